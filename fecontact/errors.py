@@ -1,0 +1,53 @@
+"""The package's exception family.
+
+Every message is one sentence that names the thing that is wrong, its value, what is allowed and
+what to do about it.
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class FecontactError(Exception):
+    """Base class of every error raised on purpose by fecontact."""
+
+
+class InputError(FecontactError, ValueError):
+    """A value, key, name or option given by the user is not usable."""
+
+
+class MeshError(FecontactError, ValueError):
+    """A mesh, or a file that should hold one, is not usable."""
+
+
+class MissingLibraryError(FecontactError):
+    """A library of the system or an optional package is not installed; the message says how to."""
+
+
+class AnalysisError(FecontactError, ArithmeticError):
+    """A computation has no answer (no equilibrium, no convergence), and the message says why."""
+
+
+def choices(names: Iterable[str]) -> str:
+    """The given names, sorted and quoted, for a message: ``'a', 'b'``, or ``none``."""
+    return ", ".join(f"'{name}'" for name in sorted(names)) or "none"
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """A hint `` (did you mean 'x'?)`` with the closest of ``names``, or an empty string."""
+    close = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
+    return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def require_positive(owner: str, **values: float) -> None:
+    """Raise :class:`InputError` unless every value is a finite number above zero."""
+    for name, value in values.items():
+        if not 0.0 < value < float("inf"):
+            raise InputError(f"{owner}: {name} = {value!r} must be a finite number above zero.")
+
+
+def require_not_negative(owner: str, **values: float) -> None:
+    """Raise :class:`InputError` unless every value is a finite number of at least zero."""
+    for name, value in values.items():
+        if not 0.0 <= value < float("inf"):
+            raise InputError(f"{owner}: {name} = {value!r} must be a finite number, zero or above.")

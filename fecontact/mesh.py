@@ -1,0 +1,135 @@
+"""The plane mesh that every other room works with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import MeshError, choices, nearest
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A plane mesh of first-order triangles or quadrilaterals with named boundaries and points.
+
+    Parameters
+    ----------
+    nodes : (N, 2) array
+        Coordinates x (tangential to the ground) and y (normal to it, into the body) [m].
+    cells : (M, 3) or (M, 4) integer array
+        Corner nodes of each cell, counter-clockwise; clockwise cells are turned round.
+    boundaries : mapping of name to (k, 2) integer array
+        Edges, as pairs of nodes; each must be an edge of exactly one cell.
+    points : mapping of name to integer or (k,) integer array
+        Nodes.
+
+    Raises
+    ------
+    MeshError
+        For arrays of another shape, nodes that do not exist, cells without area, nodes that no
+        cell uses, an empty group, or a boundary edge that is not on the outline.
+    """
+
+    nodes: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    boundaries: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    points: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        nodes = np.array(self.nodes, dtype=float)
+        cells = np.array(self.cells, dtype=np.int64)
+        if nodes.ndim != 2 or nodes.shape[1] != 2:
+            raise MeshError(f"Mesh nodes must have shape (N, 2), not {nodes.shape}.")
+        if cells.ndim != 2 or cells.shape[1] not in (3, 4) or not len(cells):
+            raise MeshError(
+                f"Mesh cells must have shape (M, 3) for triangles or (M, 4) for quadrilaterals "
+                f"with M > 0, not {cells.shape}."
+            )
+        if not np.isfinite(nodes).all():
+            raise MeshError("Mesh nodes hold values that are not finite.")
+        if cells.min() < 0 or cells.max() >= len(nodes):
+            raise MeshError(f"Mesh cells name nodes outside 0 ... {len(nodes) - 1}.")
+        if len(np.unique(cells)) != len(nodes):
+            raise MeshError(
+                f"{len(nodes) - len(np.unique(cells))} mesh nodes belong to no cell; remove them."
+            )
+        area = _signed_area(nodes, cells)
+        cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)
+        if cells.shape[1] == 4:
+            bad = _smallest_corner_jacobian(nodes, cells) <= 0
+        else:
+            bad = area == 0
+        if bad.any():
+            raise MeshError(
+                f"{np.count_nonzero(bad)} mesh cells have no area or are folded, the first is cell "
+                f"{np.flatnonzero(bad)[0]}."
+            )
+        boundaries = {name: np.array(edges, np.int64).reshape(-1, 2)
+                      for name, edges in self.boundaries.items()}
+        points = {name: np.unique(np.array(which, np.int64)) for name, which in self.points.items()}
+        for name, group in (*boundaries.items(), *points.items()):
+            if not group.size:
+                raise MeshError(f"Mesh group '{name}' is empty.")
+            if group.min() < 0 or group.max() >= len(nodes):
+                raise MeshError(f"Mesh group '{name}' names nodes outside 0 ... {len(nodes) - 1}.")
+        for array in (nodes, cells, *boundaries.values(), *points.values()):
+            array.setflags(write=False)
+        for name, value in (("nodes", nodes), ("cells", cells), ("boundaries", boundaries),
+                            ("points", points)):
+            object.__setattr__(self, name, value)
+        outline = {tuple(edge) for edge in np.sort(self.outline, axis=1).tolist()}
+        for name, edges in boundaries.items():
+            inner = [edge for edge in np.sort(edges, axis=1).tolist() if tuple(edge) not in outline]
+            if inner:
+                raise MeshError(
+                    f"Boundary '{name}' has {len(inner)} edges that are not on the outline of the "
+                    f"mesh, the first joins nodes {inner[0][0]} and {inner[0][1]}."
+                )
+
+    @cached_property
+    def outline(self) -> NDArray[np.int64]:
+        """Edges (k, 2) that belong to one cell only, the body on their left-hand side."""
+        edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2).reshape(-1, 2)
+        _, first, count = np.unique(
+            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        return edges[np.sort(first[count == 1])]
+
+    @property
+    def area(self) -> float:
+        """Area of the meshed region [m^2]."""
+        return float(_signed_area(self.nodes, self.cells).sum())
+
+    @property
+    def extent(self) -> float:
+        """Length of the diagonal of the bounding box [m]."""
+        return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
+
+    def boundary(self, name: str) -> NDArray[np.int64]:
+        """Edges (k, 2) of a named boundary; MeshError lists the names there are."""
+        if name not in self.boundaries:
+            raise MeshError(
+                f"The mesh has no boundary named '{name}'{nearest(name, self.boundaries)}; "
+                f"its boundaries are: {choices(self.boundaries)}."
+            )
+        return self.boundaries[name]
+
+
+def _signed_area(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.float64]:
+    x, y = nodes[cells, 0], nodes[cells, 1]
+    area: NDArray[np.float64] = 0.5 * (
+        x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+    return area
+
+
+def _smallest_corner_jacobian(
+    nodes: NDArray[np.float64], cells: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    corner = nodes[cells]
+    ahead = np.roll(corner, -1, axis=1) - corner
+    back = np.roll(corner, 1, axis=1) - corner
+    smallest: NDArray[np.float64] = (
+        ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]).min(axis=1)
+    return smallest
