@@ -57,10 +57,7 @@ class Mesh:
             )
         area = _signed_area(nodes, cells)
         cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)
-        if cells.shape[1] == 4:
-            bad = _smallest_corner_jacobian(nodes, cells) <= 0
-        else:
-            bad = area == 0
+        bad = _smallest_corner_jacobian(nodes, cells) <= 0 if cells.shape[1] == 4 else area == 0
         if bad.any():
             raise MeshError(
                 f"{np.count_nonzero(bad)} mesh cells have no area or are folded, the first is cell "
