@@ -28,6 +28,7 @@ class SystemArrays(NamedTuple):
     damping: Array
     constant_load: Array
     drive_shapes: Array
+    drive_stiffness: Array
     Tx: Array
     Ty: Array
     abscissa: Array
@@ -45,7 +46,7 @@ class SystemArrays(NamedTuple):
 
 
 _ARRAYS = types.NamedTuple(
-    [matrix, matrix, vector, matrix, matrix, matrix, vector, vector, matrix, matrix, vector,
+    [matrix, matrix, vector, matrix, vector, matrix, matrix, vector, vector, matrix, matrix, vector,
      vector, matrix, i8, i8, i8, i8, i8], SystemArrays)
 
 # Columns of the per-node results of `contact_state`.
@@ -180,3 +181,41 @@ def contact_history(times, states, s, out):  # type: ignore[no-untyped-def]
     """Fill out (N, n, 6) with `contact_state` at N times."""
     for k in range(len(times)):
         contact_state(times[k], states[k], s, out[k])
+
+
+# Columns of `powers`.
+POWERS = ("drive", "ground", "belt", "modal_damping", "dashpots", "contact_damping", "friction")
+
+
+@kernel(types.void(f8, vector, _ARRAYS, matrix, matrix, vector))
+def powers(t, y, s, modal_damping, dashpots, out):  # type: ignore[no-untyped-def]
+    """Fill out (7,) with the powers put in by drive, ground lifting and belt, and those lost.
+
+    ``modal_damping`` (m, m) and ``dashpots`` (m, m) are the two parts of the damping matrix.
+    """
+    n, m = s.Tx.shape
+    normal = normal_at(s.normal)
+    drive = motion_at(s.drive)
+    speed = motion_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
+    state = np.empty((n, 6))
+    contact_state(t, y, s, state)
+    out[:] = 0.0
+    for axis in range(2):
+        value, rate = drive(t, s.drive_parameters[axis])
+        pull = s.drive_stiffness[axis] * value
+        for i in range(m):
+            pull -= s.drive_shapes[axis, i] * y[i]
+        out[0] += pull * rate
+    for i in range(m):
+        for k in range(m):
+            product = y[m + i] * y[m + k]
+            out[3] += modal_damping[i, k] * product
+            out[4] += dashpots[i, k] * product
+    for j in range(n):
+        force, tangential, v, slip = state[j, 0], state[j, 1], state[j, 3], state[j, 4]
+        if force > 0.0 or state[j, 2] > 0.0:
+            elastic = normal(state[j, 2], 0.0, s.normal_parameters[j])[0]
+            out[1] += force * state[j, 5]
+            out[2] -= tangential * speed
+            out[5] += (force - elastic) * v
+            out[6] += tangential * slip

@@ -1,0 +1,217 @@
+"""What a run returns: modal histories, and everything that follows from them."""
+
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact import contact_kernels as kernels
+from fecontact.errors import InputError
+from fecontact.system import ContactSystem
+
+Array = NDArray[np.float64]
+
+
+class Status(Enum):
+    """How a run ended; the value is the sentence for people."""
+
+    FINISHED = "The run reached its end."
+    INTERRUPTED = "The run was interrupted; what was computed until then is kept."
+    FAILED = "The integrator could not go on; what was computed until then is kept."
+
+
+class ContactState(IntEnum):
+    """State of a contact node."""
+
+    OPEN = 0
+    STICK = 1
+    SLIP = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Energies:
+    """Energies, work put in and energy lost, each (N,) [J]; work and losses count from the start.
+
+    ``stored - stored[0] = work - lost`` up to the integrator's error, see :attr:`imbalance`.
+
+    Attributes
+    ----------
+    kinetic, elastic, drive_spring, contact : (N,) arrays
+        Stored: in motion, in the modes, in the springs at B, in the contact.
+    drive_work, ground_work, belt_work, load_work : (N,) arrays
+        Put in: by the moving ends of the springs at B, by the ground lifting the body, by the
+        ground dragging it along, by the load at C.
+    modal_damping, dashpots, contact_damping, friction : (N,) arrays
+        Lost: in the modes, in the dashpots at B, in the contact's normal damping, by friction
+        between body and ground.
+    """
+
+    kinetic: Array
+    elastic: Array
+    drive_spring: Array
+    contact: Array
+    drive_work: Array
+    ground_work: Array
+    belt_work: Array
+    load_work: Array
+    modal_damping: Array
+    dashpots: Array
+    contact_damping: Array
+    friction: Array
+
+    @property
+    def stored(self) -> Array:
+        """Kinetic energy and all stored energy [J]."""
+        return self.kinetic + self.elastic + self.drive_spring + self.contact
+
+    @property
+    def work(self) -> Array:
+        """All work put in [J]."""
+        return self.drive_work + self.ground_work + self.belt_work + self.load_work
+
+    @property
+    def lost(self) -> Array:
+        """All energy lost [J]."""
+        return self.modal_damping + self.dashpots + self.contact_damping + self.friction
+
+    @property
+    def imbalance(self) -> float:
+        """Largest ``|stored - stored[0] - work + lost|`` relative to the largest energy in it."""
+        error = np.abs(self.stored - self.stored[0] - self.work + self.lost).max()
+        terms = [getattr(self, name) for name in self.__dataclass_fields__]
+        scale = max(float(np.abs(term).max()) for term in terms)
+        return float(error) / scale if scale > 0.0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Motion of a contact system at N output times.
+
+    Attributes
+    ----------
+    system : ContactSystem
+    time : (N,) array
+        [s].
+    modal_coordinates, modal_velocities : (N, m) arrays
+        q and q'.
+    work : (N, 7) array
+        Integrals of the powers :data:`fecontact.contact_kernels.POWERS` from the first time [J].
+    status : Status
+        How the run ended.
+    statistics : mapping
+        Counts of the integrator: steps, right-hand sides, Jacobians, factorisations, seconds.
+    """
+
+    system: ContactSystem
+    time: Array
+    modal_coordinates: Array
+    modal_velocities: Array
+    work: Array
+    status: Status = Status.FINISHED
+    statistics: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def states(self) -> Array:
+        """States y = [q, q'] (N, 2 m)."""
+        return np.hstack([self.modal_coordinates, self.modal_velocities])
+
+    def displacement(self, point: str | int | tuple[float, float]) -> Array:
+        """Displacement x, y [m] and rotation phi [rad] (N, 3) of a point.
+
+        Parameters
+        ----------
+        point : str, int or (x, y)
+            'B', 'C' or a further named point; a contact node by its number from 0; or the
+            displacement node of the body nearest to a place (then without phi: (N, 2)).
+        """
+        return self.modal_coordinates @ self._rows(point).T
+
+    def velocity(self, point: str | int | tuple[float, float]) -> Array:
+        """Velocity [m/s] and angular velocity [rad/s] (N, 3) of a point; see displacement."""
+        return self.modal_velocities @ self._rows(point).T
+
+    def _rows(self, point: str | int | tuple[float, float]) -> Array:
+        basis = self.system.basis
+        if isinstance(point, str | int | np.integer):
+            return basis.T[basis.point_index(point if isinstance(point, str) else int(point))]
+        if basis.field is None:
+            raise InputError(f"The point {point} cannot be found: the modal basis holds no shapes "
+                             f"over the body; use a named point or a contact node.")
+        distance = np.linalg.norm(basis.field.nodes - np.asarray(point, dtype=float), axis=1)
+        nearest_node = int(np.argmin(distance))
+        reach = np.ptp(basis.field.nodes, axis=0).max()
+        if distance[nearest_node] > 0.1 * reach:
+            raise InputError(f"The point {point} lies outside the body, {distance.min():.3g} m "
+                             f"away from it.")
+        return basis.field.shapes[nearest_node]
+
+    @cached_property
+    def _contact(self) -> Array:
+        return self.system.contact_history(self.time, self.states)
+
+    @property
+    def normal_force(self) -> Array:
+        """Normal forces F (N, n) on the body, zero or above [N]."""
+        return self._contact[:, :, kernels.NORMAL_FORCE]
+
+    @property
+    def friction_force(self) -> Array:
+        """Friction forces R (N, n); on the body they act in -x [N]."""
+        return self._contact[:, :, kernels.FRICTION_FORCE]
+
+    @property
+    def penetration(self) -> Array:
+        """Penetrations u (N, n), negative where open [m]."""
+        return self._contact[:, :, kernels.PENETRATION]
+
+    @property
+    def slip_velocity(self) -> Array:
+        """Slip velocities (N, n) of the body relative to the ground [m/s]."""
+        return self._contact[:, :, kernels.SLIP_VELOCITY]
+
+    @property
+    def pressure(self) -> Array:
+        """Normal force per length of the contact face (N, n) [N/m]."""
+        return self.normal_force / self.system.basis.tributary
+
+    @cached_property
+    def contact_state(self) -> NDArray[np.int8]:
+        """State (N, n) of the contact nodes, values of :class:`ContactState`.
+
+        Open without normal force; stick below the slip velocity at which friction is largest.
+        """
+        stick = self.system.friction.stick_velocity(self.system.basis.contact_nodes)
+        state = np.where(np.abs(self.slip_velocity) < stick, ContactState.STICK, ContactState.SLIP)
+        return np.where(self.normal_force > 0.0, state, ContactState.OPEN).astype(np.int8)
+
+    @cached_property
+    def energies(self) -> Energies:
+        """Energies, work and losses of the run."""
+        system, basis = self.system, self.system.basis
+        drive, t = system.drive, self.time
+        q, rate = self.modal_coordinates, self.modal_velocities
+        spring = np.zeros(len(t))
+        for axis, c in ((0, drive.stiffness_x), (1, drive.stiffness_y)):
+            ends = np.array([drive.motion_kernel.python(time, drive.motion_parameters()[axis])[0]
+                             for time in t])
+            spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
+        contact = system.normal.stored_energy(self.penetration, system.share).sum(axis=1)
+        put = dict(zip(kernels.POWERS, self.work.T, strict=True))
+        height = q @ basis.T[1, 1]
+        return Energies(
+            kinetic=0.5 * (rate**2).sum(axis=1),
+            elastic=0.5 * ((basis.angular_frequencies * q) ** 2).sum(axis=1),
+            drive_spring=spring,
+            contact=contact,
+            drive_work=put["drive"],
+            ground_work=put["ground"],
+            belt_work=put["belt"],
+            load_work=-system.load.normal * (height - height[0]),
+            modal_damping=put["modal_damping"],
+            dashpots=put["dashpots"],
+            contact_damping=put["contact_damping"],
+            friction=put["friction"],
+        )
