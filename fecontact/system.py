@@ -85,7 +85,7 @@ class ContactSystem:
             damping=damping,
             constant_load=-self.load.normal * C[1],
             drive_shapes=np.array([drive.stiffness_x * B[0], drive.stiffness_y * B[1]]),
-            drive_stiffness=np.array([drive.stiffness_x, drive.stiffness_y]),
+            drive_stiffness=np.array([drive.stiffness_x, drive.stiffness_y], dtype=float),
             Tx=basis.contact_T[:, 0].copy(),
             Ty=basis.contact_T[:, 1].copy(),
             abscissa=basis.contact_x.copy(),

@@ -65,7 +65,7 @@ class Drive:
     def motion_parameters(self) -> NDArray[np.float64]:
         """Parameters (2, k) of the compiled motions in x and y."""
         w = self.angular_frequency
-        return np.array([[self.amplitude_x, w], [self.amplitude_y, w]])
+        return np.array([[self.amplitude_x, w], [self.amplitude_y, w]], dtype=float)
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,8 @@ class Ground:
 
     def profile_parameters(self) -> NDArray[np.float64]:
         """Parameters of the compiled profile."""
-        return np.array([self.amplitude, 2.0 * np.pi / self.wavelength])
+        return np.array([self.amplitude, 2.0 * np.pi / self.wavelength], dtype=float)
 
     def motion_parameters(self) -> NDArray[np.float64]:
         """Parameters of the compiled motion."""
-        return np.array([self.speed])
+        return np.array([self.speed], dtype=float)
