@@ -1,0 +1,268 @@
+"""The elastic body: mesh, material and supports as stiffness and mass."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.basis import ModalBasis
+from fecontact.damping import Damping
+from fecontact.errors import InputError, MeshError, choices, nearest, require_positive
+from fecontact.mesh import Mesh
+
+if TYPE_CHECKING:
+    from fecontact.points import Place
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elastic material.
+
+    Parameters
+    ----------
+    youngs_modulus : float
+        E, positive [Pa].
+    poisson_ratio : float
+        nu, above -1 and below 0.5.
+    density : float
+        rho, positive [kg/m^3].
+    """
+
+    youngs_modulus: float = 2.1e11
+    poisson_ratio: float = 0.3
+    density: float = 7850.0
+
+    def __post_init__(self) -> None:
+        require_positive("Material", youngs_modulus=self.youngs_modulus, density=self.density)
+        if not -1.0 < self.poisson_ratio < 0.5:
+            raise InputError(f"Material: poisson_ratio = {self.poisson_ratio!r} must be above -1 "
+                             f"and below 0.5.")
+
+    @classmethod
+    def named(cls, name: str) -> "Material":
+        """'steel' or 'aluminium' with handbook values; InputError lists the names there are."""
+        if name not in _MATERIALS:
+            raise InputError(f"There is no material '{name}'{nearest(name, _MATERIALS)}; named "
+                             f"materials are {choices(_MATERIALS)}, or give youngs_modulus, "
+                             f"poisson_ratio and density.")
+        return cls(*_MATERIALS[name])
+
+
+_MATERIALS = {"steel": (2.1e11, 0.3, 7850.0), "aluminium": (7.0e10, 0.33, 2700.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticBody:
+    """A plane linear elastic body of quadratic (or linear) finite elements.
+
+    Displacement nodes are the mesh nodes, then the middles of the edges, then those of the
+    quadrilaterals; degree of freedom 2 k is the displacement of node k in x, 2 k + 1 that in y.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Straight-sided triangles or quadrilaterals.
+    material : Material
+    thickness : float
+        Out-of-plane thickness, positive [m].
+    plane : 'stress' or 'strain'
+    degree : 2 or 1
+        Quadratic (P2, Q2) or linear (P1, Q1) displacements.
+    fixed : mapping of name to 'x', 'y' or 'xy'
+        Displacements held at zero on named boundaries or points of the mesh.
+
+    Raises
+    ------
+    InputError
+        For values out of range.
+    MeshError
+        For names that the mesh does not have, or a mesh in several pieces.
+    """
+
+    mesh: Mesh
+    material: Material = field(default_factory=Material)
+    thickness: float = 1.0
+    plane: Literal["stress", "strain"] = "stress"
+    degree: int = 2
+    fixed: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_positive("ElasticBody", thickness=self.thickness)
+        if self.plane not in ("stress", "strain"):
+            raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")
+        if self.degree not in (1, 2):
+            raise InputError(f"ElasticBody: degree = {self.degree!r} must be 1 or 2.")
+        known = {*self.mesh.boundaries, *self.mesh.points}
+        for name, directions in self.fixed.items():
+            if name not in known:
+                raise MeshError(f"The mesh has no boundary or point '{name}' to be fixed"
+                                f"{nearest(name, known)}; it has: {choices(known)}.")
+            if directions not in ("x", "y", "xy"):
+                raise InputError(f"ElasticBody: fixed['{name}'] = {directions!r} must be 'x', 'y' "
+                                 f"or 'xy'.")
+        pieces = _pieces(self.mesh)
+        if pieces > 1:
+            raise MeshError(f"The mesh falls into {pieces} pieces that share no node; a body must "
+                            f"be one piece.")
+
+    @cached_property
+    def basis(self) -> Any:
+        """Scalar scikit-fem basis of one displacement component."""
+        import skfem
+
+        kind = skfem.MeshTri1 if self.mesh.cells.shape[1] == 3 else skfem.MeshQuad1
+        elements = {(3, 1): skfem.ElementTriP1, (3, 2): skfem.ElementTriP2,
+                    (4, 1): skfem.ElementQuad1, (4, 2): skfem.ElementQuad2}
+        element = elements[self.mesh.cells.shape[1], self.degree]()
+        # Fourth order is exact for the mass of straight-sided triangles and parallelograms.
+        return skfem.Basis(kind(self.mesh.nodes.T.copy(), self.mesh.cells.T.copy()), element,
+                           intorder=4)
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Reference places (N, 2) of the displacement nodes [m]."""
+        return np.ascontiguousarray(self.basis.doflocs.T)
+
+    @cached_property
+    def stiffness(self) -> Any:
+        """Stiffness K, sparse (2 N, 2 N), without supports [N/m]."""
+        import scipy.sparse as sp
+        from skfem import BilinearForm
+
+        # The weak form component by component: three scalar forms of 9 x 9 pairs take a fraction
+        # of the time of one vector form of 18 x 18 pairs, most of whose products are zero.
+        gradients = [
+            BilinearForm(lambda u, v, w, a=a, b=b: v.grad[a] * u.grad[b]).assemble(self.basis)
+            for a, b in ((0, 0), (1, 1), (0, 1))
+        ]
+        xx, yy, xy = (matrix.tocsr() for matrix in gradients)
+        direct, lateral, shear = self.elasticity
+        blocks = [[direct * xx + shear * yy, lateral * xy + shear * xy.T],
+                  [lateral * xy.T + shear * xy, direct * yy + shear * xx]]
+        K = sum(sp.kron(blocks[i][j], sp.csr_array(([1.0], ([i], [j])), shape=(2, 2)))
+                for i in range(2) for j in range(2))
+        return sp.csc_array(0.5 * self.thickness * (K + K.T))
+
+    @cached_property
+    def mass(self) -> Any:
+        """Mass M, sparse (2 N, 2 N), without supports [kg]."""
+        import scipy.sparse as sp
+        from skfem import BilinearForm
+
+        scalar = BilinearForm(lambda u, v, w: u * v).assemble(self.basis)
+        scalar = 0.5 * self.material.density * self.thickness * (scalar + scalar.T)
+        return sp.csc_array(sp.kron(scalar, sp.eye_array(2)))
+
+    @cached_property
+    def gradients(self) -> tuple[Any, Any]:
+        """Derivatives to x and y at the nodes, sparse (N, N): means of the adjoining elements."""
+        from fecontact.points import nodal_gradients
+
+        return nodal_gradients(self)
+
+    @property
+    def elasticity(self) -> tuple[float, float, float]:
+        """Plane elastic constants [Pa]: s_xx = first e_xx + second e_yy, s_xy = third g_xy."""
+        E, nu = self.material.youngs_modulus, self.material.poisson_ratio
+        shear = E / (2.0 * (1.0 + nu))
+        if self.plane == "stress":
+            return E / (1.0 - nu**2), nu * E / (1.0 - nu**2), shear
+        lateral = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        return lateral + 2.0 * shear, lateral, shear
+
+    @cached_property
+    def fixed_dofs(self) -> NDArray[np.int64]:
+        """Degrees of freedom held by the supports, ascending."""
+        held: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
+        for name, directions in self.fixed.items():
+            if name in self.mesh.points:
+                where = np.asarray(self.mesh.points[name])
+            else:
+                where = np.unique(self.edge_nodes(self.mesh.boundaries[name]))
+            held += [2 * where + "xy".index(axis) for axis in directions]
+        return np.unique(np.concatenate(held))
+
+    @cached_property
+    def free_dofs(self) -> NDArray[np.int64]:
+        """Degrees of freedom not held by supports, ascending."""
+        return np.setdiff1d(np.arange(2 * len(self.nodes)), self.fixed_dofs)
+
+    def edge_nodes(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Displacement nodes (k, degree + 1) of mesh edges (k, 2): start, (middle,) end."""
+        if self.degree == 1:
+            return np.asarray(edges)
+        facets = self.basis.mesh.facets.T
+        size = len(self.mesh.nodes)
+        order = np.argsort(facets[:, 0] * size + facets[:, 1])
+        keys = (facets[:, 0] * size + facets[:, 1])[order]
+        ends = np.sort(edges, axis=1)
+        middle = size + order[np.searchsorted(keys, ends[:, 0] * size + ends[:, 1])]
+        return np.column_stack([edges[:, 0], middle, edges[:, 1]])
+
+    def angular_frequencies(self, count: int = 20) -> Array:
+        """The lowest eigenfrequencies [rad/s], exactly zero for rigid modes."""
+        from fecontact.eigen import eigenmodes
+
+        return eigenmodes(self, count)[0]
+
+    def frequencies_hz(self, count: int = 20) -> Array:
+        """The lowest eigenfrequencies [Hz], exactly zero for rigid modes."""
+        return self.angular_frequencies(count) / (2.0 * np.pi)
+
+    def modal_basis(
+        self,
+        modes: int = 20,
+        *,
+        contact: str = "contact",
+        contact_nodes: int | Literal["all"] = "all",
+        B: "Place | None" = None,
+        C: "Place | None" = None,
+        points: "Mapping[str, Place] | None" = None,
+        damping: Damping = 0.0,
+    ) -> ModalBasis:
+        """Mass-normalised modes, and T at B, C and the contact nodes.
+
+        Parameters
+        ----------
+        modes : int
+            Number of modes, the rigid ones included, lowest first.
+        contact : str
+            Boundary that touches the ground; its outward normal must point down, to -y.
+        contact_nodes : int or 'all'
+            Number of equal segments of the contact boundary, each with a node in its middle that
+            moves with the segment's mean displacement; or every displacement node of the
+            boundary.
+        B, C : place, optional
+            Excitation and load point: the name of a point or boundary of the mesh, (x, y), or
+            :class:`~fecontact.points.Patch`. Default: the mesh's point of that name; without
+            one, the rows are zero.
+        points : mapping of name to place, optional
+            Further points to observe.
+        damping : float, (m,) sequence, Rayleigh or (m, m) array
+            See :func:`fecontact.damping.modal_damping`.
+
+        Raises
+        ------
+        InputError, MeshError
+            For names that do not exist, places outside the body, an upward contact face, more
+            modes than unknowns, more contact nodes than the boundary has.
+        """
+        from fecontact.reduction import reduce_body
+
+        return reduce_body(self, modes, contact=contact, contact_nodes=contact_nodes, B=B, C=C,
+                           points=points or {}, damping=damping)
+
+
+def _pieces(mesh: Mesh) -> int:
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
+    first = np.repeat(mesh.cells[:, :1], mesh.cells.shape[1] - 1, axis=1).ravel()
+    graph = sp.coo_array((np.ones(first.size), (first, mesh.cells[:, 1:].ravel())),
+                         shape=(len(mesh.nodes),) * 2)
+    return int(connected_components(graph, directed=False, return_labels=False))

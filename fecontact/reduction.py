@@ -1,0 +1,104 @@
+"""From the finite-element body to its modal basis."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.basis import Field, ModalBasis
+from fecontact.contact_face import contact_nodes as nodes_of_face
+from fecontact.damping import Damping, modal_damping
+from fecontact.eigen import eigenmodes
+from fecontact.errors import InputError
+from fecontact.points import Place, Rows, place_rows
+
+if TYPE_CHECKING:
+    from fecontact.body import ElasticBody
+
+Array = NDArray[np.float64]
+
+
+def reduce_body(
+    body: "ElasticBody",
+    modes: int,
+    *,
+    contact: str,
+    contact_nodes: int | Literal["all"],
+    B: Place | None,
+    C: Place | None,
+    points: Mapping[str, Place],
+    damping: Damping,
+) -> ModalBasis:
+    """Modal basis of a body; see :meth:`fecontact.body.ElasticBody.modal_basis`."""
+    import scipy.sparse as sp
+
+    for name in points:
+        if name in ("B", "C"):
+            raise InputError(f"points: '{name}' is a name of its own; give it as {name}=...")
+    face = nodes_of_face(body, contact, contact_nodes)
+    named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
+    further = [place_rows(body, place, name) for name, place in points.items()]
+    restriction = sp.csr_array(sp.vstack(
+        [*(row.matrix for row in named), face.matrix, *(row.matrix for row in further)]))
+    w, shapes = eigenmodes(body, modes)
+    return ModalBasis(
+        angular_frequencies=w,
+        damping=modal_damping(damping, w),
+        T=(restriction @ shapes).reshape(-1, 3, modes),
+        positions=np.array([*(row.position for row in named), *face.positions,
+                            *(row.position for row in further)]),
+        tributary=face.tributary,
+        extra=tuple(points),
+        field=Field(
+            nodes=body.nodes,
+            cells=linear_cells(body),
+            outline=_halved(body.edge_nodes(body.mesh.outline)),
+            shapes=shapes.reshape(-1, 2, modes),
+            stress=modal_stress(body, shapes),
+            restriction=restriction,
+        ),
+    )
+
+
+def linear_cells(body: "ElasticBody") -> NDArray[np.int64]:
+    """First-order cells between all displacement nodes, counter-clockwise."""
+    dofs = body.basis.element_dofs
+    if body.degree == 1:
+        cells = dofs.T
+    elif len(dofs) == 6:
+        a, b, c, ab, bc, ac = dofs
+        cells = np.concatenate([np.column_stack(cell) for cell in (
+            (a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac))])
+    else:
+        a, b, c, d, ab, bc, cd, ad, m = dofs
+        cells = np.concatenate([np.column_stack(cell) for cell in (
+            (a, ab, m, ad), (ab, b, bc, m), (m, bc, c, cd), (ad, m, cd, d))])
+    side = body.nodes[cells[:, :3]]
+    (ux, uy), (vx, vy) = (side[:, 1] - side[:, 0]).T, (side[:, 2] - side[:, 0]).T
+    return np.where((ux * vy - uy * vx < 0.0)[:, None], cells[:, ::-1], cells)
+
+
+def modal_stress(body: "ElasticBody", shapes: Array) -> Array:
+    """Stresses xx, yy, zz, xy (N, 4, m) of displacement fields (2 N, m), means at nodes [Pa]."""
+    dx, dy = body.gradients
+    direct, lateral, shear = body.elasticity
+    u, v = shapes[0::2], shapes[1::2]
+    xx, yy, slide = dx @ u, dy @ v, dy @ u + dx @ v
+    sxx, syy = direct * xx + lateral * yy, lateral * xx + direct * yy
+    szz = body.material.poisson_ratio * (sxx + syy) * (body.plane == "strain")
+    return np.stack([sxx, syy, szz, shear * slide], axis=1)
+
+
+def _point(body: "ElasticBody", place: Place | None, name: str) -> Rows:
+    import scipy.sparse as sp
+
+    if place is None:
+        if name in body.mesh.points or name in body.mesh.boundaries:
+            return place_rows(body, name, name)
+        return Rows(sp.csr_array((3, 2 * len(body.nodes))), np.zeros(2))
+    return place_rows(body, place, name)
+
+
+def _halved(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.concatenate([edges[:, i : i + 2] for i in range(edges.shape[1] - 1)])
