@@ -219,3 +219,11 @@ def powers(t, y, s, modal_damping, dashpots, out):  # type: ignore[no-untyped-de
             out[2] -= tangential * speed
             out[5] += (force - elastic) * v
             out[6] += tangential * slip
+
+
+@kernel(types.void(i8, vector, vector, matrix, vector, vector))
+def normal_values(address, u, v, p, force, slope):  # type: ignore[no-untyped-def]
+    """Fill force and dF/du (k,) of a normal law at k penetrations and rates."""
+    law = normal_at(address)
+    for j in range(len(u)):
+        force[j], slope[j], _ = law(u[j], v[j], p[j])

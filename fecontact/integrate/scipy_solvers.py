@@ -1,0 +1,129 @@
+"""Time integration by scipy's stiff solvers, with the compiled right-hand side and Jacobian."""
+
+import time as clock
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact import contact_kernels as kernels
+from fecontact.integrate.trajectory import Status
+from fecontact.system import ContactSystem
+
+Array = NDArray[np.float64]
+
+METHODS = ("Radau", "BDF", "LSODA")
+
+
+def integrate(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    method: str,
+    rtol: float,
+    progress: Callable[[float], None] | None,
+) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
+    """Integrate from ``times[0]`` to ``times[-1]``.
+
+    The powers of drive, ground, belt, damping and friction are integrated along with the state;
+    their error is controlled too, so that the energy balance closes to the tolerance.
+
+    Returns
+    -------
+    times (k,), states (k, 2 m), work (k, 7), status, statistics
+        k is smaller than the number of times asked for if the run ended early.
+    """
+    import scipy.integrate
+
+    size, extra = len(state), len(kernels.POWERS)
+    arrays = system.arrays
+    modal = np.array(system.basis.damping)
+    dashpots = arrays.damping - modal
+    counts = {"right_hand_sides": 0, "jacobians": 0}
+
+    def rhs(t: float, y: Array) -> Array:
+        counts["right_hand_sides"] += 1
+        out = np.empty(size + extra)
+        state = np.ascontiguousarray(y[:size])
+        kernels.right_hand_side(t, state, arrays, out[:size])
+        kernels.powers(t, state, arrays, modal, dashpots, out[size:])
+        return out
+
+    def jacobian(t: float, y: Array) -> Array:
+        counts["jacobians"] += 1
+        out = np.zeros((size + extra, size + extra))
+        out[:size, :size] = system.jacobian(t, y[:size])
+        return out
+
+    begin = clock.perf_counter()
+    energy = 0.01 * rtol * _energy_scale(system, state)
+    tolerance = np.concatenate([absolute_tolerances(system, rtol), np.full(extra, energy)])
+    solver = getattr(scipy.integrate, method)(
+        rhs, float(times[0]), np.concatenate([state, np.zeros(extra)]), float(times[-1]),
+        jac=jacobian, rtol=rtol, atol=tolerance, max_step=longest_step(system, times))
+    result = np.empty((len(times), size + extra))
+    result[0] = solver.y
+    done, steps = 1, 0
+    status = Status.FINISHED
+    try:
+        while done < len(times):
+            message = solver.step()
+            if solver.status == "failed":
+                status = Status.FAILED
+                counts["message"] = message
+                break
+            steps += 1
+            reached = done + int(np.searchsorted(times[done:], solver.t, side="right"))
+            if solver.status == "finished":
+                reached = len(times)
+            if reached > done:
+                result[done:reached] = solver.dense_output()(times[done:reached]).T
+                done = reached
+            if progress is not None:
+                progress(float(solver.t))
+    except KeyboardInterrupt:
+        status = Status.INTERRUPTED
+    statistics = {"method": method, "rtol": rtol, "steps": steps, **counts,
+                  "seconds": clock.perf_counter() - begin}
+    return times[:done], result[:done, :size], result[:done, size:], status, statistics
+
+
+def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
+    """Absolute tolerances (2 m,) of the modal state.
+
+    ``rtol`` times the smallest roughness height for displacements; for velocities a tenth of the
+    width 1/k_s of the friction smoothing, or less for a finer ``rtol``: steps that do not resolve
+    it lose the contact's stick. Both are divided by the mode's largest motion at any point.
+    """
+    T = system.basis.T[:, :2]
+    largest = np.abs(T).max(axis=(0, 1))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    height = float(np.min(system.normal.roughness_height))
+    velocity = min(0.1, 1e5 * rtol) * system.friction.velocity_scale
+    return np.concatenate([rtol * height / largest, velocity / largest])
+
+
+def _energy_scale(system: ContactSystem, state: Array) -> float:
+    """Energy at the start, of the drive's springs and of the load over the roughness [J]."""
+    m, drive = system.basis.modes, system.drive
+    start = 0.5 * (state[m:] ** 2).sum() + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
+    springs = 0.5 * (drive.stiffness_x * drive.amplitude_x**2
+                     + drive.stiffness_y * drive.amplitude_y**2)
+    pressed = abs(system.load.normal) * float(np.max(system.normal.roughness_height))
+    return float(start + springs + pressed) or np.inf
+
+
+def longest_step(system: ContactSystem, times: Array) -> float:
+    """A fiftieth of the run, a twentieth of the drive's period and of the wave's passing [s].
+
+    Longer steps could jump over an excitation that starts from rest.
+    """
+    limits = [(times[-1] - times[0]) / 50.0]
+    drive, ground = system.drive, system.ground
+    if drive.angular_frequency > 0.0 and (drive.amplitude_x or drive.amplitude_y):
+        limits.append(2.0 * np.pi / drive.angular_frequency / 20.0)
+    if ground.amplitude > 0.0 and ground.speed != 0.0:
+        limits.append(ground.wavelength / abs(ground.speed) / 20.0)
+    return float(min(limits))

@@ -1,0 +1,208 @@
+"""Equilibria: a body resting on the ground, and steady sliding."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact import contact_kernels as kernels
+from fecontact.errors import AnalysisError
+from fecontact.laws.contract import friction_law, motion
+from fecontact.system import ContactSystem
+
+Array = NDArray[np.float64]
+
+
+@friction_law
+def _frictionless(v, F, p):  # type: ignore[no-untyped-def]
+    return 0.0, 0.0, 0.0
+
+
+@motion
+def _still(t, p):  # type: ignore[no-untyped-def]
+    return p[0], 0.0
+
+
+def static_equilibrium(
+    system: ContactSystem, *, friction: bool = False, time: float = 0.0
+) -> Array:
+    """Modal coordinates q (m,) of an equilibrium under the constant load.
+
+    Solves ``w^2 q = T^T f`` with the drive at its mean, by Newton's method, with continuation in
+    the load where Newton's method alone does not get there.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Its ground is flat for steady sliding.
+    friction : bool
+        With friction, steady sliding: x' = 0 and slip velocity -V at every node; needs flat
+        ground. Without, the body at rest on the ground as it stands at ``time``.
+    time : float
+        Moment at which the profile of the ground is taken when there is no friction [s].
+
+    Raises
+    ------
+    AnalysisError
+        If there is no equilibrium: it names the direction in which nothing holds the body, or
+        says that the load lifts or tips it; and for steady sliding on wavy ground.
+    """
+    if friction and system.ground.amplitude > 0.0:
+        raise AnalysisError(
+            f"There is no steady sliding on wavy ground (ground.amplitude = "
+            f"{system.ground.amplitude:g} m); start from rest or flatten the ground.")
+    arrays = system.arrays._replace(drive_shapes=np.zeros_like(system.arrays.drive_shapes))
+    if not friction:
+        travel = system.ground.motion_kernel.python(time, system.ground.motion_parameters())[0]
+        arrays = arrays._replace(
+            friction=_frictionless.address,
+            ground_motion=_still.address,
+            ground_motion_parameters=np.array([travel], dtype=float),
+        )
+    problem = _Balance(arrays)
+    solution = problem.solve(problem.guess(1.0), 1.0)
+    if solution is None:
+        solution = _continued(problem)
+    if solution is None:
+        raise AnalysisError(_reason(system, problem, friction))
+    return solution
+
+
+class _Balance:
+    """Out-of-balance modal forces of a resting or steadily sliding body."""
+
+    def __init__(self, arrays: kernels.SystemArrays) -> None:
+        self.arrays = arrays
+        self.load = arrays.constant_load
+        m = len(self.load)
+        self._rate, self._matrix = np.empty(2 * m), np.empty((2 * m, 2 * m))
+        self._state = np.zeros(2 * m)
+        # Stiffness of a face with every asperity in contact, and what offset force it has.
+        far = 1e3 * np.max(np.abs(arrays.normal_parameters[:, 1]))
+        values = np.array([_normal(arrays, far, j) for j in range(len(arrays.gap))])
+        self.face_stiffness = values[:, 1]
+        self.face_offset = values[:, 1] * far - values[:, 0]
+        tangential = (arrays.Tx**2).T @ self.face_stiffness
+        normal = (arrays.Ty**2).T @ self.face_stiffness
+        diagonal = np.diag(arrays.stiffness)
+        self.scale = diagonal + tangential + normal
+        self.scale[self.scale == 0.0] = 1.0
+
+    def force(self, q: Array, load: float) -> Array:
+        """Out-of-balance force (m,) under a part of the load."""
+        m = len(q)
+        self._state[:m] = q
+        part = self.arrays._replace(constant_load=load * self.load)
+        kernels.right_hand_side(0.0, self._state, part, self._rate)
+        return self._rate[m:].copy()
+
+    def gradient(self, q: Array) -> Array:
+        """Derivative (m, m) of the force."""
+        m = len(q)
+        self._state[:m] = q
+        kernels.jacobian(0.0, self._state, self.arrays, self._matrix)
+        return self._matrix[m:, :m].copy()
+
+    def guess(self, load: float) -> Array:
+        """Equilibrium of a face that is all in contact, and that could also pull."""
+        arrays = self.arrays
+        stiffness = arrays.stiffness + (arrays.Ty.T * self.face_stiffness) @ arrays.Ty
+        flat = arrays.gap * self.face_stiffness + self.face_offset
+        force = load * self.load - arrays.Ty.T @ flat
+        return self._solve(stiffness, force, 1e-10)
+
+    def solve(self, q: Array, load: float) -> Array | None:
+        """Newton's method with a shift that grows when a step does not help; None if it fails."""
+        shift = 1e-10
+        force = self.force(q, load)
+        best = self._size(force)
+        settled = 0
+        for _ in range(200):
+            gradient = self.gradient(q)
+            for _ in range(40):
+                step = self._solve(-gradient, force, shift)
+                trial = q + step
+                trial_force = self.force(trial, load)
+                size = self._size(trial_force)
+                if size < best or (shift <= 1e-10 and size <= self._noise(trial, load)):
+                    break
+                shift = max(10.0 * shift, 1e-8)
+                if shift > 1e8:
+                    return q if best <= self._noise(q, load) else None
+            q, force, best = trial, trial_force, size
+            shift = max(0.1 * shift, 1e-10)
+            if best <= self._noise(q, load):
+                settled += 1
+                if settled == 3:
+                    return q
+        return None
+
+    def holds(self, q: Array) -> tuple[Array, Array]:
+        """Relative stiffnesses (ascending) and their directions (m, k) at q."""
+        root = np.sqrt(self.scale)
+        scaled = -self.gradient(q) / np.outer(root, root)
+        _, values, rows = np.linalg.svd(scaled)
+        return np.asarray(values[::-1]), np.asarray((rows[::-1] / root).T)
+
+    def _solve(self, stiffness: Array, force: Array, shift: float) -> Array:
+        return np.asarray(np.linalg.solve(stiffness + np.diag(shift * self.scale), force))
+
+    def _size(self, force: Array) -> float:
+        return float(np.linalg.norm(force / np.sqrt(self.scale)))
+
+    def _noise(self, q: Array, load: float) -> float:
+        arrays = self.arrays
+        terms = np.abs(arrays.stiffness) @ np.abs(q) + np.abs(load * self.load)
+        contact = self.force(q, load) - load * self.load + arrays.stiffness @ q
+        return 1e-11 * self._size(terms + np.abs(contact))
+
+
+def _normal(arrays: kernels.SystemArrays, penetration: float, node: int) -> tuple[float, float]:
+    force, slope = np.empty(1), np.empty(1)
+    kernels.normal_values(arrays.normal, np.array([penetration]), np.zeros(1),
+                          arrays.normal_parameters[node : node + 1], force, slope)
+    return float(force[0]), float(slope[0])
+
+
+def _continued(problem: _Balance) -> Array | None:
+    """Follow the equilibrium from a small load up, halving the step in load where it fails."""
+    load, step = 1e-3, 0.1
+    q = problem.solve(problem.guess(load), load)
+    if q is None:
+        return None
+    while load < 1.0:
+        trial = min(1.0, load + step)
+        found = problem.solve(q, trial)
+        if found is None:
+            step *= 0.5
+            if step < 1e-4:
+                return None
+            continue
+        q, load, step = found, trial, 2.0 * step
+    return q
+
+
+def _reason(system: ContactSystem, problem: _Balance, friction: bool) -> str:
+    kind = "steady sliding" if friction else "static equilibrium"
+    q = problem.guess(1.0)
+    values, directions = problem.holds(q)
+    force = problem.force(q, 1.0)
+    for value, direction in zip(values, directions.T, strict=True):
+        if value > 1e-9:
+            break
+        pull = abs(direction @ force)
+        if pull > 1e-9 * np.linalg.norm(direction) * np.linalg.norm(force):
+            return (f"There is no {kind}: nothing holds the body against "
+                    f"{_named(system, direction)}; give it a spring at B (drive.stiffness_x, "
+                    f"drive.stiffness_y) or a support.")
+    return (f"There is no {kind}: under load.normal = {system.load.normal:g} N the body lifts off "
+            f"or tips over; check the sign and place of the load, and the length of the contact.")
+
+
+def _named(system: ContactSystem, direction: Array) -> str:
+    motion = system.basis.contact_T @ direction
+    x, y = np.abs(motion[:, 0]).max(), np.abs(motion[:, 1]).max()
+    if x > 10.0 * y:
+        return "a translation along the ground (x)"
+    spread = np.ptp(motion[:, 1])
+    if y > 10.0 * x and spread < 0.1 * y:
+        return "a translation away from the ground (y)"
+    return "a rotation"
