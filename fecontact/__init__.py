@@ -1,3 +1,12 @@
-"""fecontact: elastic bodies in contact with friction."""
+"""fecontact: elastic bodies in contact with friction.
+
+Geometry, mesh, :class:`ElasticBody`, :class:`ModalBasis`, :class:`ContactSystem`,
+:func:`simulate`, pictures: each of these takes what the one before it gives. Units are SI.
+The public names stand in ``__init__.pyi``; each is loaded when it is first used.
+"""
+
+import lazy_loader
 
 __version__ = "0.1.0"
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
