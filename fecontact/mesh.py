@@ -5,9 +5,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fecontact.errors import MeshError, choices, nearest
+
+_FLAT = 1e-12  # area of a degenerate cell, as part of its squared sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +30,9 @@ class Mesh:
     Raises
     ------
     MeshError
-        For arrays of another shape, nodes that do not exist, cells without area, nodes that no
-        cell uses, an empty group, or a boundary edge that is not on the outline.
+        For arrays of another shape, nodes that do not exist, cells without area or on one
+        another, nodes that no cell uses, an empty group, or a boundary edge that is not on the
+        outline or is named twice.
     """
 
     nodes: NDArray[np.float64]
@@ -57,14 +60,15 @@ class Mesh:
             )
         area = _signed_area(nodes, cells)
         cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)
-        bad = _smallest_corner_jacobian(nodes, cells) <= 0 if cells.shape[1] == 4 else area == 0
+        area = _smallest_corner_jacobian(nodes, cells) if cells.shape[1] == 4 else np.abs(area)
+        side = nodes[cells] - np.roll(nodes[cells], 1, axis=1)
+        bad = area <= _FLAT * (side**2).sum(axis=(1, 2))
         if bad.any():
             raise MeshError(
                 f"{np.count_nonzero(bad)} mesh cells have no area or are folded, the first is cell "
                 f"{np.flatnonzero(bad)[0]}."
             )
-        boundaries = {name: np.array(edges, np.int64).reshape(-1, 2)
-                      for name, edges in self.boundaries.items()}
+        boundaries = {name: _edges(name, edges) for name, edges in self.boundaries.items()}
         points = {name: np.unique(np.array(which, np.int64)) for name, which in self.points.items()}
         for name, group in (*boundaries.items(), *points.items()):
             if not group.size:
@@ -76,6 +80,12 @@ class Mesh:
         for name, value in (("nodes", nodes), ("cells", cells), ("boundaries", boundaries),
                             ("points", points)):
             object.__setattr__(self, name, value)
+        crowded = self._sides[self._cells_at_edges > 2]
+        if len(crowded):
+            raise MeshError(
+                f"The edge between mesh nodes {crowded[0][0]} and {crowded[0][1]} belongs to more "
+                f"than two cells; remove cells that lie on one another."
+            )
         outline = {tuple(edge) for edge in np.sort(self.outline, axis=1).tolist()}
         for name, edges in boundaries.items():
             inner = [edge for edge in np.sort(edges, axis=1).tolist() if tuple(edge) not in outline]
@@ -84,15 +94,27 @@ class Mesh:
                     f"Boundary '{name}' has {len(inner)} edges that are not on the outline of the "
                     f"mesh, the first joins nodes {inner[0][0]} and {inner[0][1]}."
                 )
+            if len(np.unique(np.sort(edges, axis=1), axis=0)) < len(edges):
+                raise MeshError(f"Boundary '{name}' names an edge twice.")
 
     @cached_property
     def outline(self) -> NDArray[np.int64]:
         """Edges (k, 2) that belong to one cell only, the body on their left-hand side."""
-        edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2).reshape(-1, 2)
-        _, first, count = np.unique(
-            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        return self._sides[self._cells_at_edges == 1]
+
+    @cached_property
+    def _sides(self) -> NDArray[np.int64]:
+        """Edges of each cell in turn, so that inner ones occur twice."""
+        return np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2).reshape(-1, 2)
+
+    @cached_property
+    def _cells_at_edges(self) -> NDArray[np.int64]:
+        """For each row of ``_sides`` the number of cells that have this edge."""
+        _, edge, count = np.unique(
+            np.sort(self._sides, axis=1), axis=0, return_inverse=True, return_counts=True
         )
-        return edges[np.sort(first[count == 1])]
+        cells: NDArray[np.int64] = count[edge.ravel()]
+        return cells
 
     @property
     def area(self) -> float:
@@ -112,6 +134,14 @@ class Mesh:
                 f"its boundaries are: {choices(self.boundaries)}."
             )
         return self.boundaries[name]
+
+
+def _edges(name: str, edges: ArrayLike) -> NDArray[np.int64]:
+    array = np.array(edges, np.int64)
+    if array.size and (array.ndim != 2 or array.shape[1] != 2):
+        raise MeshError(f"Boundary '{name}' must have shape (k, 2), pairs of nodes, not "
+                        f"{array.shape}.")
+    return array.reshape(-1, 2)
 
 
 def _signed_area(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.float64]:
