@@ -1,26 +1,35 @@
 """Tables of keys and values (TOML, HDF5) as dataclasses, and back."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, fields, is_dataclass
-from typing import Any, TypeVar, get_type_hints
+import json
+import re
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, fields, is_dataclass
+from numbers import Integral, Real
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-import msgspec
+import numpy as np
 
 from fecontact.basis import ModalBasis
-from fecontact.errors import InputError, choices, nearest
+from fecontact.errors import FecontactError, InputError, choices, nearest
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
-from fecontact.system import PARTS, ContactSystem
+from fecontact.system import ContactSystem
 
 T = TypeVar("T")
 
-_PARTS = {"normal": RoughSurface, "friction": ExponentialFriction, "ground": Ground,
-          "drive": Drive, "load": Load}
+PART_CLASSES: Mapping[str, type] = {
+    "normal": RoughSurface, "friction": ExponentialFriction, "ground": Ground, "drive": Drive,
+    "load": Load,
+}
+
+_COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
 
 
-def from_table(cls: type[T], table: Mapping[str, Any], where: str) -> T:
+def from_table(cls: type[T], table: Any, where: str) -> T:
     """An instance of a dataclass from a table whose keys are its fields.
 
     Parameters
@@ -28,7 +37,8 @@ def from_table(cls: type[T], table: Mapping[str, Any], where: str) -> T:
     cls : type
         A dataclass; fields that are dataclasses take sub-tables.
     table : mapping
-        Keys and values; keys with defaults may be missing.
+        Keys and values; keys with defaults may be missing. Whole numbers serve as floats, lists
+        as tuples.
     where : str
         Where the table stands, for messages: ``study.toml: [ground]``.
 
@@ -39,43 +49,46 @@ def from_table(cls: type[T], table: Mapping[str, Any], where: str) -> T:
         range, or a missing key.
     """
     if not isinstance(table, Mapping):
-        raise InputError(f"{where} must be a table of keys and values, not {table!r}.")
+        raise InputError(f"{where} must be a table of keys and values, not {shown(table)}.")
     hints = get_type_hints(cls)
-    valid = [entry.name for entry in fields(cls)]  # type: ignore[arg-type]
+    entries = {entry.name: entry for entry in fields(cls)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for key, value in table.items():
-        if key not in valid:
-            raise InputError(f"{where} has an unknown key '{key}'{nearest(key, valid)}; "
-                             f"its keys are: {choices(valid)}.")
-        if isinstance(hints[key], type) and is_dataclass(hints[key]):
-            values[key] = from_table(hints[key], value, f"{where[:-1]}.{key}]"
-                                     if where.endswith("]") else f"{where} [{key}]")
-            continue
-        try:
-            values[key] = msgspec.convert(value, hints[key], str_keys=True)
-        except msgspec.ValidationError as error:
-            raise InputError(f"{where}: {key} = {value!r} has the wrong type "
-                             f"({_plain(str(error))}).") from None
-    try:
+        require_known(key, entries, where)
+        values[key] = convert(value, hints[key], where, key)
+    missing = [name for name, entry in entries.items() if name not in values
+               and entry.default is MISSING and entry.default_factory is MISSING]
+    if missing:
+        raise InputError(f"{where} lacks {'the key' if len(missing) == 1 else 'the keys'} "
+                         f"{choices(missing)}.")
+    with located(f"{where}:", cls.__name__):
         return cls(**values)
-    except TypeError:
-        missing = [entry.name for entry in fields(cls)  # type: ignore[arg-type]
-                   if entry.name not in values and _required(entry)]
-        raise InputError(f"{where} lacks the key {choices(missing)}.") from None
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
-def to_table(instance: Any) -> dict[str, Any]:
-    """The fields of a dataclass as a table that TOML can hold: None left out, tuples as lists."""
-    return {key: _plain_value(value) for key, value in asdict(instance).items()
-            if value is not None}
+def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
+    """The fields of a dataclass as a table that TOML can hold.
+
+    Parameters
+    ----------
+    instance : Any
+        A dataclass instance.
+    defaults : bool
+        Whether fields that have their default value are in the table; those that are None never
+        are.
+    """
+    table = {}
+    for entry in fields(instance):
+        value = getattr(instance, entry.name)
+        default = entry.default_factory() if callable(entry.default_factory) else entry.default
+        if value is not None and (defaults or default is MISSING or value != default):
+            table[entry.name] = plain(value)
+    return table
 
 
 def system_tables(system: ContactSystem) -> dict[str, Any]:
     """Laws, ground, drive, load and gap of a contact system as tables."""
-    tables: dict[str, Any] = {part: to_table(getattr(system, part)) for part in PARTS}
-    tables["gap"] = _plain_value(system.gap)
+    tables: dict[str, Any] = {part: to_table(getattr(system, part)) for part in PART_CLASSES}
+    tables["gap"] = plain(system.gap)
     return tables
 
 
@@ -85,24 +98,136 @@ def system_from_tables(
     """The contact system of a basis and tables ``normal``, ``friction``, ... , ``gap``."""
     parts: dict[str, Any] = {
         part: from_table(cls, tables.get(part, {}), f"{where}: [{part}]")
-        for part, cls in _PARTS.items()
+        for part, cls in PART_CLASSES.items()
     }
-    return ContactSystem(basis, gap=tables.get("gap", 0.0), **parts)
+    gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
+    return ContactSystem(basis, gap=gap, **parts)
 
 
-def _required(entry: Any) -> bool:
-    from dataclasses import MISSING
+def require_known(key: str, valid: Mapping[str, Any] | Sequence[str], where: str) -> None:
+    """Raise :class:`InputError` with the nearest valid key unless ``key`` is one of them."""
+    if key not in valid:
+        raise InputError(f"{where} has no key '{key}'{nearest(key, valid)}; "
+                         f"its keys are: {choices(valid)}.")
 
-    return entry.default is MISSING and entry.default_factory is MISSING
+
+def convert(value: Any, hint: Any, where: str, key: str) -> Any:
+    """A value of a table as the type that a field of a dataclass asks for.
+
+    Raises
+    ------
+    InputError
+        ``study.toml: [friction]: decay = "high" must be a number or a list of numbers.``
+    """
+    try:
+        return _converted(value, hint, f"{where[:-1]}.{key}]" if where.endswith("]")
+                          else f"{where}: [{key}]")
+    except _MismatchError:
+        raise InputError(f"{where}: {key} = {shown(value)} must be {described(hint)}.") from None
 
 
-def _plain_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain_value(item) for key, item in value.items() if item is not None}
+@contextmanager
+def located(where: str, *titles: str) -> Iterator[None]:
+    """Put the place before the message of an error, instead of the titles that it begins with."""
+    try:
+        yield
+    except FecontactError as error:
+        names = "|".join(re.escape(title) for title in titles) or "$"
+        message = re.sub(rf"^({names})[ \w]*: ", "", str(error))
+        if message.startswith(where):
+            raise
+        raise type(error)(f"{where} {message}") from error.__cause__
+
+
+def shown(value: Any) -> str:
+    """A value as it would stand in a file, cut to a length that fits into a sentence."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    try:
+        text = json.dumps(value, ensure_ascii=False)
+    except (TypeError, ValueError):
+        text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def described(hint: Any, *, plural: bool = False) -> str:
+    """What a type is called in a message: ``a number or a list of numbers``."""
+    words = list(dict.fromkeys(
+        word for option in _options(hint) if option is not types.NoneType
+        for word in _words(option, plural)))
+    *most, last = words
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+class _MismatchError(Exception):
+    """A value is not of the type asked for."""
+
+
+def _converted(value: Any, hint: Any, where: str) -> Any:
+    for option in _options(hint):
+        try:
+            return _converted_to(value, option, where)
+        except _MismatchError:
+            continue
+    raise _MismatchError
+
+
+def _converted_to(value: Any, hint: Any, where: str) -> Any:
+    origin, args = get_origin(hint), get_args(hint)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if hint is float and isinstance(value, Real) and not isinstance(value, bool):
+        return float(value)
+    if hint is int and isinstance(value, Integral) and not isinstance(value, bool):
+        return int(value)
+    if hint in (str, bool, types.NoneType) and isinstance(value, hint):
+        return value
+    if origin is Literal and value in args and not isinstance(value, bool):
+        return value
+    if is_dataclass(hint):
+        if isinstance(value, hint):  # type: ignore[arg-type]
+            return value
+        if isinstance(value, Mapping):
+            return from_table(hint, value, where)  # type: ignore[arg-type]
+    if origin is tuple and isinstance(value, list | tuple):
+        if args[-1] is Ellipsis:
+            return tuple(_converted(item, args[0], where) for item in value)
+        if len(value) == len(args):
+            return tuple(_converted(item, kind, where)
+                         for item, kind in zip(value, args, strict=True))
+    if origin in (dict, Mapping) and isinstance(value, Mapping):
+        return {str(key): convert(item, args[1], where, str(key)) for key, item in value.items()}
+    raise _MismatchError
+
+
+def _options(hint: Any) -> tuple[Any, ...]:
+    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+
+
+def _words(hint: Any, plural: bool) -> list[str]:
+    simple = {float: ("a number", "numbers"), int: ("a whole number", "whole numbers"),
+              str: ("a text in quotes", "texts in quotes"), bool: ("true or false",) * 2}
+    origin, args = get_origin(hint), get_args(hint)
+    if hint in simple:
+        return [simple[hint][plural]]
+    if origin is Literal:
+        return [json.dumps(option) for option in args]
+    if origin is tuple:
+        number = "" if args[-1] is Ellipsis else f"{_COUNTS.get(len(args), len(args))} "
+        return [f"{'lists' if plural else 'a list'} of {number}{described(args[0], plural=True)}"]
+    content = (", ".join(entry.name for entry in fields(hint)) if is_dataclass(hint)
+               else f"names and {described(args[1], plural=True)}")
+    return [f"{'tables' if plural else 'a table'} of {content}"]
+
+
+def plain(value: Any) -> Any:
+    """A value as TOML can hold it: dataclasses and mappings as tables, sequences as lists."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return to_table(value)
+    if isinstance(value, Mapping):
+        return {key: plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
     if isinstance(value, tuple | list):
-        return [_plain_value(item) for item in value]
+        return [plain(item) for item in value]
     return value
-
-
-def _plain(message: str) -> str:
-    return message.replace("`", "").rstrip(".").replace("Expected", "expected")

@@ -1,0 +1,286 @@
+"""A whole study in one TOML file: from the geometry to the run and its pictures."""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from fecontact.basis import ModalBasis
+from fecontact.body import ElasticBody
+from fecontact.errors import InputError, choices, nearest
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.drive import Drive, Load
+from fecontact.laws.friction import ExponentialFriction
+from fecontact.laws.ground import Ground
+from fecontact.laws.normal import RoughSurface
+from fecontact.mesh import Mesh
+from fecontact.shapes import Beam, Block, Pendulum
+from fecontact.study_sections import (
+    BasisSettings,
+    BodySettings,
+    MeshFile,
+    OutputSettings,
+    RenderSettings,
+    SimulationSettings,
+)
+from fecontact.system import ContactSystem
+from fecontact.tables import (
+    PART_CLASSES,
+    convert,
+    from_table,
+    located,
+    plain,
+    shown,
+    to_table,
+)
+
+Gap = float | tuple[float, ...]
+
+SHAPES: Mapping[str, type] = {"beam": Beam, "pendulum": Pendulum, "block": Block}
+
+_SECTIONS: Mapping[str, type] = {
+    "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
+    "simulation": SimulationSettings, "output": OutputSettings, "render": RenderSettings,
+}
+_ATTRIBUTES = {name: name for name in _SECTIONS} | {"body": "body_settings",
+                                                     "basis": "basis_settings"}
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: geometry, body, modes, laws, run and output, as in its TOML file.
+
+    Each attribute is a section of the file, the fields of its class are the keys of the section.
+
+    Attributes
+    ----------
+    geometry : Beam, Pendulum, Block or MeshFile
+        ``[geometry]``: a shape and its dimensions, ``shape = "beam"``, or a mesh,
+        ``file = "part.msh"``.
+    body_settings : BodySettings
+        ``[body]``
+    basis_settings : BasisSettings
+        ``[basis]``
+    normal, friction, ground, drive, load
+        ``[normal]``, ... : laws, ground, drive and load; see
+        :class:`~fecontact.system.ContactSystem`.
+    gap : float or (n,) tuple
+        Initial distance of the contact nodes from flat ground [m]; stands above all sections.
+    simulation : SimulationSettings
+        ``[simulation]``
+    output : OutputSettings
+        ``[output]``
+    render : RenderSettings
+        ``[render]``
+    path : Path or None
+        The file; other files are named relative to it.
+    """
+
+    geometry: Beam | Pendulum | Block | MeshFile
+    body_settings: BodySettings = field(default_factory=BodySettings)
+    basis_settings: BasisSettings = field(default_factory=BasisSettings)
+    normal: RoughSurface = field(default_factory=RoughSurface)
+    friction: ExponentialFriction = field(default_factory=ExponentialFriction)
+    ground: Ground = field(default_factory=Ground)
+    drive: Drive = field(default_factory=Drive)
+    load: Load = field(default_factory=Load)
+    gap: Gap = 0.0
+    simulation: SimulationSettings = field(default_factory=SimulationSettings)
+    output: OutputSettings = field(default_factory=OutputSettings)
+    render: RenderSettings = field(default_factory=RenderSettings)
+    path: Path | None = field(default=None, compare=False)
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Study":
+        """Read a study file.
+
+        Raises
+        ------
+        InputError
+            If there is no such file, it is not TOML, or it has unknown sections or keys, values
+            of the wrong type or out of range.
+        """
+        path = Path(path)
+        try:
+            text = path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            others = (other.name for other in path.parent.glob("*.toml"))
+            raise InputError(f"{path} does not exist{nearest(path.name, others)}.") from None
+        except (OSError, UnicodeDecodeError):
+            raise InputError(f"{path} cannot be read as a study; give a text file in "
+                             f"TOML.") from None
+        return cls.from_toml(text, path)
+
+    @classmethod
+    def from_toml(cls, text: str, path: str | Path | None = None) -> "Study":
+        """A study from TOML text; ``path`` says where it stands, see :meth:`read`."""
+        path = None if path is None else Path(path)
+        try:
+            tables = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"{_title(path)} is not valid TOML: {error}.") from None
+        return cls.from_tables(tables, path)
+
+    @classmethod
+    def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
+        """A study from the tables of a TOML file; see :meth:`read`."""
+        title = _title(path)
+        for name in tables:
+            if name not in (valid := ("gap", "geometry", *_SECTIONS)):
+                raise InputError(f"{title} has an unknown section or key '{name}'"
+                                 f"{nearest(name, valid)}; there are: {choices(valid)}.")
+        if "geometry" not in tables:
+            raise InputError(f"{title} lacks the section [geometry]; give a shape and its "
+                             f"dimensions, or the file of a mesh.")
+        return cls(
+            _geometry(tables["geometry"], f"{title}: [geometry]"),
+            gap=_gap(tables.get("gap", 0.0), title),
+            path=path,
+            **{_ATTRIBUTES[name]: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
+               for name, kind in _SECTIONS.items()},
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the file without its ending."""
+        return "study" if self.path is None else self.path.stem
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the file, from which other files are named."""
+        return Path() if self.path is None else self.path.parent
+
+    def tables(self, *, defaults: bool = True) -> dict[str, Any]:
+        """All sections as tables for TOML, with or without values equal to the defaults."""
+        geometry = to_table(self.geometry, defaults=defaults)
+        shape = {kind: name for name, kind in SHAPES.items()}.get(type(self.geometry))
+        sections = {name: to_table(getattr(self, attribute), defaults=defaults)
+                    for name, attribute in _ATTRIBUTES.items()}
+        return {"gap": plain(self.gap),
+                "geometry": geometry if shape is None else {"shape": shape, **geometry},
+                **{name: table for name, table in sections.items() if table or defaults}}
+
+    def to_toml(self) -> str:
+        """The resolved study as TOML text: every key, also where it has its default value.
+
+        ``Study.from_toml(study.to_toml(), study.path) == study``.
+        """
+        import tomli_w
+
+        return tomli_w.dumps(self.tables())
+
+    def with_(self, **changes: Any) -> "Study":
+        """A copy with other values, by the dotted names of the file.
+
+        ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``
+
+        Raises
+        ------
+        InputError
+            If there is no such key (with the nearest), or the value is of the wrong type or out
+            of range.
+        """
+        tables = self.tables(defaults=False)
+        for name, value in changes.items():
+            *sections, key = name.split(".")
+            table: Any = tables
+            for depth, section in enumerate(sections, 1):
+                table = table.setdefault(section, {})
+                if not isinstance(table, dict):
+                    raise InputError(f"{_title(self.path)}: {name} cannot be set, because "
+                                     f"{'.'.join(sections[:depth])} = {shown(table)} is not a "
+                                     f"table.")
+            table[key] = plain(value)
+        return self.from_tables(tables, self.path)
+
+    def mesh(self) -> Mesh:
+        """The mesh, generated or read; the same object at every call, as in all of these."""
+        return self._mesh
+
+    def body(self) -> ElasticBody:
+        """The elastic body."""
+        return self._body
+
+    def basis(self) -> ModalBasis:
+        """The modal basis."""
+        return self._basis
+
+    def system(self) -> ContactSystem:
+        """The contact system.
+
+        Raises
+        ------
+        FecontactError
+            With the file and the section before the message, like all of these methods.
+        """
+        title, basis = _title(self.path), self.basis()
+        try:
+            return ContactSystem(basis, gap=self.gap,
+                                 **{part: getattr(self, part) for part in PART_CLASSES})
+        except InputError as error:
+            owner, _, message = str(error).partition(": ")
+            for part, kind in PART_CLASSES.items():
+                if owner == kind.__name__:
+                    raise InputError(f"{title}: [{part}]: {message}") from None
+            raise InputError(f"{title}: {error}") from None
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
+        """Run the study from ``t_start`` to ``t_end``; ``progress`` is called with the time [s]."""
+        settings, title = self.simulation, _title(self.path)
+        if settings.t_end is None:
+            raise InputError(f"{title}: [simulation] lacks the key 't_end', the end of the run "
+                             f"in s.")
+        system = self.system()
+        with located(f"{title}: [simulation]:"):
+            return simulate(system, settings.t_end, t_start=settings.t_start,
+                            initial=settings.initial, outputs=settings.outputs,
+                            method=settings.method, rtol=settings.rtol, progress=progress)
+
+    @cached_property
+    def _mesh(self) -> Mesh:
+        from fecontact.geometry import generate
+
+        with located(f"{_title(self.path)}: [geometry]:", type(self.geometry).__name__):
+            if isinstance(self.geometry, MeshFile):
+                return self.geometry.mesh(self.folder)
+            return generate(self.geometry)
+
+    @cached_property
+    def _body(self) -> ElasticBody:
+        mesh = self.mesh()
+        with located(f"{_title(self.path)}: [body]:", "ElasticBody"):
+            return self.body_settings.body(mesh)
+
+    @cached_property
+    def _basis(self) -> ModalBasis:
+        body = self.body()
+        with located(f"{_title(self.path)}: [basis]:"):
+            return self.basis_settings.basis(body)
+
+
+def _title(path: Path | None) -> str:
+    return "The study" if path is None else str(path)
+
+
+def _geometry(table: Any, where: str) -> Any:
+    if not isinstance(table, Mapping) or ("shape" in table) == ("file" in table):
+        raise InputError(f"{where} must have either a shape ({choices(SHAPES)}) or the file of a "
+                         f"mesh.")
+    if "file" in table:
+        return from_table(MeshFile, table, where)
+    shape = table["shape"]
+    if not isinstance(shape, str) or shape not in SHAPES:
+        raise InputError(f"{where}: shape = {shown(shape)} must be one of {choices(SHAPES)}"
+                         f"{nearest(str(shape), SHAPES)}.")
+    dimensions = {key: value for key, value in table.items() if key != "shape"}
+    return from_table(SHAPES[shape], dimensions, where)
+
+
+def _gap(value: Any, title: str) -> Gap:
+    gap: Gap = convert(value, Gap, title, "gap")
+    if not all(0.0 <= item < float("inf") for item in (gap if isinstance(gap, tuple) else (gap,))):
+        raise InputError(f"{title}: gap = {shown(value)} must be finite and zero or above.")
+    return gap

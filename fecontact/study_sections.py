@@ -1,0 +1,246 @@
+"""Sections of a study file that have no class of their own elsewhere in the package."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from fecontact.basis import ModalBasis
+from fecontact.body import ElasticBody, Material
+from fecontact.damping import Rayleigh
+from fecontact.errors import InputError, choices, require_positive
+from fecontact.integrate.initial import RigidStart
+from fecontact.mesh import Mesh
+from fecontact.points import Patch
+from fecontact.tables import located
+
+Place = str | tuple[float, float] | Patch
+Directions = Literal["x", "y", "xy"]
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """``[geometry]`` with the file of a mesh; see :func:`fecontact.mesh_io.read_mesh`.
+
+    Parameters
+    ----------
+    file : str
+        The mesh, relative to the study file.
+    scale : float
+        Factor from the file's unit of length to m.
+    boundaries : mapping of name to name or box
+        Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1] [m].
+    points : mapping of name to name or place
+        Points to name: a group of the file, or the node nearest to [x, y] [m].
+    """
+
+    file: str
+    scale: float = 1.0
+    boundaries: Mapping[str, str | tuple[float, float, float, float]] = field(
+        default_factory=dict)
+    points: Mapping[str, str | tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_positive("MeshFile", scale=self.scale)
+
+    def mesh(self, folder: Path) -> Mesh:
+        """Read the mesh; ``folder`` is that of the study file."""
+        from fecontact.mesh_io import read_mesh
+
+        return read_mesh(folder / self.file, scale=self.scale,
+                         boundaries=self.boundaries or None, points=self.points or None)
+
+
+@dataclass(frozen=True)
+class BodySettings:
+    """``[body]``: material, thickness and supports; see :class:`fecontact.body.ElasticBody`.
+
+    Parameters
+    ----------
+    material : str, optional
+        'steel' or 'aluminium'; its values may be replaced one by one. Steel when no material
+        value is given at all.
+    youngs_modulus, poisson_ratio, density : float, optional
+        [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
+    thickness : float
+        Out-of-plane thickness [m].
+    plane : 'stress' or 'strain'
+    degree : 1 or 2
+        Of the finite elements.
+    fixed : mapping of name to 'x', 'y' or 'xy'
+        Supports on boundaries and points of the mesh.
+    """
+
+    material: str | None = None
+    youngs_modulus: float | None = None
+    poisson_ratio: float | None = None
+    density: float | None = None
+    thickness: float = 1.0
+    plane: Literal["stress", "strain"] = "stress"
+    degree: Literal[1, 2] = 2
+    fixed: Mapping[str, Directions] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_positive("BodySettings", thickness=self.thickness)
+        with located("BodySettings:", "Material"):
+            _ = self.elastic_material
+
+    @property
+    def elastic_material(self) -> Material:
+        """The material that the four keys describe."""
+        values = {"youngs_modulus": self.youngs_modulus, "poisson_ratio": self.poisson_ratio,
+                  "density": self.density}
+        given: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
+        if self.material is None and given and len(given) < len(values):
+            raise InputError(f"BodySettings: {choices(given)} alone does not describe a material; "
+                             f"give {choices(values.keys() - given.keys())} too, or a material.")
+        return replace(Material.named(self.material or "steel"), **given)
+
+    def body(self, mesh: Mesh) -> ElasticBody:
+        """The elastic body on a mesh."""
+        return ElasticBody(mesh, self.elastic_material, thickness=self.thickness,
+                           plane=self.plane, degree=self.degree, fixed=self.fixed)
+
+
+@dataclass(frozen=True)
+class BasisSettings:
+    """``[basis]``: modes and points; see :meth:`fecontact.body.ElasticBody.modal_basis`.
+
+    Parameters
+    ----------
+    modes : int
+        Number of modes, the rigid ones included.
+    contact : str
+        Boundary that touches the ground.
+    contact_nodes : int or 'all'
+    B, C : place, optional
+        Excitation and load point: name of a point or boundary, [x, y], or a patch
+        ``{at = name or [x, y], radius = r}``.
+    points : mapping of name to place
+        Further points to observe.
+    damping : float, list or Rayleigh
+        One damping ratio, one per mode, or ``{mass_factor, stiffness_factor}``.
+    """
+
+    modes: int = 20
+    contact: str = "contact"
+    contact_nodes: int | Literal["all"] = "all"
+    B: Place | None = None
+    C: Place | None = None
+    points: Mapping[str, Place] = field(default_factory=dict)
+    damping: float | tuple[float, ...] | Rayleigh = 0.0
+
+    def __post_init__(self) -> None:
+        if self.modes < 1:
+            raise InputError(f"BasisSettings: modes = {self.modes} must be at least 1.")
+        if self.contact_nodes != "all" and self.contact_nodes < 1:
+            raise InputError(f"BasisSettings: contact_nodes = {self.contact_nodes} must be at "
+                             f"least 1, or \"all\".")
+
+    def basis(self, body: ElasticBody) -> ModalBasis:
+        """The modal basis of a body."""
+        return body.modal_basis(self.modes, contact=self.contact,
+                                contact_nodes=self.contact_nodes, B=self.B, C=self.C,
+                                points=self.points, damping=self.damping)
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """``[simulation]``: the run; see :func:`fecontact.integrate.simulate`.
+
+    Parameters
+    ----------
+    t_end : float, optional
+        End of the run [s]; needed for running only.
+    t_start : float
+        Start of the run [s].
+    outputs : int
+        Number of equally spaced output times, both ends included.
+    method : str
+        Integrator.
+    rtol : float
+        Relative tolerance.
+    initial : 'rest', 'sliding' or RigidStart
+        Where it starts; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid
+        motion.
+    """
+
+    t_end: float | None = None
+    t_start: float = 0.0
+    outputs: int = 1001
+    method: str = "Radau"
+    rtol: float = 1e-6
+    initial: Literal["rest", "sliding"] | RigidStart = "rest"
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.t_start):
+            raise InputError(f"SimulationSettings: t_start = {self.t_start!r} must be finite.")
+        if self.t_end is not None and not self.t_start < self.t_end < math.inf:
+            raise InputError(f"SimulationSettings: t_end = {self.t_end!r} must be a finite time "
+                             f"after t_start = {self.t_start!r}.")
+        if self.outputs < 2:
+            raise InputError(f"SimulationSettings: outputs = {self.outputs} must be at least 2.")
+        require_positive("SimulationSettings", rtol=self.rtol)
+
+
+@dataclass(frozen=True)
+class OutputSettings:
+    """``[output]``: what a run writes.
+
+    Parameters
+    ----------
+    folder : str
+        Where, relative to the study file.
+    frames : int
+        Number of full displacement fields in the file, for ParaView.
+    points : list
+        Points whose motion is plotted: 'B', 'C', further named points, contact nodes by their
+        number. Empty for B and C.
+    """
+
+    folder: str = "results"
+    frames: int = 200
+    points: tuple[str | int, ...] = ()
+
+    def __post_init__(self) -> None:
+        _require_frames("OutputSettings", self.frames)
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """``[render]``: the moving picture; see :func:`fecontact.output.movie.render`.
+
+    Parameters
+    ----------
+    frames : int
+        Number of pictures.
+    fps : float
+        Pictures a second.
+    size : (int, int)
+        Width and height [pixels].
+    colour : 'displacement' or 'von_mises'
+        Quantity that colours the body.
+    scale : float or 'auto'
+        Factor by which displacements are drawn larger.
+    """
+
+    frames: int = 200
+    fps: float = 25.0
+    size: tuple[int, int] = (1280, 720)
+    colour: Literal["displacement", "von_mises"] = "displacement"
+    scale: float | Literal["auto"] = "auto"
+
+    def __post_init__(self) -> None:
+        _require_frames("RenderSettings", self.frames)
+        require_positive("RenderSettings", fps=self.fps)
+        if min(self.size) < 16 or max(self.size) > 8192:
+            raise InputError(f"RenderSettings: size = {list(self.size)} must be two whole numbers "
+                             f"of 16 to 8192 pixels.")
+        if self.scale != "auto":
+            require_positive("RenderSettings", scale=self.scale)
+
+
+def _require_frames(owner: str, frames: int) -> None:
+    if frames < 2:
+        raise InputError(f"{owner}: frames = {frames} must be at least 2.")
