@@ -1,5 +1,7 @@
 """Vibration modes of the finite-element body: rigid ones exactly, elastic ones by Lanczos."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +19,52 @@ Array = NDArray[np.float64]
 _DENSE = 600
 
 
+@dataclass(frozen=True, eq=False)
+class FreeSystem:
+    """Stiffness and mass over the free degrees of freedom, and the rigid modes among them.
+
+    Attributes
+    ----------
+    stiffness, mass : sparse (f, f) arrays
+        K, symmetric and positive semi-definite, and M, positive definite.
+    rigid : (f, r) array
+        Mass-normalised rigid modes: ``K rigid = 0``.
+    shift : float
+        Small against the lowest elastic squared frequency [1/s^2]; ``K + shift M`` is factorised.
+    """
+
+    stiffness: Any
+    mass: Any
+    rigid: Array
+    shift: float
+
+    @classmethod
+    def of(cls, body: "ElasticBody") -> "FreeSystem":
+        """The free degrees of freedom of a body."""
+        free = body.free_dofs
+        K, M = body.stiffness, body.mass
+        if len(free) < K.shape[0]:
+            K, M = K[free][:, free].tocsc(), M[free][:, free].tocsc()
+        return cls(K, M, rigid_modes(body)[free], _shift(body))
+
+    @cached_property
+    def factors(self) -> Any:
+        """Factors of K + shift M.
+
+        The matrix is positive definite, so that no pivoting is needed and the fill of an
+        ordering for symmetric matrices is kept.
+        """
+        from scipy.sparse.linalg import splu
+
+        return splu((self.stiffness + self.shift * self.mass).tocsc(),
+                    permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                    options={"SymmetricMode": True})
+
+    def without_rigid(self, shapes: Array) -> Array:
+        """The part of displacements (f,) or (f, k) that is mass-orthogonal to the rigid modes."""
+        return np.asarray(shapes - self.rigid @ (self.rigid.T @ (self.mass @ shapes)))
+
+
 def eigenmodes(body: "ElasticBody", count: int) -> tuple[Array, Array]:
     """The lowest angular frequencies (m,) [rad/s] and mass-normalised shapes (2 N, m).
 
@@ -31,87 +79,114 @@ def eigenmodes(body: "ElasticBody", count: int) -> tuple[Array, Array]:
     AnalysisError
         If a computed mode misses ``|K s - w^2 M s| < 1e-10 |K| |s|``.
     """
-    free = body.free_dofs
-    if not 1 <= count <= len(free):
-        raise InputError(f"modes = {count} must be at least 1 and at most the number of unknowns "
-                         f"of the body, {len(free)}.")
-    K, M = body.stiffness, body.mass
-    rigid = rigid_modes(body)[:, :count]
+    w, free_shapes = free_modes(FreeSystem.of(body), count)
+    shapes = on_body(body, free_shapes)
+    elastic = w > 0.0
+    w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
+    return w, shapes
+
+
+def on_body(body: "ElasticBody", free_shapes: Array) -> Array:
+    """Shapes (2 N, m) over all degrees of freedom from those over the free ones."""
+    shapes = np.zeros((2 * len(body.nodes), free_shapes.shape[1]))
+    shapes[body.free_dofs] = free_shapes
+    return shapes
+
+
+def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
+    """The same over the free degrees of freedom: frequencies (m,) and shapes (f, m)."""
+    unknowns = system.stiffness.shape[0]
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= unknowns:
+        raise InputError(f"modes = {count!r} must be a whole number from 1 to the number of "
+                         f"unknowns of the body, {unknowns}.")
+    rigid = system.rigid[:, :count]
     elastic = count - rigid.shape[1]
-    squares, shapes = np.zeros(0), np.zeros((len(K.indptr) - 1, 0))
-    if elastic:
-        if len(free) < len(K.indptr) - 1:
-            K, M = K[free][:, free].tocsc(), M[free][:, free].tocsc()
-        squares, small = elastic_modes(K, M, rigid[free], elastic, _shift(body))
-        shapes = np.zeros((2 * len(body.nodes), elastic))
-        shapes[free] = small * fixed_signs(small)
+    if not elastic:
+        return np.zeros(count), rigid
+    squares, shapes = elastic_modes(system, elastic)
     return (np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(squares)]),
-            np.hstack([rigid, shapes]))
+            np.hstack([rigid, shapes * fixed_signs(shapes)]))
 
 
 def rigid_modes(body: "ElasticBody") -> Array:
-    """Mass-normalised rigid modes (2 N, r) that the supports leave, r = 0 ... 3."""
+    """Mass-normalised rigid modes (2 N, r) that the supports leave, r = 0 ... 3.
+
+    Translation in x, in y, and a counter-clockwise rotation about the place where the lines of
+    the held displacements meet, about the centre of mass where they leave it open.
+    """
     M = body.mass
-    motions = np.zeros((2 * len(body.nodes), 3))
-    motions[0::2, 0] = motions[1::2, 1] = 1.0
-    centre = np.array([(M @ motions[:, axis])[axis::2] @ body.nodes[:, axis]
-                       for axis in range(2)]) / (motions[:, 0] @ (M @ motions[:, 0]))
-    scale = body.mesh.extent
-    motions[0::2, 2] = -(body.nodes[:, 1] - centre[1]) / scale
-    motions[1::2, 2] = (body.nodes[:, 0] - centre[0]) / scale
-    held = motions[body.fixed_dofs]
-    free = np.eye(3)
-    if len(held):
-        _, size, directions = np.linalg.svd(held, full_matrices=True)
-        kept = np.concatenate([size, np.zeros(3 - len(size))]) <= 1e-9 * size[0]
-        free = directions[kept].T
-    if not free.size:
-        return np.zeros((len(motions), 0))
-    # Translations first: reduce the free directions to echelon form before orthogonalising.
-    for column in range(free.shape[1]):
-        pivot = next(i for i in range(3) if np.abs(free[i, column:]).max() > 1e-9)
-        swap = column + int(np.argmax(np.abs(free[pivot, column:])))
-        free[:, [column, swap]] = free[:, [swap, column]]
-        free[:, column] /= free[pivot, column]
-        for other in range(column + 1, free.shape[1]):
-            free[:, other] -= free[pivot, other] * free[:, column]
-    shapes = motions @ free
-    shapes[body.fixed_dofs] = 0.0
+    x, y = body.nodes.T
+    held_x, held_y = (body.fixed_dofs[body.fixed_dofs % 2 == axis] // 2 for axis in range(2))
+    ones = np.zeros(2 * len(x))
+    ones[0::2] = 1.0
+    inertia = (M @ ones)[0::2] / (ones @ (M @ ones))
+    pivot_x = x[held_y].mean() if held_y.size else inertia @ x
+    pivot_y = y[held_x].mean() if held_x.size else inertia @ y
+    shapes = np.column_stack([ones, np.roll(ones, 1)])[:, [not held_x.size, not held_y.size]]
+    off = np.concatenate([x[held_y] - pivot_x, y[held_x] - pivot_y])
+    if np.abs(off).max(initial=0.0) <= 1e-9 * body.mesh.extent:
+        rotation = np.column_stack([pivot_y - y, x - pivot_x]).ravel()
+        rotation[body.fixed_dofs] = 0.0
+        shapes = np.column_stack([shapes, rotation])
     for column in range(shapes.shape[1]):
         for _ in range(2):
             earlier = shapes[:, :column]
             shapes[:, column] -= earlier @ (earlier.T @ (M @ shapes[:, column]))
         shapes[:, column] /= np.sqrt(shapes[:, column] @ (M @ shapes[:, column]))
-    turning = free[2] < 0.0
-    return shapes * np.where(turning, -1.0, 1.0)
+    return shapes
 
 
-def elastic_modes(
-    K: Any, M: Any, rigid: Array, count: int, shift: float
-) -> tuple[Array, Array]:
+def strain_energies(body: "ElasticBody", shapes: Array) -> Array:
+    """Strain energies (m,) [J] of displacement fields (2 N, m), from the strains in the elements.
+
+    The product with K would lose the digits by which the stiffest cells exceed the body as a
+    whole: all of them, for a slender body with cells strongly graded into its corners.
+    """
+    basis = body.basis
+    slopes = [function[0].grad for function in basis.basis]
+    direct, lateral, shear = body.elasticity
+    energies = np.zeros(shapes.shape[1])
+    for mode, shape in enumerate(shapes.T):
+        local = shape.reshape(-1, 2)[basis.element_dofs]
+        local = local - local.mean(axis=0)
+        (xx, xy), (yx, yy) = (
+            sum(slope * values[:, None] for slope, values in zip(slopes, part, strict=True))
+            for part in (local[..., 0], local[..., 1])
+        )
+        density = direct * (xx**2 + yy**2) + 2.0 * lateral * xx * yy + shear * (xy + yx) ** 2
+        energies[mode] = 0.5 * body.thickness * (density * basis.dx).sum()
+    return energies
+
+
+def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     """Squares of the lowest non-zero angular frequencies and their mass-normalised shapes.
 
-    Shift-invert Lanczos about ``-shift``, with a factorisation for symmetric matrices, on the
-    complement of the ``rigid`` modes, which is kept exactly.
+    Shift-invert Lanczos about ``-shift`` on the complement of the rigid modes, which is kept
+    exactly; the dense solver for few unknowns.
     """
+    K, M = system.stiffness, system.mass
     size = K.shape[0]
     if size <= _DENSE or 3 * count > size:
         from scipy.linalg import eigh
 
-        inertia = M @ rigid
+        inertia = M @ system.rigid
         # Lift the rigid modes above all others instead of removing them.
         lifted = K.toarray() + (inertia @ inertia.T) * _largest(K, M)
         squares, shapes = eigh(lifted, M.toarray(), subset_by_index=[0, count - 1])
     else:
-        squares, shapes = _lanczos(K, M, rigid, count, shift)
-    shapes = shapes - rigid @ (rigid.T @ (M @ shapes))
-    inertia = M @ shapes
-    shapes /= np.sqrt((shapes * inertia).sum(axis=0))
+        from scipy.sparse.linalg import LinearOperator, eigsh
+
+        start = np.random.default_rng(0).standard_normal(size)
+        solve = LinearOperator(
+            K.shape, lambda force: system.without_rigid(system.factors.solve(force)), dtype=float)
+        squares, shapes = eigsh(K, k=count, M=M, sigma=-system.shift, OPinv=solve,
+                                v0=system.without_rigid(start))
+    shapes = system.without_rigid(shapes)
+    shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))
     # Rayleigh quotients do not carry the shift's round-off.
-    forces = K @ shapes
-    squares = (shapes * forces).sum(axis=0)
+    squares = (shapes * (K @ shapes)).sum(axis=0)
     order = np.argsort(squares)
-    squares, shapes, forces = squares[order], shapes[:, order], forces[:, order]
+    squares, shapes = squares[order], shapes[:, order]
     error = backward_error(K, M, squares, shapes).max()
     if not error < 1e-10 or squares[0] <= 0.0:
         raise AnalysisError(
@@ -129,32 +204,12 @@ def backward_error(K: Any, M: Any, squares: Array, shapes: Array) -> Array:
     return np.asarray(residual / (largest * np.linalg.norm(shapes, axis=0)))
 
 
-def _lanczos(K: Any, M: Any, rigid: Array, count: int, shift: float) -> tuple[Array, Array]:
-    from scipy.sparse.linalg import LinearOperator, eigsh, splu
-
-    # K + shift M is positive definite, so that no pivoting is needed and the fill of an ordering
-    # for symmetric matrices is kept.
-    factors = splu((K + shift * M).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                   options={"SymmetricMode": True})
-    inertia = M @ rigid
-
-    def solve(force: Array) -> Array:
-        motion = factors.solve(force)
-        return np.asarray(motion - rigid @ (inertia.T @ motion))
-
-    start = np.random.default_rng(0).standard_normal(K.shape[0])
-    start -= rigid @ (inertia.T @ start)
-    squares, shapes = eigsh(K, k=count, M=M, sigma=-shift, v0=start,
-                            OPinv=LinearOperator(K.shape, solve, dtype=float))
-    return squares, shapes
-
-
 def _shift(body: "ElasticBody") -> float:
-    """A quarter of the square of a slender body's lowest bending frequency, roughly [1/s^2]."""
+    """A small part of the square of a slender body's lowest bending frequency [1/s^2]."""
     length = body.mesh.extent
     height = body.mesh.area / length
     speed = np.sqrt(body.material.youngs_modulus / body.material.density)
-    return float((0.5 * speed * height / length**2) ** 2)
+    return float((0.05 * speed * height / length**2) ** 2)
 
 
 def _largest(K: Any, M: Any) -> float:
