@@ -1,0 +1,231 @@
+"""Figures of a run: histories, phase plane, contact map and energies."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import InputError, choices
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.units import suitable_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Point = str | int | tuple[float, float]
+
+# Colours that people with colour-blindness tell apart (Okabe and Ito).
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
+STATES = (("open", "#f2f0ec"), ("stick", "#0072b2"), ("slip", "#e69f00"))
+_AXES = ("x", "y")
+
+_LINE_BINS = 2000  # each drawn by its lowest and highest value
+_MAP_COLUMNS = 1500
+
+STYLE: Any = {
+    "font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#4d4d4d",
+    "axes.grid": True, "grid.color": "#e4e2de", "grid.linewidth": 0.7, "axes.axisbelow": True,
+    "lines.linewidth": 1.2, "legend.frameon": False, "axes.titleweight": "normal",
+    "xtick.color": "#303030", "ytick.color": "#303030", "axes.formatter.useoffset": False,
+    "agg.path.chunksize": 20000, "savefig.dpi": 150, "svg.fonttype": "none", "pdf.fonttype": 42,
+}
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """An empty figure [inches] that no plotting session knows of."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Figure":
+    """Displacements and velocities of points, and the sums of the contact forces, over time."""
+    points = tuple(points) or _usual_points(trajectory)
+    figure = new_figure(10.0, 7.5)
+    axes = figure.subplots(3, 2, sharex=True)
+    time = _time(axes[2], trajectory)
+    for column, (quantity, unit, values) in enumerate((
+        ("displacement", "m", [trajectory.displacement(point) for point in points]),
+        ("velocity", "m/s", [trajectory.velocity(point) for point in points]),
+    )):
+        for row, name in enumerate(_AXES):
+            factor = _labelled(axes[row, column], f"{quantity} {name}", unit,
+                               *(value[:, row] for value in values))
+            for point, value, colour in zip(points, values, _cycle(points), strict=True):
+                axes[row, column].plot(*_thinned(time, value[:, row] / factor), color=colour,
+                                       label=point_name(point))
+    for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
+                               (axes[2, 1], "friction force", trajectory.friction_force)):
+        total = forces.sum(axis=1)
+        factor = _labelled(axis, f"total {name}", "N", total)
+        axis.plot(*_thinned(time, total / factor), color="#303030")
+    figure.align_ylabels(axes)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center",
+                  ncols=max(1, min(len(points), 6)))
+    return figure
+
+
+def phase_figure(trajectory: Trajectory, point: Point = "B", axis: str = "x") -> "Figure":
+    """Velocity of a point over its displacement, with the ground's speed."""
+    if axis not in _AXES:
+        raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
+    row = _AXES.index(axis)
+    figure = new_figure(6.4, 5.2)
+    plane = figure.subplots()
+    x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
+    unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
+    plane.set_xlabel(f"displacement {axis} [{symbol}]")
+    factor = _labelled(plane, f"velocity {axis}", "m/s", v)
+    plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
+    plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
+    speed = trajectory.system.ground.speed
+    if row == 0 and speed != 0.0:
+        plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
+                      label="ground")
+    plane.legend(loc="best")
+    plane.set_title(point_name(point))
+    return figure
+
+
+def contact_map_figure(trajectory: Trajectory) -> "Figure":
+    """Pressure and state of the contact nodes over time and position."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    figure = new_figure(10.0, 6.2)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    starts = np.unique(np.linspace(0, len(trajectory.time), _MAP_COLUMNS + 1).astype(int))[:-1]
+    edges = _time_edges(trajectory.time, starts)
+    time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
+    places, place_label = _place_edges(trajectory)
+
+    pressure = np.maximum.reduceat(trajectory.pressure, starts, axis=0)
+    factor, pressure_symbol = suitable_unit(float(pressure.max()), "N/m")
+    image = upper.pcolormesh(edges / time_unit, places, pressure.T / factor, cmap="viridis",
+                             vmin=0.0, vmax=float(pressure.max()) / factor or 1.0)
+    figure.colorbar(image, ax=upper, label=f"contact pressure [{pressure_symbol}]", pad=0.01)
+
+    counts = np.stack([np.add.reduceat((trajectory.contact_state == k).astype(np.int32), starts,
+                                       axis=0) for k in range(3)])
+    image = lower.pcolormesh(edges / time_unit, places, counts.argmax(axis=0).T,
+                             cmap=ListedColormap([colour for _, colour in STATES]),
+                             norm=BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3))
+    bar = figure.colorbar(image, ax=lower, label="state", pad=0.01, ticks=[0, 1, 2])
+    bar.ax.set_yticklabels([name for name, _ in STATES])
+    bar.ax.tick_params(length=0)
+    figure.align_ylabels([upper, lower])
+    lower.set_xlabel(f"time [{symbol}]")
+    for axis in (upper, lower):
+        axis.set_ylabel(place_label)
+        axis.grid(False)
+        if len(places) == 2:
+            axis.set_yticks([0.5 * (places[0] + places[1])], ["0"])
+    return figure
+
+
+def energies_figure(trajectory: Trajectory) -> "Figure":
+    """Stored energies, work put in and energy lost over time; terms that stay zero are left out."""
+    energies = trajectory.energies
+    figure = new_figure(10.0, 8.0)
+    axes = figure.subplots(3, 1, sharex=True)
+    time = _time(axes[2:], trajectory)
+    panels = (
+        ("stored energy", energies.stored, ("kinetic", "elastic", "drive_spring", "contact")),
+        ("work put in", energies.work, ("drive_work", "ground_work", "belt_work", "load_work")),
+        ("energy lost", energies.lost,
+         ("modal_damping", "dashpots", "contact_damping", "friction")),
+    )
+    for axis, (title, total, names) in zip(axes, panels, strict=True):
+        terms = {name: getattr(energies, name) for name in names}
+        shown = {name: term for name, term in terms.items() if term.any()}
+        factor = _labelled(axis, title, "J", total, *shown.values())
+        for name, term in shown.items():
+            axis.plot(*_thinned(time, term / factor), color=COLOURS[names.index(name)],
+                      label=name.removesuffix("_work").replace("_", " "))
+        if not shown:
+            axis.set(ylim=(-1.0, 1.0), yticks=[0.0])
+        axis.plot(*_thinned(time, total / factor), color="#303030", linewidth=1.8, label="total",
+                  zorder=1.5)
+        axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    figure.align_ylabels(axes)
+    axes[0].set_title(f"error of the energy balance: {energies.imbalance:.1e} of the largest term")
+    return figure
+
+
+def point_name(point: Point) -> str:
+    """A point for people: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
+    if isinstance(point, str):
+        return point
+    if isinstance(point, int | np.integer):
+        return f"contact node {point}"
+    return f"({point[0]:g}, {point[1]:g}) m"
+
+
+def _usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
+    """B, if anything moves there, and the contact node in the middle."""
+    basis = trajectory.system.basis
+    middle = basis.contact_nodes // 2
+    return ("B", middle) if basis.T[0].any() else (middle,)
+
+
+def _cycle(items: Sequence[Any]) -> list[str]:
+    return [COLOURS[k % len(COLOURS)] for k in range(len(items))]
+
+
+def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:
+    """Times in a suitable unit, which the given axes name."""
+    factor, symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
+    for axis in bottom:
+        axis.set_xlabel(f"time [{symbol}]")
+        if len(trajectory.time) > 1:
+            axis.set_xlim(trajectory.time[0] / factor, trajectory.time[-1] / factor)
+    return trajectory.time / factor
+
+
+def _labelled(axis: "Axes", name: str, unit: str, *values: Array) -> float:
+    """Label the y axis with a unit that suits the values, and return its factor."""
+    largest = max((float(np.abs(value).max()) for value in values), default=0.0)
+    factor, symbol = suitable_unit(largest, unit)
+    axis.set_ylabel(f"{name} [{symbol}]")
+    return factor
+
+
+def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
+    """A long line by the lowest and the highest of every few points, so that no peak is lost."""
+    few = len(x) // _LINE_BINS
+    if few < 4:
+        return x, y
+    whole = len(x) - len(x) % few
+    blocks = y[:whole].reshape(-1, few)
+    first = np.arange(len(blocks)) * few
+    chosen = np.unique(np.concatenate([
+        first + blocks.argmin(axis=1), first + blocks.argmax(axis=1), np.arange(whole, len(x)),
+        [0, len(x) - 1]]))
+    return x[chosen], y[chosen]
+
+
+def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:
+    """Borders (k + 1,) of the columns that begin at the given output times."""
+    if len(time) == 1:
+        return np.array([time[0] - 0.5, time[0] + 0.5])
+    between = 0.5 * (time[starts[1:] - 1] + time[starts[1:]])
+    return np.concatenate([time[:1], between, time[-1:]])
+
+
+def _place_edges(trajectory: Trajectory) -> tuple[Array, str]:
+    """Borders (n + 1,) between the contact nodes along the face, and the label of their axis."""
+    basis = trajectory.system.basis
+    x, length = basis.contact_x, basis.tributary
+    if len(x) == 1 or not (np.diff(x) > 0.0).all():
+        return np.arange(len(x) + 1) - 0.5, "contact node"
+    between = 0.5 * (x[1:] + x[:-1])
+    first, last = x[0] - 0.5 * length[0], x[-1] + 0.5 * length[-1]
+    edges: Array = np.array([first, *between, last], dtype=float)
+    factor, symbol = suitable_unit(float(np.ptp(edges)), "m")
+    return edges / factor, f"contact position x [{symbol}]"

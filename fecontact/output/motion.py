@@ -1,0 +1,168 @@
+"""What a moving picture shows, in numbers: places, colours, forces and ground at each frame."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.basis import Field
+from fecontact.errors import InputError, choices, nearest, require_positive
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.frames import (
+    blocks,
+    contact_forces,
+    displacement,
+    require_field,
+    von_mises,
+)
+from fecontact.output.units import round_125
+
+Array = NDArray[np.float64]
+Colour = Literal["displacement", "von_mises"]
+
+COLOURS = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
+
+_VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A run, prepared for drawing: the same scale and colour range hold for all its frames.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        Its modal basis must hold shapes over the body.
+    indices : (F,) integer array
+        Output times to draw.
+    colour : "displacement" or "von_mises"
+        What the body is coloured by.
+    given_scale : float or None
+        Factor of all displacements; None for one that makes the largest well visible.
+
+    Raises
+    ------
+    InputError
+        For a basis without shapes, another colour, or a scale that is not positive.
+    """
+
+    trajectory: Trajectory
+    indices: NDArray[np.intp]
+    colour: Colour = "displacement"
+    given_scale: float | None = None
+
+    def __post_init__(self) -> None:
+        require_field(self.trajectory)
+        if self.colour not in COLOURS:
+            raise InputError(f"colour = '{self.colour}' is not known"
+                             f"{nearest(self.colour, COLOURS)}; choose from {choices(COLOURS)}.")
+        if self.given_scale is not None:
+            require_positive("The deformation", scale=self.given_scale)
+
+    @cached_property
+    def field(self) -> Field:
+        """Modes over the body."""
+        return require_field(self.trajectory)
+
+    @cached_property
+    def times(self) -> Array:
+        """Times (F,) of the frames [s]."""
+        return self.trajectory.time[self.indices]
+
+    @cached_property
+    def forces(self) -> Array:
+        """Forces (F, n, 2) on the contact nodes, [-R, F] [N]."""
+        return contact_forces(self.trajectory, self.indices)
+
+    @cached_property
+    def states(self) -> NDArray[np.int8]:
+        """States (F, n) of the contact nodes."""
+        return self.trajectory.contact_state[self.indices]
+
+    @cached_property
+    def largest_force(self) -> float:
+        """Largest force on a contact node [N]."""
+        return float(np.linalg.norm(self.forces, axis=2).max(initial=0.0))
+
+    @cached_property
+    def scale(self) -> float:
+        """Factor of all displacements, a round number of at least one unless it was given."""
+        if self.given_scale is not None:
+            return float(self.given_scale)
+        extent = float(np.linalg.norm(np.ptp(self.field.nodes, axis=0)))
+        gap = float(np.min(self.trajectory.system.gap))
+        size = max(self._largest["displacement"], self.trajectory.system.ground.amplitude, gap)
+        return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
+
+    @cached_property
+    def largest_colour(self) -> float:
+        """Upper end of the colour range, in SI units; the lower end is zero."""
+        return self._largest[self.colour]
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
+        low = np.minimum(self.field.nodes.min(axis=0), self._extremes[0])
+        high = np.maximum(self.field.nodes.max(axis=0), self._extremes[1])
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+    @cached_property
+    def ground_level(self) -> float:
+        """Drawn height of the flat ground: under the lowest contact node by its gap [m]."""
+        basis, gap = self.trajectory.system.basis, np.min(self.trajectory.system.gap)
+        heights = basis.positions[2 : 2 + basis.contact_nodes, 1]
+        return float(heights.min() - self.scale * gap)
+
+    def body(self, frame: int) -> tuple[Array, Array]:
+        """Drawn places (N, 2) of the nodes [m] and their colours (N,) in SI units."""
+        q = self._q(frame)
+        motion = displacement(self.field, q)[0]
+        colours = np.linalg.norm(motion, axis=1) if self.colour == "displacement" else \
+            von_mises(self.field, q)[0]
+        return self.field.nodes + self.scale * motion, colours
+
+    def contact_places(self, frame: int) -> Array:
+        """Drawn places (n, 2) of the contact nodes [m]."""
+        basis = self.trajectory.system.basis
+        motion = basis.contact_T[:, :2] @ self._q(frame)[0]
+        return basis.positions[2 : 2 + basis.contact_nodes] + self.scale * motion
+
+    def ground(self, frame: int, x: Array) -> Array:
+        """Drawn heights (k,) of the ground at the drawn abscissae x (k,) [m]."""
+        height = self.trajectory.system.ground.height(x, float(self.times[frame]))
+        return self.ground_level + self.scale * height
+
+    @cached_property
+    def travel(self) -> Array:
+        """Travel (F,) of the ground [m]."""
+        ground = self.trajectory.system.ground
+        law, parameters = ground.motion_kernel.python, ground.motion_parameters()
+        return np.array([law(float(time), parameters)[0] for time in self.times])
+
+    def _q(self, frame: int) -> Array:
+        which = self.indices[frame]
+        return self.trajectory.modal_coordinates[which : which + 1]
+
+    @cached_property
+    def _extremes(self) -> tuple[Array, Array]:
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        for which in blocks(self.indices, len(self.field.nodes)):
+            places = self.field.nodes + self.scale * displacement(
+                self.field, self.trajectory.modal_coordinates[which])
+            low = np.minimum(low, places.min(axis=(0, 1)))
+            high = np.maximum(high, places.max(axis=(0, 1)))
+        return low, high
+
+    @cached_property
+    def _largest(self) -> dict[str, float]:
+        largest = dict.fromkeys(COLOURS, 0.0)
+        for which in blocks(self.indices, len(self.field.nodes)):
+            q = self.trajectory.modal_coordinates[which]
+            size = np.linalg.norm(displacement(self.field, q), axis=2).max()
+            largest["displacement"] = max(largest["displacement"], float(size))
+            if self.colour == "von_mises":
+                stress = float(von_mises(self.field, q).max())
+                largest["von_mises"] = max(largest["von_mises"], stress)
+        return largest

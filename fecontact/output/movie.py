@@ -1,0 +1,251 @@
+"""Moving pictures of a run: MP4, numbered PNG files, or a single still."""
+
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import InputError, MissingLibraryError, require_positive
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.frames import frame_indices, require_field
+from fecontact.output.furniture import Furniture
+from fecontact.output.motion import Colour, Motion
+from fecontact.output.probe import require_rendering
+from fecontact.output.scene import Scene
+
+Image = NDArray[np.uint8]
+Progress = Callable[[int, int], None]
+
+_SMALLEST = (320, 180)
+_STILL_FRAMES = 200  # whose range of colours and motion a still shares with a movie
+
+
+def render(
+    trajectory: Trajectory,
+    path: str | Path,
+    *,
+    frames: int = 200,
+    fps: float = 25,
+    size: tuple[int, int] = (960, 540),
+    colour: Colour = "displacement",
+    scale: float | None = None,
+    title: str | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Draw a run as a movie or as numbered pictures, whole or not at all.
+
+    One sees the body in scaled displacement and its undeformed outline, the ground, whose marks
+    travel at its true speed and whose waves are scaled as the body is, the contact nodes in the
+    colour of their state, and the forces of the ground on them, the longest arrow being the
+    largest force of the movie. Scale and colour range hold for all frames.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Its modal basis must hold shapes over the body.
+    path : str or Path
+        ``NAME.mp4`` for a movie, ``NAME.png`` for ``NAME_0000.png`` and so on, or a folder for
+        ``frame_0000.png`` and so on in it. Earlier files of these names are replaced.
+    frames : int
+        Number of frames, evenly spaced, never more than there are output times.
+    fps : float
+        Frames per second of the movie.
+    size : (int, int)
+        Width and height in pixels, even, at least 320 x 180.
+    colour : "displacement" or "von_mises"
+        What the body is coloured by: the magnitude of the displacement [m] or the von Mises
+        stress [Pa].
+    scale : float, optional
+        Factor of the displacements; by default a round one that makes the largest visible.
+    title : str, optional
+        Shown at the top.
+    start, end : float, optional
+        Part of the run to draw [s].
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each frame.
+
+    Returns
+    -------
+    Path
+        The movie, the folder, or the first of the pictures.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, a basis without shapes, or a path that cannot be written.
+    MissingLibraryError
+        If this computer cannot render pictures or encode movies; the message says what to install.
+    """
+    path = Path(path)
+    movie = path.suffix.lower() == ".mp4"
+    if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
+        raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
+                         f"folder.")
+    require_positive("A movie", fps=fps)
+    _require_size(size)
+    require_field(trajectory)
+    indices = frame_indices(trajectory.time, frames, start, end)
+    if not len(indices):
+        raise InputError("frames = 0 makes no movie; give at least 1.")
+    motion = Motion(trajectory, indices, colour, scale)
+    lasting = float(motion.times[-1] - motion.times[0])
+    slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
+    require_rendering()
+    with _movie_file(path, size, fps) if movie else _numbered_files(path) as take:
+        for done, image in enumerate(_images(motion, size, title, slowness), start=1):
+            take(image)
+            if progress is not None:
+                progress(done, len(indices))
+    if movie or path.suffix.lower() != ".png" or path.is_dir():
+        return path
+    return path.with_name(f"{path.stem}_0000.png")
+
+
+def picture(
+    trajectory: Trajectory,
+    path: str | Path,
+    *,
+    time: float | None = None,
+    size: tuple[int, int] = (960, 540),
+    colour: Colour = "displacement",
+    scale: float | None = None,
+    title: str | None = None,
+) -> Path:
+    """Draw a run at one time, as a frame of :func:`render` over the whole run.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Its modal basis must hold shapes over the body.
+    path : str or Path
+        ``NAME.png``.
+    time : float, optional
+        The nearest output time is drawn; the last by default [s].
+    size, colour, scale, title
+        See :func:`render`.
+
+    Returns
+    -------
+    Path
+        The picture.
+
+    Raises
+    ------
+    InputError, MissingLibraryError
+        See :func:`render`.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"{path} must end in .png.")
+    _require_folder(path)
+    _require_size(size)
+    require_field(trajectory)
+    at = len(trajectory.time) - 1 if time is None else int(np.argmin(np.abs(trajectory.time
+                                                                            - time)))
+    chosen = frame_indices(trajectory.time, _STILL_FRAMES)
+    motion = Motion(trajectory, np.union1d(chosen, [at]), colour, scale)
+    require_rendering()
+    frame = int(np.searchsorted(motion.indices, at))
+    image = next(_images(motion, size, title, None, only=frame))
+    part = path.with_name(path.name + ".part")
+    try:
+        _save(part, image)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: float | None,
+            only: int | None = None) -> Iterator[Image]:
+    """Pictures (height, width, 3) of all frames of a motion, or of one."""
+    furniture = Furniture(motion, *size, title, slowness)
+    scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
+                  fineness=2 if only is None else 4)
+    with scene:
+        for frame in range(len(motion.indices)) if only is None else (only,):
+            yield furniture.around(scene.image(frame), frame)
+
+
+@contextmanager
+def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], Any]]:
+    """A function that adds a frame to a movie; the file appears when the block ends well."""
+    import imageio_ffmpeg
+
+    _require_folder(path)
+    try:
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise MissingLibraryError(f"There is no ffmpeg to encode movies with ({error}); reinstall "
+                                  f"imageio-ffmpeg, or write .png pictures.") from None
+    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    writer = imageio_ffmpeg.write_frames(
+        str(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
+        pix_fmt_out="yuv420p", ffmpeg_log_level="error",
+        output_params=["-movflags", "+faststart"])
+    try:
+        try:
+            writer.send(None)
+            yield lambda image: writer.send(np.ascontiguousarray(image))
+        finally:
+            writer.close()
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written "
+                         f"({str(error).strip().splitlines()[0]}).") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _numbered_files(path: Path) -> Iterator[Callable[[Image], Any]]:
+    """A function that adds a numbered picture; all appear when the block ends well."""
+    folder, stem = (path, "frame") if path.is_dir() or not path.suffix else (path.parent, path.stem)
+    _require_folder(path)
+    part = path.parent / f"{path.stem}.part"
+    shutil.rmtree(part, ignore_errors=True)
+    names: list[str] = []
+
+    def take(image: Image) -> None:
+        names.append(f"{stem}_{len(names):04d}.png")
+        _save(part / names[-1], image)
+
+    try:
+        part.mkdir()
+        yield take
+        folder.mkdir(exist_ok=True)
+        for old in folder.iterdir():
+            if re.fullmatch(re.escape(stem) + r"_\d{4,}\.png", old.name):
+                old.unlink()
+        for name in names:
+            os.replace(part / name, folder / name)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be written ({error.strerror or error}).") from None
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _save(path: Path, image: Image) -> None:
+    from matplotlib.image import imsave
+
+    imsave(path, image, format="png")
+
+
+def _require_folder(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
+
+
+def _require_size(size: tuple[int, int]) -> None:
+    if len(size) != 2 or any(not isinstance(side, int) or side % 2 or side < least
+                             for side, least in zip(size, _SMALLEST, strict=False)):
+        raise InputError(f"size = {size!r} must be an even width and height in pixels, at least "
+                         f"{_SMALLEST[0]} x {_SMALLEST[1]}.")

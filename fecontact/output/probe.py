@@ -1,0 +1,87 @@
+"""Whether this computer can render pictures without a screen."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+from fecontact.errors import MissingLibraryError
+
+PACKAGES = "libegl1 libgl1 libglu1-mesa libxcursor1 libxft2 libxinerama1 libgomp1"
+_WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
+
+# VTK ends the process with a segmentation fault where graphics libraries are missing, so the
+# attempt runs in a process of its own. It uses the modules that pyvista uses, without pyvista.
+_ATTEMPT = """
+import vtkmodules.vtkRenderingOpenGL2
+import vtkmodules.vtkRenderingFreeType
+import vtkmodules.vtkInteractionStyle
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+window, renderer = vtkRenderWindow(), vtkRenderer()
+renderer.SetBackground(1.0, 0.0, 0.0)
+window.SetOffScreenRendering(True)
+window.SetSize(16, 16)
+window.AddRenderer(renderer)
+window.Render()
+pixels = vtkUnsignedCharArray()
+window.GetPixelData(0, 0, 15, 15, 1, pixels, 0)
+assert pixels.GetValue(0) == 255 and pixels.GetValue(1) == 0, "the picture came out blank"
+print("window", window.GetClassName())
+"""
+
+
+def rendering_works() -> str | None:
+    """Try to render a small picture off screen, once per process.
+
+    Returns
+    -------
+    str or None
+        Why it is not possible, in one sentence, or None if it is.
+    """
+    return _attempt()[0]
+
+
+def require_rendering() -> None:
+    """Raise :class:`MissingLibraryError`, with what to install, unless pictures can be rendered."""
+    reason = rendering_works()
+    if reason is not None:
+        raise MissingLibraryError(reason)
+
+
+@contextmanager
+def known_window() -> Iterator[None]:
+    """Let VTK open the kind of window that was found to work, without trying others first."""
+    window = _attempt()[1]
+    if window is None or _WINDOW in os.environ:
+        yield
+        return
+    os.environ[_WINDOW] = window
+    try:
+        yield
+    finally:
+        os.environ.pop(_WINDOW, None)
+
+
+@cache
+def _attempt() -> tuple[str | None, str | None]:
+    """The reason why rendering fails and the kind of window that works; one of them is None."""
+    try:
+        done = subprocess.run([sys.executable, "-c", _ATTEMPT], capture_output=True, text=True,
+                              timeout=120, check=False, stdin=subprocess.DEVNULL)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return _reason(str(error)), None
+    windows = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("window ")]
+    if done.returncode == 0 and windows:
+        return None, windows[0]
+    lines = [line for line in done.stderr.splitlines() if line.strip()]
+    if done.returncode < 0:
+        return _reason(f"the trial process ended by signal {-done.returncode}"), None
+    return _reason(lines[-1].strip() if lines else f"exit code {done.returncode}"), None
+
+
+def _reason(what: str) -> str:
+    return (f"Pictures cannot be rendered here ({what.rstrip('.')}); on Debian or Ubuntu install "
+            f"the graphics libraries with: apt-get install -y {PACKAGES}")

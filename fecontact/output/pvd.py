@@ -1,0 +1,134 @@
+"""Frames of a run as PVD and VTU files, for ParaView before 5.12 and other programs."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.errors import InputError
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.frames import (
+    displacement,
+    frame_indices,
+    nodal_contact_force,
+    require_field,
+    von_mises,
+)
+from fecontact.output.store import Case, read_case
+
+
+def export_pvd(
+    case: Case | Trajectory | str | Path, path: str | Path, *, frames: int = 200
+) -> Path:
+    """Write frames of a run into a folder of VTU files, and a PVD file that lists them.
+
+    Each frame holds ``displacement`` [m], ``von_mises`` [Pa] and ``contact_force`` [N] at the
+    nodes of the undeformed body, as in :func:`fecontact.output.store.write_case`.
+
+    Parameters
+    ----------
+    case : Case, Trajectory, str or Path
+        The run, or the file it is stored in.
+    path : str or Path
+        ``FOLDER`` for ``FOLDER/FOLDER.pvd`` with the frames beside it, or ``NAME.pvd`` with the
+        frames in the folder ``NAME``. The folder is written whole or not at all. One that exists
+        is replaced if there is nothing but .pvd and .vtu files in it.
+    frames : int
+        Number of frames, evenly spaced, never more than there are output times.
+
+    Returns
+    -------
+    Path
+        The PVD file.
+
+    Raises
+    ------
+    InputError
+        If the run has no shapes over the body, ``frames`` is not above zero, the folder holds
+        other files or cannot be written, or the case cannot be read.
+    """
+    trajectory = _trajectory(case)
+    field = require_field(trajectory)
+    indices = frame_indices(trajectory.time, frames)
+    if not len(indices):
+        raise InputError("frames = 0 makes no files; give at least 1.")
+    path = Path(path)
+    beside = path.suffix == ".pvd"
+    folder = path.with_suffix("") if beside else path
+    name = folder.name
+    collection = path if beside else folder / f"{name}.pvd"
+    _require_free(folder)
+    from fecontact.mesh_io import write_fields
+
+    part = folder.with_name(folder.name + ".part")
+    shutil.rmtree(part, ignore_errors=True)
+    try:
+        part.mkdir()
+        names = []
+        for number, index in enumerate(indices):
+            q = trajectory.modal_coordinates[index : index + 1]
+            names.append(f"{name}_{number:04d}.vtu")
+            write_fields(part / names[-1], field.nodes, field.cells, {
+                "displacement": displacement(field, q)[0].astype(np.float32),
+                "von_mises": von_mises(field, q)[0].astype(np.float32),
+                "contact_force": nodal_contact_force(
+                    trajectory, slice(index, index + 1))[0].astype(np.float32),
+            })
+        times = trajectory.time[indices].tolist()
+        listed = [f"{name}/{file}" for file in names] if beside else names
+        (part / collection.name).write_text(_collection(listed, times), encoding="utf-8")
+        _replace(folder, part)
+        if beside:
+            os.replace(folder / collection.name, collection)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be written ({error.strerror or error}).") from None
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return collection
+
+
+def _trajectory(case: Case | Trajectory | str | Path) -> Trajectory:
+    if isinstance(case, Trajectory):
+        return case
+    return (case if isinstance(case, Case) else read_case(case)).trajectory
+
+
+def _collection(names: list[str], times: list[float]) -> str:
+    from xml.sax.saxutils import quoteattr
+
+    sets = [f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>'
+            for name, time in zip(names, times, strict=True)]
+    return "\n".join([
+        '<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>",
+        *sets, "  </Collection>", "</VTKFile>", ""])
+
+
+def _require_free(folder: Path) -> None:
+    if not folder.name or folder.name == "..":
+        raise InputError(f"Give a folder of its own for the frames, not '{folder}'.")
+    if not folder.parent.is_dir():
+        raise InputError(f"{folder} cannot be written: folder {folder.parent} does not exist.")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file; give a folder.")
+    others = [item.name for item in folder.iterdir() if item.suffix not in (".vtu", ".pvd")] \
+        if folder.is_dir() else []
+    if others:
+        raise InputError(f"{folder} holds other files ({min(others)}); give a folder of its own "
+                         f"for the frames.")
+
+
+def _replace(folder: Path, part: Path) -> None:
+    """Put the finished folder in its place; an earlier one survives if that fails."""
+    if not folder.exists():
+        os.replace(part, folder)
+        return
+    old = folder.with_name(folder.name + ".old")
+    shutil.rmtree(old, ignore_errors=True)
+    os.replace(folder, old)
+    try:
+        os.replace(part, folder)
+    except OSError:
+        os.replace(old, folder)
+        raise
+    shutil.rmtree(old)

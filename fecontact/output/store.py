@@ -1,0 +1,132 @@
+"""A case in one HDF5 file: the run, all that it was computed from, and frames for ParaView."""
+
+import json
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from fecontact.errors import InputError
+from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.output.frames import frame_indices
+from fecontact.output.hdf5 import new_file, open_file, read_basis, write_basis
+from fecontact.output.vtkhdf import write_vtkhdf
+from fecontact.tables import system_from_tables, system_tables
+
+_PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
+_STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
+          "work": "J"}
+_CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
+            "slip_velocity": "m/s", "contact_state": "0 open, 1 stick, 2 slip"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run as read from its file.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        Equal to the one that was written, to the last bit.
+    study : str or None
+        The study that described the run, as TOML text.
+    versions : mapping
+        Versions of fecontact and the libraries it ran with.
+    """
+
+    trajectory: Trajectory
+    study: str | None = None
+    versions: dict[str, str] = field(default_factory=dict)
+
+
+def write_case(
+    path: str | Path, trajectory: Trajectory, *, frames: int = 200, study: str | None = None
+) -> Path:
+    """Write a run into one HDF5 file, whole or not at all.
+
+    With frames the file is a temporal VTKHDF file too: call it ``NAME.vtkhdf`` and ParaView opens
+    it by double click. The rest lies outside its group /VTKHDF: /basis, /trajectory, /system,
+    /study and /versions.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; it is replaced if it exists.
+    trajectory : Trajectory
+        The run.
+    frames : int
+        Number of output times whose fields are stored, evenly spaced, never more than there are;
+        zero, or a modal basis without shapes over the body, leaves /VTKHDF out.
+    study : str, optional
+        The study that described the run, as TOML text.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If ``frames`` is negative, or the file cannot be written.
+    """
+    indices = frame_indices(trajectory.time, frames)
+    with new_file(path) as file:
+        for name, text in _versions().items():
+            file.require_group("versions").attrs[name] = text
+        write_basis(file.create_group("basis"), trajectory.system.basis)
+        file.create_group("system").attrs["json"] = json.dumps(system_tables(trajectory.system))
+        if study is not None:
+            file.create_group("study").attrs["toml"] = study
+        _write_trajectory(file.create_group("trajectory"), trajectory)
+        if len(indices) and trajectory.system.basis.field is not None:
+            write_vtkhdf(file, trajectory, indices)
+    return Path(path)
+
+
+def read_case(path: str | Path) -> Case:
+    """Read a run that :func:`write_case` wrote.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is not HDF5, was not written by fecontact, holds no run, is
+        damaged, or its system has parameters that this version does not know.
+    """
+    with open_file(path, "basis") as file:
+        if "trajectory" not in file:
+            raise InputError(f"{path} holds a modal basis but no run; read it with "
+                             f"ModalBasis.load.")
+        try:
+            basis = read_basis(file["basis"])
+            tables = json.loads(file["system"].attrs["json"])
+            stored = file["trajectory"]
+            state = {name: stored[name][()] for name in _STATE}
+            status = Status[stored.attrs["status"]]
+            statistics = json.loads(stored.attrs["statistics"])
+            study = str(file["study"].attrs["toml"]) if "study" in file else None
+            versions = {name: str(text) for name, text in file["versions"].attrs.items()}
+        except (KeyError, OSError, json.JSONDecodeError) as error:
+            raise InputError(f"{path} is damaged or of another version of fecontact "
+                             f"({error}).") from None
+    system = system_from_tables(basis, tables, str(path))
+    return Case(Trajectory(system=system, status=status, statistics=statistics, **state),
+                study, versions)
+
+
+def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
+    for name, unit in (_STATE | _CONTACT).items():
+        data = group.create_dataset(name, data=getattr(trajectory, name))
+        data.attrs["unit"] = unit
+    group.attrs["status"] = trajectory.status.name
+    group.attrs["statistics"] = json.dumps(trajectory.statistics, default=lambda x: x.item())
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

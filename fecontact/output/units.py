@@ -1,0 +1,49 @@
+"""Numbers for people: a unit that suits their size, and round numbers."""
+
+import math
+
+_UNITS = {
+    "m": ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m")),
+    "m/s": ((1e-6, "µm/s"), (1e-3, "mm/s"), (1.0, "m/s")),
+    "rad": ((1e-6, "µrad"), (1e-3, "mrad"), (1.0, "rad")),
+    "rad/s": ((1e-3, "mrad/s"), (1.0, "rad/s")),
+    "s": ((1e-6, "µs"), (1e-3, "ms"), (1.0, "s")),
+    "N": ((1e-3, "mN"), (1.0, "N"), (1e3, "kN")),
+    "N/m": ((1.0, "N/m"), (1e3, "N/mm"), (1e6, "kN/mm")),
+    "Pa": ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa")),
+    "J": ((1e-9, "nJ"), (1e-6, "µJ"), (1e-3, "mJ"), (1.0, "J"), (1e3, "kJ")),
+}
+
+
+def suitable_unit(size: float, unit: str) -> tuple[float, str]:
+    """The largest unit that a value is not below, as its factor and its symbol.
+
+    Parameters
+    ----------
+    size : float
+        Largest magnitude to show, in ``unit``; zero gives ``unit`` itself.
+    unit : str
+        SI unit: m, m/s, rad, rad/s, s, N, N/m, Pa or J.
+
+    Returns
+    -------
+    (float, str)
+        ``value / factor`` is the number to show: ``suitable_unit(2e-5, "m") == (1e-6, "µm")``.
+    """
+    if not 0.0 < abs(size) < math.inf:
+        return 1.0, unit
+    fitting = [choice for choice in _UNITS[unit] if abs(size) >= choice[0] * (1.0 - 1e-9)]
+    return fitting[-1] if fitting else _UNITS[unit][0]
+
+
+def round_125(value: float) -> float:
+    """The largest 1, 2 or 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    digit = value / power
+    return power * (5.0 if digit >= 5.0 else 2.0 if digit >= 2.0 else 1.0)
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """A value with a suitable unit: ``quantity(0.0123, "m") == "12.3 mm"``."""
+    factor, symbol = suitable_unit(value, unit)
+    return f"{value / factor:.{digits}g} {symbol}"
