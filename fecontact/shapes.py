@@ -6,12 +6,7 @@ The contact face is the bottom of the body, at y = 0; the ground lies below it.
 from dataclasses import dataclass
 from typing import Literal
 
-from fecontact.errors import (
-    InputError,
-    choices,
-    require_not_negative,
-    require_positive,
-)
+from fecontact.errors import InputError, choices, require_not_negative, require_positive
 
 Element = Literal["quadrilateral", "triangle"]
 

@@ -1,0 +1,1 @@
+"""Mesh file formats that are read without meshio, and what all readers hand on."""

@@ -1,0 +1,18 @@
+"""Makes the meshes in this folder again: ``python meshes/generate.py``."""
+
+from pathlib import Path
+
+from fecontact.geometry import Beam, Block, Pendulum, generate
+from fecontact.mesh_io import write_mesh
+
+SHAPES = {
+    "beam.msh": Beam(),
+    "block.msh": Block(),
+    "pendulum.msh": Pendulum(
+        arm_length=0.3045, arm_height=0.00798, bob_width=0.0324, bob_height=0.0324
+    ),
+}
+
+if __name__ == "__main__":
+    for name, shape in SHAPES.items():
+        write_mesh(generate(shape), Path(__file__).with_name(name))
