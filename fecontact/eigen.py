@@ -29,14 +29,11 @@ class FreeSystem:
         K, symmetric and positive semi-definite, and M, positive definite.
     rigid : (f, r) array
         Mass-normalised rigid modes: ``K rigid = 0``.
-    shift : float
-        Small against the lowest elastic squared frequency [1/s^2]; ``K + shift M`` is factorised.
     """
 
     stiffness: Any
     mass: Any
     rigid: Array
-    shift: float
 
     @classmethod
     def of(cls, body: "ElasticBody") -> "FreeSystem":
@@ -45,24 +42,53 @@ class FreeSystem:
         K, M = body.stiffness, body.mass
         if len(free) < K.shape[0]:
             K, M = K[free][:, free].tocsc(), M[free][:, free].tocsc()
-        return cls(K, M, rigid_modes(body)[free], _shift(body))
+        return cls(K, M, rigid_modes(body)[free])
+
+    @cached_property
+    def held(self) -> NDArray[np.int64]:
+        """Degrees of freedom not supported (f - r,): the other r hold the body isostatically."""
+        from scipy.linalg import qr
+
+        size, rigid = self.rigid.shape
+        if not rigid:
+            return np.arange(size)
+        pivots = qr(self.rigid.T, mode="r", pivoting=True)[1]
+        return np.setdiff1d(np.arange(size), pivots[:rigid])
 
     @cached_property
     def factors(self) -> Any:
-        """Factors of K + shift M.
+        """Factors of the stiffness of the isostatically held body.
 
-        The matrix is positive definite, so that no pivoting is needed and the fill of an
-        ordering for symmetric matrices is kept.
+        It is positive definite, so that no pivoting is needed and the fill of an ordering for
+        symmetric matrices is kept.
         """
         from scipy.sparse.linalg import splu
 
-        return splu((self.stiffness + self.shift * self.mass).tocsc(),
-                    permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+        K = self.stiffness
+        if len(self.held) < K.shape[0]:
+            K = K[self.held][:, self.held]
+        return splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                     options={"SymmetricMode": True})
+
+    @cached_property
+    def inertia(self) -> Array:
+        """M rigid (f, r)."""
+        return np.asarray(self.mass @ self.rigid)
 
     def without_rigid(self, shapes: Array) -> Array:
         """The part of displacements (f,) or (f, k) that is mass-orthogonal to the rigid modes."""
-        return np.asarray(shapes - self.rigid @ (self.rigid.T @ (self.mass @ shapes)))
+        return np.asarray(shapes - self.rigid @ (self.inertia.T @ shapes))
+
+    def deflection(self, forces: Array) -> Array:
+        """Elastic static response (f,) or (f, k) to forces.
+
+        Forces that are not self-balancing are balanced by the inertia of the rigid motion that
+        they cause; the response is mass-orthogonal to the rigid modes.
+        """
+        balanced = forces - self.inertia @ (self.rigid.T @ forces)
+        deflection = np.zeros_like(balanced)
+        deflection[self.held] = self.factors.solve(np.ascontiguousarray(balanced[self.held]))
+        return self.without_rigid(deflection)
 
 
 def eigenmodes(body: "ElasticBody", count: int) -> tuple[Array, Array]:
@@ -161,7 +187,7 @@ def strain_energies(body: "ElasticBody", shapes: Array) -> Array:
 def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     """Squares of the lowest non-zero angular frequencies and their mass-normalised shapes.
 
-    Shift-invert Lanczos about ``-shift`` on the complement of the rigid modes, which is kept
+    Inverse Lanczos iteration with the elastic static response, which leaves out the rigid modes
     exactly; the dense solver for few unknowns.
     """
     K, M = system.stiffness, system.mass
@@ -177,10 +203,9 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
         from scipy.sparse.linalg import LinearOperator, eigsh
 
         start = np.random.default_rng(0).standard_normal(size)
-        solve = LinearOperator(
-            K.shape, lambda force: system.without_rigid(system.factors.solve(force)), dtype=float)
-        squares, shapes = eigsh(K, k=count, M=M, sigma=-system.shift, OPinv=solve,
-                                v0=system.without_rigid(start))
+        squares, shapes = eigsh(
+            K, k=count, M=M, sigma=0.0, v0=system.without_rigid(start),
+            OPinv=LinearOperator(K.shape, system.deflection, dtype=float))
     shapes = system.without_rigid(shapes)
     shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))
     # Rayleigh quotients do not carry the shift's round-off.
@@ -202,14 +227,6 @@ def backward_error(K: Any, M: Any, squares: Array, shapes: Array) -> Array:
     residual = np.linalg.norm(K @ shapes - (M @ shapes) * squares, axis=0)
     largest = float(abs(K).sum(axis=0).max())
     return np.asarray(residual / (largest * np.linalg.norm(shapes, axis=0)))
-
-
-def _shift(body: "ElasticBody") -> float:
-    """A small part of the square of a slender body's lowest bending frequency [1/s^2]."""
-    length = body.mesh.extent
-    height = body.mesh.area / length
-    speed = np.sqrt(body.material.youngs_modulus / body.material.density)
-    return float((0.05 * speed * height / length**2) ** 2)
 
 
 def _largest(K: Any, M: Any) -> float:
