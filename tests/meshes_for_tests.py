@@ -58,7 +58,7 @@ def clamped_beam(length, height, columns, times):
 
 
 def tapered_membrane(columns, rows, times, triangles=False):
-    """NAFEMS FV32: length 10, height 5 at the left, 1 at the right, graded into the left corners."""
+    """NAFEMS FV32: length 10, height 5 at the left and 1 at the right, graded to the left."""
     step = 10.0 / columns
     xs = np.concatenate([halved_towards_zero(step, times), np.linspace(step, 10.0, columns)[1:]])
     near = halved_towards_zero(1.0 / rows, times)

@@ -373,7 +373,7 @@ def test_unknown_support_names_the_nearest():
 
 def test_body_in_two_pieces():
     one = rectangle(1.0, 0.3, 2, 1)
-    two = Mesh(np.concatenate([one.nodes, one.nodes + [2.0, 0.0]]),
+    two = Mesh(np.concatenate([one.nodes, one.nodes + np.array([2.0, 0.0])]),
                np.concatenate([one.cells, one.cells + len(one.nodes)]))
     with pytest.raises(MeshError, match="2 pieces"):
         ElasticBody(two, STEEL)
