@@ -82,9 +82,10 @@ def _check_faces_down(body: "ElasticBody", boundary: str) -> None:
     # The body lies on the left of its outline: a face that looks down runs to +x.
     runs = body.mesh.nodes[edges[:, 1], 0] - body.mesh.nodes[edges[:, 0], 0]
     length = np.linalg.norm(body.mesh.nodes[edges[:, 1]] - body.mesh.nodes[edges[:, 0]], axis=1)
-    if runs.sum() < 0.5 * length.sum():
+    if runs.sum() < 0.5 * length.sum() or (runs < -1e-9 * length).any():
         raise InputError(f"Boundary '{boundary}' does not face the ground, which lies below the "
-                         f"body (towards -y); turn the mesh or choose another contact boundary.")
+                         f"body (towards -y), with all its edges; turn the mesh or choose another "
+                         f"contact boundary.")
 
 
 def _chains(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
