@@ -1,0 +1,97 @@
+"""Substitutions with sparse triangular factors for many sparse right-hand sides at once."""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.compiled import kernel, matrix, vector
+
+Array = NDArray[np.float64]
+
+_index = types.Array(types.int32, 1, "C")
+_flags = types.Array(types.boolean, 1, "C")
+
+# Columns treated at once: enough to vectorise, few enough for the cache.
+_BLOCK = 64
+
+
+@kernel(types.void(_index, _index, vector, matrix, _flags))
+def _forward(indptr, indices, data, x, active):  # type: ignore[no-untyped-def]
+    """Solve L x = b in place, L unit lower triangular by columns; zero rows are passed over."""
+    n, width = x.shape
+    for j in range(n):
+        if active[j]:
+            for p in range(indptr[j], indptr[j + 1]):
+                i = indices[p]
+                if i != j:
+                    active[i] = True
+                    entry = data[p]
+                    for c in range(width):
+                        x[i, c] -= entry * x[j, c]
+
+
+@kernel(types.void(_index, _index, vector, matrix))
+def _backward(indptr, indices, data, x):  # type: ignore[no-untyped-def]
+    """Solve L^T x = b in place."""
+    n, width = x.shape
+    for j in range(n - 1, -1, -1):
+        for p in range(indptr[j], indptr[j + 1]):
+            i = indices[p]
+            if i != j:
+                entry = data[p]
+                for c in range(width):
+                    x[j, c] -= entry * x[i, c]
+
+
+class SymmetricFactors:
+    """``A = P^T L D L^T P`` from SuperLU's factors of a symmetric positive definite matrix.
+
+    The forward substitution of sparse right-hand sides touches only the rows that they reach,
+    a small part for loads on a boundary. It alone gives ``W A^-1 W^T`` for all of them; the
+    backward substitution is done for the few combinations that are wanted in full.
+    """
+
+    def __init__(self, factors: Any) -> None:
+        if (factors.perm_r != factors.perm_c).any():
+            raise ArithmeticError("the factors are not symmetric")
+        L = factors.L
+        self.L = (L.indptr.astype(np.int32), L.indices.astype(np.int32),
+                  np.ascontiguousarray(L.data))
+        self.diagonal = np.asarray(factors.U.diagonal())
+        self.order = factors.perm_r
+
+    def half_solved(self, rows: Any) -> tuple[NDArray[np.int64], Array]:
+        """``D^-1/2 L^-1 P W^T`` of sparse rows W (k, n): the places of its non-zero rows (r,)
+        and these rows (r, k).
+        """
+        size, count = len(self.order), rows.shape[0]
+        columns = rows.tocsr()
+        blocks, places = [], np.zeros(size, dtype=bool)
+        for first in range(0, count, _BLOCK):
+            part = columns[first : first + _BLOCK].tocoo()
+            x = np.zeros((size, part.shape[0]))
+            x[self.order[part.coords[1]], part.coords[0]] = part.data
+            active = np.zeros(size, dtype=bool)
+            active[self.order[part.coords[1]]] = True
+            _forward(*self.L, x, active)
+            reached = np.flatnonzero(active)
+            places |= active
+            blocks.append((reached, x[reached]))
+        kept = np.flatnonzero(places)
+        result = np.zeros((len(kept), count))
+        column = 0
+        for reached, block in blocks:
+            result[np.searchsorted(kept, reached), column : column + block.shape[1]] = block
+            column += block.shape[1]
+        return kept, result / np.sqrt(self.diagonal[kept, None])
+
+    def completed(self, places: NDArray[np.int64], half: Array) -> Array:
+        """``A^-1 W^T C`` (n, p) from combinations ``half @ C`` (r, p) of half-solved columns."""
+        x = np.zeros((len(self.order), half.shape[1]))
+        x[places] = half / np.sqrt(self.diagonal[places, None])
+        _backward(*self.L, x)
+        return x[self.order]
+
+
