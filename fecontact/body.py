@@ -12,6 +12,7 @@ from fecontact.basis import ModalBasis
 from fecontact.damping import Damping
 from fecontact.errors import InputError, MeshError, choices, nearest, require_positive
 from fecontact.mesh import Mesh
+from fecontact.supports import check_supports, expansion, fixed_dofs
 
 if TYPE_CHECKING:
     from fecontact.points import Place
@@ -73,8 +74,9 @@ class ElasticBody:
     plane : 'stress' or 'strain'
     degree : 2 or 1
         Quadratic (P2, Q2) or linear (P1, Q1) displacements.
-    fixed : mapping of name to 'x', 'y' or 'xy'
-        Displacements held at zero on named boundaries or points of the mesh.
+    fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
+        Supports on named boundaries or points of the mesh: displacements held at zero, or a
+        hinge, whose nodes (those of the boundary of a hole, say) turn rigidly about their centre.
 
     Raises
     ------
@@ -97,14 +99,7 @@ class ElasticBody:
             raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")
         if self.degree not in (1, 2):
             raise InputError(f"ElasticBody: degree = {self.degree!r} must be 1 or 2.")
-        known = {*self.mesh.boundaries, *self.mesh.points}
-        for name, directions in self.fixed.items():
-            if name not in known:
-                raise MeshError(f"The mesh has no boundary or point '{name}' to be fixed"
-                                f"{nearest(name, known)}; it has: {choices(known)}.")
-            if directions not in ("x", "y", "xy"):
-                raise InputError(f"ElasticBody: fixed['{name}'] = {directions!r} must be 'x', 'y' "
-                                 f"or 'xy'.")
+        check_supports(self)
         pieces = _pieces(self.mesh)
         if pieces > 1:
             raise MeshError(f"The mesh falls into {pieces} pieces that share no node; a body must "
@@ -177,20 +172,13 @@ class ElasticBody:
 
     @cached_property
     def fixed_dofs(self) -> NDArray[np.int64]:
-        """Degrees of freedom held by the supports, ascending."""
-        held: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
-        for name, directions in self.fixed.items():
-            if name in self.mesh.points:
-                where = np.asarray(self.mesh.points[name])
-            else:
-                where = np.unique(self.edge_nodes(self.mesh.boundaries[name]))
-            held += [2 * where + "xy".index(axis) for axis in directions]
-        return np.unique(np.concatenate(held))
+        """Degrees of freedom held at zero by the supports, ascending."""
+        return fixed_dofs(self)
 
     @cached_property
-    def free_dofs(self) -> NDArray[np.int64]:
-        """Degrees of freedom not held by supports, ascending."""
-        return np.setdiff1d(np.arange(2 * len(self.nodes)), self.fixed_dofs)
+    def expansion(self) -> Any:
+        """All degrees of freedom from the free ones, sparse (2 N, f); see the supports."""
+        return expansion(self)
 
     def edge_nodes(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
         """Displacement nodes (k, degree + 1) of mesh edges (k, 2): start, (middle,) end."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.basis import fixed_signs
 from fecontact.errors import AnalysisError, InputError
+from fecontact.supports import rigid_modes
 
 if TYPE_CHECKING:
     from fecontact.body import ElasticBody
@@ -38,11 +39,16 @@ class FreeSystem:
     @classmethod
     def of(cls, body: "ElasticBody") -> "FreeSystem":
         """The free degrees of freedom of a body."""
-        free = body.free_dofs
-        K, M = body.stiffness, body.mass
-        if len(free) < K.shape[0]:
-            K, M = K[free][:, free].tocsc(), M[free][:, free].tocsc()
-        return cls(K, M, rigid_modes(body)[free])
+        E = body.expansion
+        rigid = rigid_modes(body)
+        if E.nnz == E.shape[1]:
+            free = E.indices
+            K, M = (a if len(free) == a.shape[0] else a[free][:, free].tocsc()
+                    for a in (body.stiffness, body.mass))
+            return cls(K, M, rigid[free])
+        # The columns of E have no row in common, so that E^T E is diagonal.
+        return cls((E.T @ body.stiffness @ E).tocsc(), (E.T @ body.mass @ E).tocsc(),
+                   (E.T @ rigid) / E.multiply(E).sum(axis=0)[:, None])
 
     @cached_property
     def held(self) -> NDArray[np.int64]:
@@ -106,17 +112,10 @@ def eigenmodes(body: "ElasticBody", count: int) -> tuple[Array, Array]:
         If a computed mode misses ``|K s - w^2 M s| < 1e-10 |K| |s|``.
     """
     w, free_shapes = free_modes(FreeSystem.of(body), count)
-    shapes = on_body(body, free_shapes)
+    shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
     return w, shapes
-
-
-def on_body(body: "ElasticBody", free_shapes: Array) -> Array:
-    """Shapes (2 N, m) over all degrees of freedom from those over the free ones."""
-    shapes = np.zeros((2 * len(body.nodes), free_shapes.shape[1]))
-    shapes[body.free_dofs] = free_shapes
-    return shapes
 
 
 def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
@@ -132,34 +131,6 @@ def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     squares, shapes = elastic_modes(system, elastic)
     return (np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(squares)]),
             np.hstack([rigid, shapes * fixed_signs(shapes)]))
-
-
-def rigid_modes(body: "ElasticBody") -> Array:
-    """Mass-normalised rigid modes (2 N, r) that the supports leave, r = 0 ... 3.
-
-    Translation in x, in y, and a counter-clockwise rotation about the place where the lines of
-    the held displacements meet, about the centre of mass where they leave it open.
-    """
-    M = body.mass
-    x, y = body.nodes.T
-    held_x, held_y = (body.fixed_dofs[body.fixed_dofs % 2 == axis] // 2 for axis in range(2))
-    ones = np.zeros(2 * len(x))
-    ones[0::2] = 1.0
-    inertia = (M @ ones)[0::2] / (ones @ (M @ ones))
-    pivot_x = x[held_y].mean() if held_y.size else inertia @ x
-    pivot_y = y[held_x].mean() if held_x.size else inertia @ y
-    shapes = np.column_stack([ones, np.roll(ones, 1)])[:, [not held_x.size, not held_y.size]]
-    off = np.concatenate([x[held_y] - pivot_x, y[held_x] - pivot_y])
-    if np.abs(off).max(initial=0.0) <= 1e-9 * body.mesh.extent:
-        rotation = np.column_stack([pivot_y - y, x - pivot_x]).ravel()
-        rotation[body.fixed_dofs] = 0.0
-        shapes = np.column_stack([shapes, rotation])
-    for column in range(shapes.shape[1]):
-        for _ in range(2):
-            earlier = shapes[:, :column]
-            shapes[:, column] -= earlier @ (earlier.T @ (M @ shapes[:, column]))
-        shapes[:, column] /= np.sqrt(shapes[:, column] @ (M @ shapes[:, column]))
-    return shapes
 
 
 def strain_energies(body: "ElasticBody", shapes: Array) -> Array:
