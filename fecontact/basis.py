@@ -85,6 +85,9 @@ class ModalBasis:
                 raise InputError(f"Modal basis: {name} holds values that are not finite.")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        if not (self.tributary > 0.0).all():
+            raise InputError(f"Modal basis: tributary lengths must be above zero, not "
+                             f"{self.tributary.min()}.")
         m = len(self.angular_frequencies)
         points = 2 + len(self.tributary) + len(self.extra)
         for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2))):
@@ -185,12 +188,12 @@ class ModalBasis:
         """
         from scipy.linalg import LinAlgError, eigh
 
-        mass, stiffness = (np.asarray(a, dtype=float) for a in (mass, stiffness))
-        d = len(mass)
+        mass, stiffness = _real("mass", mass), _real("stiffness", stiffness)
+        d = len(mass) if mass.ndim else 0
         for name, matrix in (("mass", mass), ("stiffness", stiffness)):
-            if matrix.shape != (d, d):
-                raise InputError(f"The {name} matrix must be square and of the mass matrix's "
-                                 f"size, ({d}, {d}), not {matrix.shape}.")
+            if not d or matrix.shape != (d, d):
+                raise InputError(f"The {name} matrix must be square, not empty and of the mass "
+                                 f"matrix's size, not of shape {matrix.shape}.")
             if not np.isfinite(matrix).all():
                 raise InputError(f"The {name} matrix holds values that are not finite.")
             asymmetry = np.abs(matrix - matrix.T).max() / max(np.abs(matrix).max(), 1e-300)
@@ -201,11 +204,16 @@ class ModalBasis:
             squares, shapes = eigh(stiffness, mass)
         except LinAlgError:
             raise InputError("The mass matrix is not positive definite.") from None
-        noise = 10.0 * d * np.finfo(float).eps * max(abs(squares[-1]), abs(squares[0]))
-        if squares[0] < -noise:
+        digit = np.finfo(float).eps * max(abs(squares[-1]), abs(squares[0]))
+        if squares[0] < -10.0 * d * digit:
             raise InputError(f"The stiffness matrix is not positive semi-definite: its smallest "
                              f"eigenvalue relative to the mass is {squares[0]:.3e} 1/s^2.")
-        w = np.sqrt(np.where(squares <= noise, 0.0, squares))
+        # Rayleigh quotients: those of rigid modes come out below a tenth of the last digit of the
+        # largest, for any number of unknowns, and the lowest of a slender body not far above.
+        squares = (shapes * (stiffness @ shapes)).sum(axis=0)
+        w = np.sqrt(np.where(squares <= 100.0 * digit, 0.0, squares))
+        order = np.argsort(w, kind="stable")
+        w, shapes = w[order], shapes[:, order]
         shapes = shapes * fixed_signs(shapes)
         contact = _rows("contact", rows, d, "(n, 3, d)")
         names = [name for name in rows if name not in ("B", "C", "contact")]
@@ -213,7 +221,12 @@ class ModalBasis:
         T = np.concatenate([*points, contact, *(_rows(name, rows, d, "(3, d)") for name in names)])
         n = len(contact)
         positions = np.zeros((len(T), 2))
-        positions[2 : 2 + n, 0] = 0.0 if contact_x is None else np.asarray(contact_x, dtype=float)
+        for name, given in (("contact_x", contact_x), ("tributary", tributary)):
+            if given is not None and _real(name, given).shape != (n,):
+                raise InputError(f"{name} must have one value for each of the {n} contact nodes, "
+                                 f"not shape {np.shape(given)}.")
+        if contact_x is not None:
+            positions[2 : 2 + n, 0] = contact_x
         physical = np.ndim(damping) == 2 if not hasattr(damping, "mass_factor") else False
         if physical:
             matrix = np.asarray(damping, dtype=float)
@@ -257,12 +270,20 @@ def fixed_signs(shapes: Array) -> Array:
     return np.where(shapes[first, np.arange(shapes.shape[1])] < 0.0, -1.0, 1.0)
 
 
+def _real(name: str, values: ArrayLike) -> Array:
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be an array of real numbers, not "
+                         f"{type(values).__name__}.") from None
+
+
 def _rows(name: str, rows: Mapping[str, ArrayLike], d: int, shape: str) -> Array:
     if name not in rows:
         if name == "contact":
             raise InputError("rows must have an entry 'contact' of shape (n, 3, d).")
         return np.zeros((1, 3, d))
-    block = np.asarray(rows[name], dtype=float)
+    block = _real(f"rows['{name}']", rows[name])
     if block.ndim == 2 and shape == "(3, d)":
         block = block[None]
     if block.ndim != 3 or block.shape[1:] != (3, d) or not len(block):

@@ -57,7 +57,10 @@ def modal_damping(
     if isinstance(damping, Rayleigh):
         return np.diag(damping.mass_factor
                        + damping.stiffness_factor * angular_frequencies**2)
-    values = np.asarray(damping, dtype=float)
+    try:
+        values = np.asarray(damping, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"Damping {damping!r} is not a number or an array of numbers.") from None
     if not np.isfinite(values).all():
         raise InputError(f"Damping {damping!r} is not finite.")
     if values.shape == (count, count) and values.ndim == 2:
