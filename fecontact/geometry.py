@@ -2,10 +2,8 @@
 
 import math
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 from uuid import uuid4
 
@@ -13,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, MissingLibraryError
+from fecontact.grids import Grid, grid_of, nearest_line
+from fecontact.hole_rim import Rim
 from fecontact.mesh import Mesh
-from fecontact.shapes import SAME, Beam, Block, Pendulum, Shape
+from fecontact.shapes import Beam, Block, Pendulum, Shape
 
 __all__ = ["MAX_CELLS", "Beam", "Block", "Pendulum", "Shape", "generate"]
 
@@ -58,90 +58,14 @@ def generate(shape: Shape) -> Mesh:
     """
     if not isinstance(shape, Shape):
         raise InputError(f"generate: {shape!r} is not a shape; give a Beam, a Block or a Pendulum.")
-    grid = _grid(shape)
+    grid = grid_of(shape)
     _require_few_cells(shape, grid)
     gmsh = _import_gmsh()
     with _GMSH_LOCK, _gmsh_session(gmsh):
         return _mesh(gmsh, grid, shape)
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """Lines that cut the plane into rectangles, which of these are filled, and the names.
-
-    ``part(x, y)`` is the name of the part of the body around a point, or None outside;
-    ``side(part, facing, x)`` names the outline of a rectangle of that part with its middle at x.
-    """
-
-    x: list[float]
-    y: list[float]
-    part: Callable[[float, float], str | None]
-    side: Callable[[str, str, float], str]
-    points: dict[str, tuple[float, float]]
-
-    def cells(self) -> Iterator[tuple[int, int, str]]:
-        for i, x in enumerate(_middles(self.x)):
-            for j, y in enumerate(_middles(self.y)):
-                part = self.part(x, y)
-                if part is not None:
-                    yield i, j, part
-
-    def divisions(self, element_size: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Elements along each interval of the lines x and y."""
-        x, y = (np.clip(np.ceil(np.diff(lines) / max(element_size, 1e-99) - 1e-6), 1.0, 1e99)
-                for lines in (self.x, self.y))
-        return x, y
-
-
-def _grid(shape: Shape) -> _Grid:
-    match shape:
-        case Beam():
-            return _Grid(
-                _lines(0.0, shape.length, shape.length / 2),
-                _lines(0.0, shape.height, shape.height / 2),
-                lambda x, y: "body",
-                lambda part, facing, x: "contact" if facing == "bottom" else facing,
-                {"B": (0.0, shape.height / 2), "C": (shape.length / 2, shape.height)},
-            )
-        case Block():
-            width, height = shape.width, shape.height
-            contact = width if shape.contact_length is None else shape.contact_length
-            drive = height / 2 if shape.drive_height is None else shape.drive_height
-
-            def side_of_block(part: str, facing: str, x: float) -> str:
-                touches = facing == "bottom" and abs(x - width / 2) < contact / 2
-                return "contact" if touches else facing
-
-            return _Grid(
-                _lines(0.0, width, width / 2, (width - contact) / 2, (width + contact) / 2),
-                _lines(0.0, height, drive),
-                lambda x, y: "body",
-                side_of_block,
-                {"B": (0.0, drive), "C": (width / 2, height)},
-            )
-        case Pendulum():
-            length, half_width = shape.arm_length, shape.bob_width / 2
-            middle, half_arm = shape.bob_height / 2, shape.arm_height / 2
-            drive = length if shape.drive_distance is None else shape.drive_distance
-
-            def part_of_pendulum(x: float, y: float) -> str | None:
-                if x > length - half_width:
-                    return "bob"
-                return "arm" if abs(y - middle) < half_arm else None
-
-            def side_of_pendulum(part: str, facing: str, x: float) -> str:
-                return "contact" if (part, facing) == ("bob", "bottom") else f"{part}_{facing}"
-
-            return _Grid(
-                _lines(0.0, length + half_width, length - half_width, length, drive),
-                _lines(0.0, shape.bob_height, middle, middle - half_arm, middle + half_arm),
-                part_of_pendulum,
-                side_of_pendulum,
-                {"pivot": (0.0, middle), "B": (drive, middle), "C": (length, shape.bob_height)},
-            )
-
-
-def _mesh(gmsh: Any, grid: _Grid, shape: Shape) -> Mesh:
+def _mesh(gmsh: Any, grid: Grid, shape: Shape) -> Mesh:
     """Build the model, mesh it and collect nodes, cells and groups."""
     geo = gmsh.model.geo
     along_x, along_y = grid.divisions(shape.element_size)
@@ -164,38 +88,53 @@ def _mesh(gmsh: Any, grid: _Grid, shape: Shape) -> Mesh:
         names.setdefault(curves[key], []).append(name)
         return curves[key]
 
+    rim = None if grid.hole is None else Rim(geo, grid, grid.hole, shape.element_size, corner)
     for i, j, part in grid.cells():
         x = (grid.x[i] + grid.x[i + 1]) / 2
-        loop = geo.addCurveLoop([
-            curve("x", i, j, grid.side(part, "bottom", x)),
-            curve("y", i + 1, j, grid.side(part, "right", x)),
-            -curve("x", i, j + 1, grid.side(part, "top", x)),
-            -curve("y", i, j, grid.side(part, "left", x)),
-        ])
-        surface = geo.addPlaneSurface([loop])
-        geo.mesh.setTransfiniteSurface(surface, "AlternateLeft")
-        if shape.element == "quadrilateral":
-            geo.mesh.setRecombine(2, surface)
-        surfaces.append(surface)
+        if rim is not None and rim.touches(i, j):
+            right, up = rim.side(i, j)
+            loops = rim.loops(
+                i, j,
+                curve("y", i + right, j, grid.side(part, "right" if right else "left", x)),
+                curve("x", i, j + up, grid.side(part, "top" if up else "bottom", x)),
+                (int(along_y[j]), int(along_x[i])),
+            )
+        else:
+            loops = [[
+                curve("x", i, j, grid.side(part, "bottom", x)),
+                curve("y", i + 1, j, grid.side(part, "right", x)),
+                -curve("x", i, j + 1, grid.side(part, "top", x)),
+                -curve("y", i, j, grid.side(part, "left", x)),
+            ]]
+        for curves_of_loop in loops:
+            surface = geo.addPlaneSurface([geo.addCurveLoop(curves_of_loop)])
+            geo.mesh.setTransfiniteSurface(surface, "AlternateLeft")
+            if shape.element == "quadrilateral":
+                geo.mesh.setRecombine(2, surface)
+            surfaces.append(surface)
     geo.synchronize()
     gmsh.model.mesh.generate(2)
 
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
-    tags = tags[order]
-    nodes = coordinates.reshape(-1, 3)[order, :2]
     cell_type, size = (3, 4) if shape.element == "quadrilateral" else (2, 3)
     cells = np.concatenate([
         gmsh.model.mesh.getElementsByType(cell_type, surface)[1] for surface in surfaces
     ])
+    # The centre of a hole is a node of Gmsh's that no cell uses.
+    order = np.argsort(tags)
+    order = order[np.isin(tags[order], cells)]
+    tags = tags[order]
+    nodes = coordinates.reshape(-1, 3)[order, :2]
     boundaries: dict[str, list[NDArray[Any]]] = {}
+    if rim is not None:
+        names |= {tag: [rim.hole.name] for tag in rim.arcs.values()}
     for tag, owners in names.items():
         if len(owners) == 1:
             boundaries.setdefault(owners[0], []).append(
                 gmsh.model.mesh.getElementsByType(1, tag)[1])
     points = {}
     for name, place in grid.points.items():
-        key = _nearest_line(grid.x, place[0]), _nearest_line(grid.y, place[1])
+        key = nearest_line(grid.x, place[0]), nearest_line(grid.y, place[1])
         points[name] = np.searchsorted(tags, gmsh.model.mesh.getNodes(0, corners[key])[0])
     return Mesh(
         nodes,
@@ -250,7 +189,7 @@ def _import_gmsh() -> Any:
     return gmsh
 
 
-def _require_few_cells(shape: Shape, grid: _Grid) -> None:
+def _require_few_cells(shape: Shape, grid: Grid) -> None:
     count = _count_cells(shape, grid, shape.element_size)
     if count > MAX_CELLS:
         enough = shape.element_size * math.sqrt(count / MAX_CELLS)
@@ -262,24 +201,7 @@ def _require_few_cells(shape: Shape, grid: _Grid) -> None:
         )
 
 
-def _count_cells(shape: Shape, grid: _Grid, element_size: float) -> float:
+def _count_cells(shape: Shape, grid: Grid, element_size: float) -> float:
     along_x, along_y = grid.divisions(element_size)
     per_rectangle = 2 if shape.element == "triangle" else 1
     return per_rectangle * math.fsum(along_x[i] * along_y[j] for i, j, _ in grid.cells())
-
-
-def _lines(first: float, last: float, *between: float) -> list[float]:
-    """Sorted grid lines; those that all but coincide with an earlier argument are left out."""
-    kept = [first, last]
-    for value in between:
-        if all(abs(value - line) > SAME * (last - first) for line in kept):
-            kept.append(value)
-    return sorted(kept)
-
-
-def _nearest_line(lines: Sequence[float], value: float) -> int:
-    return int(np.argmin(np.abs(np.subtract(lines, value))))
-
-
-def _middles(lines: Sequence[float]) -> list[float]:
-    return [(a + b) / 2 for a, b in pairwise(lines)]

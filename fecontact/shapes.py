@@ -104,6 +104,8 @@ class Pendulum:
     Boundaries ``contact`` (bottom of the bob), ``bob_top``, ``bob_left`` (above and below the
     arm), ``bob_right``, ``arm_top``, ``arm_bottom``, ``arm_left``; points ``pivot`` (the hinge),
     ``B`` (on the mid-line, ``drive_distance`` from the hinge) and ``C`` (top of the bob, middle).
+    With a ``hinge_radius`` the arm reaches half its height beyond the hinge, and ``pivot`` is the
+    boundary of a hole, to be held as a 'hinge'.
 
     The default is the aluminium pendulum of the impact oscillator: an arm of 0.30 m x 7.7 mm,
     which weighs 0.122 kg at a thickness of 19.6 mm and 2700 kg/m^3. The bob is a square whose
@@ -118,6 +120,8 @@ class Pendulum:
         Sides of the bob along x and y [m].
     drive_distance : float or None
         Distance of B from the hinge [m]; None for ``arm_length``.
+    hinge_radius : float
+        Radius of the hole at the hinge, below half of ``arm_height``; zero for none [m].
     element_size : float
         Longest side of a quadrilateral, and of the legs of a (right-angled) triangle [m].
     element : "quadrilateral" or "triangle"
@@ -134,6 +138,7 @@ class Pendulum:
     bob_width: float = 0.033
     bob_height: float = 0.033
     drive_distance: float | None = None
+    hinge_radius: float = 0.0
     element_size: float = 0.004
     element: Element = "quadrilateral"
 
@@ -141,6 +146,10 @@ class Pendulum:
         require_positive("Pendulum", arm_length=self.arm_length, arm_height=self.arm_height,
                          bob_width=self.bob_width, bob_height=self.bob_height,
                          element_size=self.element_size)
+        require_not_negative("Pendulum", hinge_radius=self.hinge_radius)
+        if self.hinge_radius >= 0.5 * self.arm_height * (1 - SAME):
+            raise InputError(f"Pendulum: hinge_radius = {self.hinge_radius!r} must be below half "
+                             f"of arm_height = {self.arm_height!r}.")
         if self.bob_height <= self.arm_height * (1 + SAME):
             raise InputError(f"Pendulum: bob_height = {self.bob_height!r} must be above arm_height "
                              f"= {self.arm_height!r}.")

@@ -160,9 +160,10 @@ def test_too_many_elements_name_an_element_size_that_works() -> None:
     with pytest.raises(InputError, match=r"element_size = 1e-08 makes 1e\+10 elements") as caught:
         generate(shape)
     enough = float(str(caught.value).split("at least ")[1].split()[0])
-    from fecontact.geometry import MAX_CELLS, _count_cells, _grid
+    from fecontact.geometry import MAX_CELLS, _count_cells
+    from fecontact.grids import grid_of
 
-    assert 0.2 * MAX_CELLS < _count_cells(shape, _grid(shape), enough) <= MAX_CELLS
+    assert 0.2 * MAX_CELLS < _count_cells(shape, grid_of(shape), enough) <= MAX_CELLS
     with pytest.raises(InputError, match="more than 2000000"):
         generate(Beam(element_size=5e-324))
 
