@@ -153,6 +153,19 @@ class Study:
         """Folder of the file, from which other files are named."""
         return Path() if self.path is None else self.path.parent
 
+    @property
+    def results(self) -> Path:
+        """Folder of the results."""
+        return self.folder / self.output.folder
+
+    @property
+    def t_end(self) -> float:
+        """End of the run [s]; InputError if the study does not say."""
+        if self.simulation.t_end is None:
+            raise InputError(f"{_title(self.path)}: [simulation] lacks the key 't_end', the end "
+                             f"of the run in s.")
+        return self.simulation.t_end
+
     def tables(self, *, defaults: bool = True) -> dict[str, Any]:
         """All sections as tables for TOML, with or without values equal to the defaults."""
         geometry = to_table(self.geometry, defaults=defaults)
@@ -229,13 +242,9 @@ class Study:
 
     def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; ``progress`` is called with the time [s]."""
-        settings, title = self.simulation, _title(self.path)
-        if settings.t_end is None:
-            raise InputError(f"{title}: [simulation] lacks the key 't_end', the end of the run "
-                             f"in s.")
-        system = self.system()
-        with located(f"{title}: [simulation]:"):
-            return simulate(system, settings.t_end, t_start=settings.t_start,
+        settings, t_end, system = self.simulation, self.t_end, self.system()
+        with located(f"{_title(self.path)}: [simulation]:"):
+            return simulate(system, t_end, t_start=settings.t_start,
                             initial=settings.initial, outputs=settings.outputs,
                             method=settings.method, rtol=settings.rtol, progress=progress)
 

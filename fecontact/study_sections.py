@@ -193,7 +193,7 @@ class OutputSettings:
     folder : str
         Where, relative to the study file.
     frames : int
-        Number of full displacement fields in the file, for ParaView.
+        Number of full displacement fields in the file, for ParaView; zero for none.
     points : list
         Points whose motion is plotted: 'B', 'C', further named points, contact nodes by their
         number. Empty for B and C.
@@ -204,7 +204,8 @@ class OutputSettings:
     points: tuple[str | int, ...] = ()
 
     def __post_init__(self) -> None:
-        _require_frames("OutputSettings", self.frames)
+        if self.frames < 0:
+            raise InputError(f"OutputSettings: frames = {self.frames} must be zero or above.")
 
 
 @dataclass(frozen=True)
@@ -218,29 +219,33 @@ class RenderSettings:
     fps : float
         Pictures a second.
     size : (int, int)
-        Width and height [pixels].
+        Width and height, even, at least 320 x 180 [pixels].
     colour : 'displacement' or 'von_mises'
         Quantity that colours the body.
-    scale : float or 'auto'
-        Factor by which displacements are drawn larger.
+    scale : float, optional
+        Factor by which displacements are drawn larger; by default the largest is well visible.
+    title : str, optional
+        Shown at the top.
+    start, end : float, optional
+        Part of the run to draw [s].
     """
 
     frames: int = 200
     fps: float = 25.0
-    size: tuple[int, int] = (1280, 720)
+    size: tuple[int, int] = (960, 540)
     colour: Literal["displacement", "von_mises"] = "displacement"
-    scale: float | Literal["auto"] = "auto"
+    scale: float | None = None
+    title: str | None = None
+    start: float | None = None
+    end: float | None = None
 
     def __post_init__(self) -> None:
-        _require_frames("RenderSettings", self.frames)
+        if self.frames < 1:
+            raise InputError(f"RenderSettings: frames = {self.frames} must be at least 1.")
         require_positive("RenderSettings", fps=self.fps)
-        if min(self.size) < 16 or max(self.size) > 8192:
-            raise InputError(f"RenderSettings: size = {list(self.size)} must be two whole numbers "
-                             f"of 16 to 8192 pixels.")
-        if self.scale != "auto":
+        width, height = self.size
+        if width < 320 or height < 180 or width % 2 or height % 2:
+            raise InputError(f"RenderSettings: size = {list(self.size)} must be an even width and "
+                             f"height in pixels, at least [320, 180].")
+        if self.scale is not None:
             require_positive("RenderSettings", scale=self.scale)
-
-
-def _require_frames(owner: str, frames: int) -> None:
-    if frames < 2:
-        raise InputError(f"{owner}: frames = {frames} must be at least 2.")

@@ -1,0 +1,60 @@
+# Targets that need the package set everything up themselves, once: see $(READY).
+
+VENV   := .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/.ready
+SYSTEM := $(VENV)/.system-libraries
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test check bench clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
+	  while IFS='|' read -r name what; do printf '  %-12s %s\n' "$$name" "$$what"; done
+
+setup: $(READY) $(SYSTEM) ## install everything into .venv
+
+demo: $(READY) $(SYSTEM) ## two studies from geometry to movie, into demo-output/
+	@$(BIN)/fecontact demo demo-output
+
+test: $(READY) $(SYSTEM) ## run the tests
+	@$(BIN)/python -m pytest -q -n auto
+
+check: $(READY) ## ruff and mypy
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy
+
+bench: $(READY) $(SYSTEM) ## run the benchmarks
+	@for file in benchmarks/[a-z]*.py; do echo "$$file"; $(BIN)/python "$$file" || exit 1; done
+
+clean: ## remove .venv, demo-output and caches
+	rm -rf $(VENV) demo-output dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@for name in python3.13 python3.12 python3.11 python3; do \
+	  if command -v $$name >/dev/null 2>&1 && \
+	     $$name -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	    python=$$name; break; \
+	  fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+	  echo "fecontact needs Python 3.11 or newer, and there is none on the PATH." >&2; exit 1; \
+	fi; \
+	if ! $$python -c 'import ensurepip, venv' 2>/dev/null; then \
+	  version=$$($$python -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	  echo "$$python cannot make virtual environments; please run" >&2; \
+	  echo "    apt-get install -y python$$version-venv    (or python3-venv, as root)" >&2; \
+	  exit 1; \
+	fi; \
+	echo "Making $(VENV) with $$($$python --version)"; \
+	$$python -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(READY): pyproject.toml | $(BIN)/python
+	@echo "Installing fecontact and what it needs"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@
+
+$(SYSTEM): .ci/system-libraries fecontact/system_libraries.py | $(BIN)/python
+	@$(BIN)/python .ci/system-libraries
+	@touch $@

@@ -1,0 +1,136 @@
+"""What commands show while they work, on stderr, and the files and folders they write to."""
+
+import os
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from fecontact.errors import InputError
+
+INTERRUPTED = 130  # exit code after Ctrl-C
+PATIENCE = 2.0  # nothing is shown of work that takes less [s]
+
+
+@contextmanager
+def progress_bar(
+    what: str, total: float, start: float = 0.0
+) -> Iterator[Callable[[float], None]]:
+    """A function that is told how far the work is, from ``start`` to ``total``.
+
+    It draws a bar on a terminal, from two seconds on.
+    """
+    if not sys.stderr.isatty():
+        yield lambda done: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    bar = Progress(TextColumn("{task.description}"), BarColumn(),
+                   TextColumn("{task.percentage:.0f} %"), TimeRemainingColumn(),
+                   console=Console(stderr=True), transient=True)
+    task = bar.add_task(what, total=total - start)
+    begin = latest = time.perf_counter()
+
+    def show(done: float) -> None:
+        nonlocal latest
+        now = time.perf_counter()
+        if now - begin > PATIENCE and now - latest > 0.1:
+            latest = now
+            bar.start()
+            bar.update(task, completed=done - start)
+
+    try:
+        yield show
+    finally:
+        bar.stop()
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Show on a terminal, from two seconds on, that work is going on that cannot be measured."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    status = Console(stderr=True).status(f"{what} ...")
+    timer = threading.Timer(PATIENCE, status.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+        status.stop()
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Load and compile the package: as :func:`waiting`, and Ctrl-C ends the process at once.
+
+    An exception would be lost in the callbacks of the compiler. Nothing is written meanwhile.
+    """
+    def leave(*_: object) -> None:
+        os.write(sys.stderr.fileno(), b"error: interrupted.\n")
+        os._exit(INTERRUPTED)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, leave)
+    try:
+        with waiting("Loading, and compiling after changes"):
+            yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def output_folder(folder: Path) -> Iterator[Path]:
+    """A folder that can be written, made if need be; unmade if nothing was put there.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made or written.
+    """
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        _remove_empty(made)
+        raise InputError(f"The folder {folder} cannot be written "
+                         f"({(error.strerror or str(error)).lower()}); choose another "
+                         f"one.") from None
+    try:
+        yield folder
+    finally:
+        _remove_empty(made)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    with output_folder(path.parent):
+        part = path.with_name(path.name + ".part")
+        try:
+            part.write_text(text, encoding="utf-8")
+            os.replace(part, path)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written "
+                             f"({(error.strerror or str(error)).lower()}).") from None
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for path in folders:
+        with suppress(OSError):
+            path.rmdir()

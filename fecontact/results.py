@@ -1,0 +1,135 @@
+"""From studies to files: what ``run``, ``render`` and the demonstration share."""
+
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fecontact.console import loading, progress_bar
+from fecontact.errors import FecontactError, InputError
+
+if TYPE_CHECKING:
+    from fecontact.integrate.trajectory import Trajectory
+    from fecontact.study import Study
+    from fecontact.study_sections import RenderSettings
+
+
+def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
+    """A study, with other values for some of its keys: texts ``ground.speed=0.1``."""
+    with loading():
+        from fecontact.study import Study
+    study = Study.read(file)
+    values: dict[str, Any] = {}
+    for change in changes or ():
+        name, equals, text = (part.strip() for part in change.partition("="))
+        if not equals or not name:
+            raise InputError(f"--set {change} must have the form KEY=VALUE, like "
+                             f"ground.speed=0.1.")
+        try:
+            values[name] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            # Texts come without quotes from a shell.
+            values[name] = text
+    return study.with_(**values) if values else study
+
+
+def write_run(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
+    """Write a run and its plots into a folder; the files."""
+    from fecontact.output.store import write_case
+
+    case = write_case(folder / f"{study.name}.vtkhdf", trajectory, frames=study.output.frames,
+                      study=study.to_toml())
+    return [case, *write_plots(study, trajectory, folder)]
+
+
+def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
+    """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
+    from fecontact.output import plots
+
+    def file(what: str) -> Path:
+        return folder / f"{study.name}-{what}.png"
+
+    system, points = trajectory.system, study.output.points
+    # Where only the y direction is driven, the motion in x has nothing to show.
+    drive = system.drive
+    vertical = drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0
+    return [
+        plots.plot_history(trajectory, file("history"), points),
+        plots.plot_phase(trajectory, file("phase"), points[0] if points else "B",
+                         "y" if vertical else "x"),
+        plots.plot_contact_map(trajectory, file("contact")),
+        plots.plot_energies(trajectory, file("energies")),
+    ]
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run as found on disk.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    trajectory : Trajectory
+        The run.
+    settings : RenderSettings
+        How its study wants it drawn.
+    current : bool
+        Whether the study file still says what the run was computed from.
+    """
+
+    path: Path
+    trajectory: "Trajectory"
+    settings: "RenderSettings"
+    current: bool = True
+
+
+def stored_run(file: Path) -> StoredRun:
+    """A run from its own file, or found by the file of its study.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or the study was not run yet.
+    """
+    with loading():
+        from fecontact.output.store import read_case
+        from fecontact.study import Study
+        from fecontact.study_sections import RenderSettings
+
+    if file.suffix.lower() == ".toml":
+        study = Study.read(file)
+        path = study.results / f"{study.name}.vtkhdf"
+        if not path.is_file():
+            raise InputError(f"{path} does not exist; run the study first: fecontact run {file}")
+        case = read_case(path)
+        return StoredRun(path, case.trajectory, study.render, _same_run(study, case.study))
+    case = read_case(file)
+    try:
+        settings = Study.from_toml(case.study or "").render
+    except FecontactError:
+        # A run without a study, or with one that this version does not know, can still be drawn.
+        settings = RenderSettings()
+    return StoredRun(file, case.trajectory, settings)
+
+
+def _same_run(study: "Study", stored: str | None) -> bool:
+    from fecontact.study import Study
+
+    try:
+        earlier = Study.from_toml(stored or "")
+    except FecontactError:
+        return False
+    return study == replace(earlier, output=study.output, render=study.render)
+
+
+def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") -> Path:
+    """Draw a run with a progress bar; the file or folder."""
+    from fecontact.output.movie import render
+
+    with progress_bar("Drawing", settings.frames) as progress:
+        return render(trajectory, target, frames=settings.frames, fps=settings.fps,
+                      size=settings.size, colour=settings.colour, scale=settings.scale,
+                      title=settings.title, start=settings.start, end=settings.end,
+                      progress=lambda done, total: progress(done * settings.frames / total))

@@ -1,0 +1,11 @@
+"""Study files to start from; the demonstration runs two of them."""
+
+from importlib.resources import files
+
+TEMPLATES = {"beam": "beam_on_wavy_ground", "pendulum": "pendulum_on_stop",
+             "block": "block_on_belt"}
+
+
+def template(shape: str) -> str:
+    """Text of the study file for a shape: beam, pendulum or block."""
+    return files(__name__).joinpath(f"{TEMPLATES[shape]}.toml").read_text(encoding="utf-8")
