@@ -58,9 +58,10 @@ def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Fig
         for row, name in enumerate(_AXES):
             factor = _labelled(axes[row, column], f"{quantity} {name}", unit,
                                *(value[:, row] for value in values))
-            for point, value, colour in zip(points, values, _cycle(points), strict=True):
-                axes[row, column].plot(*_thinned(time, value[:, row] / factor), color=colour,
-                                       label=point_name(point))
+            for number, (point, value) in enumerate(zip(points, values, strict=True)):
+                axes[row, column].plot(*_thinned(time, value[:, row] / factor),
+                                       color=COLOURS[number % len(COLOURS)],
+                                       linewidth=1.2 if number else 2.0, label=point_name(point))
     for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
                                (axes[2, 1], "friction force", trajectory.friction_force)):
         total = forces.sum(axis=1)
@@ -174,10 +175,6 @@ def _usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
     return ("B", middle) if basis.T[0].any() else (middle,)
 
 
-def _cycle(items: Sequence[Any]) -> list[str]:
-    return [COLOURS[k % len(COLOURS)] for k in range(len(items))]
-
-
 def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:
     """Times in a suitable unit, which the given axes name."""
     factor, symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
@@ -223,7 +220,7 @@ def _place_edges(trajectory: Trajectory) -> tuple[Array, str]:
     basis = trajectory.system.basis
     x, length = basis.contact_x, basis.tributary
     if len(x) == 1 or not (np.diff(x) > 0.0).all():
-        return np.arange(len(x) + 1) - 0.5, "contact node"
+        return np.arange(len(x) + 1, dtype=np.float64) - 0.5, "contact node"
     between = 0.5 * (x[1:] + x[:-1])
     first, last = x[0] - 0.5 * length[0], x[-1] + 0.5 * length[-1]
     edges: Array = np.array([first, *between, last], dtype=float)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_VISIBLE = 0.09  # largest displacement drawn, as a part of the body's extent
+_VISIBLE = 0.07  # largest displacement drawn, as a part of the body's extent
 _WIDTH = 10.0  # inches
 
 

@@ -154,7 +154,7 @@ def picture(
     motion = Motion(trajectory, np.union1d(chosen, [at]), colour, scale)
     require_rendering()
     frame = int(np.searchsorted(motion.indices, at))
-    image = next(_images(motion, size, title, None, only=frame))
+    (image,) = _images(motion, size, title, None, only=frame)
     part = path.with_name(path.name + ".part")
     try:
         _save(part, image)

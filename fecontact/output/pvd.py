@@ -33,7 +33,8 @@ def export_pvd(
     path : str or Path
         ``FOLDER`` for ``FOLDER/FOLDER.pvd`` with the frames beside it, or ``NAME.pvd`` with the
         frames in the folder ``NAME``. The folder is written whole or not at all. One that exists
-        is replaced if there is nothing but .pvd and .vtu files in it.
+        is replaced if there is nothing but .pvd and .vtu files in it; its parent folder is made
+        if there is none.
     frames : int
         Number of frames, evenly spaced, never more than there are output times.
 
@@ -63,8 +64,9 @@ def export_pvd(
 
     part = folder.with_name(folder.name + ".part")
     shutil.rmtree(part, ignore_errors=True)
+    new_parent = not folder.parent.exists()
     try:
-        part.mkdir()
+        part.mkdir(parents=new_parent)
         names = []
         for number, index in enumerate(indices):
             q = trajectory.modal_coordinates[index : index + 1]
@@ -85,6 +87,8 @@ def export_pvd(
         raise InputError(f"{folder} cannot be written ({error.strerror or error}).") from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
+        if new_parent and not collection.exists():
+            folder.parent.rmdir()
     return collection
 
 
@@ -107,8 +111,9 @@ def _collection(names: list[str], times: list[float]) -> str:
 def _require_free(folder: Path) -> None:
     if not folder.name or folder.name == "..":
         raise InputError(f"Give a folder of its own for the frames, not '{folder}'.")
-    if not folder.parent.is_dir():
-        raise InputError(f"{folder} cannot be written: folder {folder.parent} does not exist.")
+    if not folder.parent.parent.is_dir():
+        raise InputError(f"{folder} cannot be written: folder {folder.parent.parent} does not "
+                         f"exist.")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; give a folder.")
     others = [item.name for item in folder.iterdir() if item.suffix not in (".vtu", ".pvd")] \

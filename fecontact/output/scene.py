@@ -17,8 +17,8 @@ DARK = "#303030"
 _GROUND, _SURFACE, _MARKS, _OUTLINE = "#e9e7e3", "#4d4d4d", "#9b978f", "#8c8c8c"
 
 # Distance in front of the paper, as a part of the view's height.
-_LAYERS = {"ground": 0.0, "marks": 0.01, "surface": 0.02, "body": 0.03, "outline": 0.04,
-           "reference": 0.05, "force": 0.06, "rim": 0.07, "node": 0.08}
+_LAYERS = {"ground": 0.0, "marks": 0.01, "surface": 0.02, "body": 0.03, "reference": 0.04,
+           "outline": 0.05, "force": 0.06, "rim": 0.07, "node": 0.08}
 
 _MARGIN = 0.05  # of the view, beside and above the body
 _DEPTH = 0.20  # of the view's height, for the ground

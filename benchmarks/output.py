@@ -1,0 +1,78 @@
+"""Times of writing and drawing a run: ``python benchmarks/output.py``."""
+
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.body import ElasticBody, Material
+from fecontact.geometry import Beam, generate
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.friction import ExponentialFriction
+from fecontact.laws.ground import Ground
+from fecontact.laws.normal import RoughSurface
+from fecontact.output.movie import render
+from fecontact.output.probe import rendering_works
+from fecontact.output.pvd import export_pvd
+from fecontact.output.store import read_case, write_case
+from fecontact.system import ContactSystem
+
+FRAMES = 200
+
+
+def bouncing_beam() -> Trajectory:
+    """A beam of 8000 cells in free oscillation of its modes, over sliding ground."""
+    body = ElasticBody(generate(Beam(element_size=0.00145)), Material(), thickness=0.01)
+    basis = body.modal_basis(20, contact_nodes=40)
+    system = ContactSystem(basis, RoughSurface(), ExponentialFriction(), Ground(speed=0.5))
+    t = np.linspace(0.0, 0.02, 2001)
+    w = 2.0 * np.pi * 100.0 * np.arange(1, basis.modes + 1)
+    size = 1e-5 / np.arange(1, basis.modes + 1)
+    return Trajectory(system, t, size * np.sin(w * t[:, None]),
+                      size * w * np.cos(w * t[:, None]), np.zeros((len(t), 7)))
+
+
+def best_of(count: int, task) -> float:
+    seconds = []
+    for _ in range(count):
+        start = time.perf_counter()
+        task()
+        seconds.append(time.perf_counter() - start)
+    return min(seconds)
+
+
+def frames_per_second(trajectory: Trajectory, path: Path, size: tuple[int, int]) -> float:
+    """Without the start of VTK and the encoder, from the first frame to the last."""
+    ticks: list[float] = []
+    render(trajectory, path, frames=FRAMES, size=size,
+           progress=lambda done, total: ticks.append(time.perf_counter()))
+    return (len(ticks) - 1) / (ticks[-1] - ticks[0])
+
+
+def main() -> None:
+    trajectory = bouncing_beam()
+    field = trajectory.system.basis.field
+    _ = trajectory.normal_force
+    print(f"{len(field.nodes)} nodes, {len(field.cells)} cells, {FRAMES} frames")
+    with tempfile.TemporaryDirectory() as folder:
+        case = Path(folder, "case.vtkhdf")
+        print(f"{'case with VTKHDF':32}{best_of(3, lambda: write_case(case, trajectory)):8.2f} s"
+              f"{case.stat().st_size / 1e6:8.0f} MB")
+        print(f"{'reading it':32}{best_of(3, lambda: read_case(case)):8.2f} s")
+        plain = Path(folder, "plain.vtkhdf")
+        print(f"{'case without frames':32}"
+              f"{best_of(3, lambda: write_case(plain, trajectory, frames=0)):8.2f} s"
+              f"{plain.stat().st_size / 1e6:8.0f} MB")
+        print(f"{'PVD and VTU':32}"
+              f"{best_of(1, lambda: export_pvd(trajectory, Path(folder, 'pvd'))):8.2f} s")
+        if (reason := rendering_works()) is not None:
+            print(reason)
+            return
+        for size in ((960, 540), (1280, 720)):
+            rate = frames_per_second(trajectory, Path(folder, "run.mp4"), size)
+            print(f"{f'movie {size[0]} x {size[1]}':32}{rate:8.1f} frames/s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,265 @@
+from itertools import islice, pairwise
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from matplotlib import colormaps
+from matplotlib.image import imread
+from synthetic import basis, run
+
+from fecontact.errors import InputError, MissingLibraryError
+from fecontact.output import movie, probe
+from fecontact.output.frames import frame_indices
+from fecontact.output.furniture import Furniture
+from fecontact.output.motion import Motion
+from fecontact.output.movie import picture, render
+from fecontact.output.scene import STATE_COLOURS, Scene
+
+SMALL = (480, 270)
+
+rendering = pytest.mark.skipif(probe.rendering_works() is not None,
+                               reason=str(probe.rendering_works()))
+
+
+def motion_of(trajectory, frames=50, **options):
+    return Motion(trajectory, frame_indices(trajectory.time, frames), **options)
+
+
+def still(q, **options):
+    """A run of a small beam at given modal coordinates (F, 5)."""
+    trajectory = run(basis(columns=20, rows=4), times=len(q), **options)
+    q = np.asarray(q, dtype=float)
+    return type(trajectory)(trajectory.system, trajectory.time, q, np.zeros_like(q),
+                            trajectory.work)
+
+
+def rgb(text):
+    return np.array([int(text[k : k + 2], 16) for k in (1, 3, 5)])
+
+
+def close_to(image, colour, tolerance=12):
+    return (np.abs(image.astype(int) - colour) <= tolerance).all(axis=-1)
+
+
+def test_scale_is_round_and_makes_the_largest_motion_visible():
+    for size in np.geomspace(1e-9, 1e-3, 13):
+        trajectory = run(times=21, size=size)
+        motion = motion_of(trajectory)
+        digits = f"{motion.scale:.0e}"[0]
+        assert digits in "125"
+        field = trajectory.system.basis.field
+        moved = max(np.linalg.norm(field.shapes @ q, axis=1).max()
+                    for q in trajectory.modal_coordinates)
+        assert motion.largest_colour == pytest.approx(moved)
+        extent = np.hypot(0.2, 0.02)
+        assert 0.04 * extent <= motion.scale * moved <= 0.1 * extent
+    assert motion_of(run(times=5, size=0.05)).scale == 1.0
+    assert motion_of(run(times=5), given_scale=300.0).scale == 300.0
+    assert motion_of(still(np.zeros((3, 5)))).scale == 1.0
+
+
+def test_drawn_places_scale_the_displacements_and_stay_in_the_box():
+    trajectory = run(times=21)
+    motion = motion_of(trajectory, given_scale=400.0)
+    field = trajectory.system.basis.field
+    left, right, bottom, top = motion.box
+    reached = []
+    for frame, q in enumerate(trajectory.modal_coordinates):
+        places, colours = motion.body(frame)
+        np.testing.assert_allclose(places, field.nodes + 400.0 * field.shapes @ q, atol=1e-15)
+        np.testing.assert_allclose(colours, np.linalg.norm(field.shapes @ q, axis=1), atol=1e-18)
+        reached += [places.min(axis=0), places.max(axis=0)]
+    low, high = np.min(reached, axis=0), np.max(reached, axis=0)
+    np.testing.assert_allclose([left, right, bottom, top],
+                               [min(low[0], 0.0), max(high[0], 0.2), min(low[1], 0.0),
+                                max(high[1], 0.02)])
+
+
+def test_ground_travels_at_its_true_speed_and_its_waves_are_scaled():
+    motion = motion_of(run(times=21, waviness=4e-6, speed=0.3), given_scale=100.0)
+    np.testing.assert_allclose(motion.travel, 0.3 * motion.times)
+    x = np.linspace(0.0, 0.2, 7)
+    for frame in (0, 5, 20):
+        wave = 4e-6 * np.sin(2.0 * np.pi * (x - 0.3 * motion.times[frame]) / 0.03)
+        np.testing.assert_allclose(motion.ground(frame, x), 100.0 * wave, atol=1e-15)
+    gap = run(times=3)
+    gap = type(gap)(gap.system.with_(gap=2e-6), gap.time, gap.modal_coordinates,
+                    gap.modal_velocities, gap.work)
+    assert motion_of(gap, given_scale=100.0).ground_level == pytest.approx(-2e-4)
+
+
+def test_strips_and_scene_fill_the_picture_and_say_scale_and_time():
+    for size in ((960, 540), (1280, 720), (480, 640)):
+        motion = motion_of(run(times=5))
+        furniture = Furniture(motion, *size, "A title " * 30, 40.0)
+        scene = np.full((furniture.scene_height, size[0], 3), 7, dtype=np.uint8)
+        image = furniture.around(scene, 3)
+        assert image.shape == (size[1], size[0], 3)
+        header = image[: furniture.header_height]
+        assert (header[:, : size[0] // 4] < 128).any()
+        assert (header[:, -size[0] // 6 :] < 128).any()
+        for edge in (image[0], image[-1], image[: furniture.header_height, 0]):
+            assert (edge == 255).all()  # nothing is cut off
+        assert f"deformation × {motion.scale:g}" in furniture._scales()
+        assert "slowed down 40 ×" in furniture._scales()
+        furniture._clock(3)
+        assert furniture._clock_parts[2].get_text() == "t = 15 ms"
+
+
+@rendering
+def test_body_moves_by_the_scaled_displacement_and_has_the_colour_of_its_size():
+    q = np.zeros((3, 5))
+    q[:, 0] = [0.0, 1e-5, 2e-5]
+    motion = motion_of(still(q), given_scale=500.0)
+    with Scene(motion, 960, 430) as scene:
+        images = [scene.image(frame) for frame in range(3)]
+    viridis = 255.0 * colormaps["viridis"]([0.0, 0.5, 1.0])[:, :3]
+    spans = []
+    for image, colour in zip(images, viridis, strict=True):
+        assert image.shape == (430, 960, 3)
+        columns = np.flatnonzero(close_to(image, colour).sum(axis=0) > 20)
+        spans.append((columns[0], columns[-1] + 1))
+    widths = np.diff(spans, axis=1)[:, 0]
+    pixel = 0.2 / widths.mean()
+    assert np.ptp(widths) <= 2
+    assert widths.mean() > 0.7 * 960
+    assert np.diff(np.mean(spans, axis=1)) == pytest.approx(500 * 1e-5 / pixel, abs=1.5)
+
+
+@rendering
+def test_contact_nodes_show_their_states_and_forces():
+    q = np.zeros((3, 5))
+    q[:, 1] = [5e-6, -4e-6, -4e-6]  # open, then pressed down
+    trajectory = still(q, speed=0.02)
+    trajectory.modal_velocities[1, 0] = 0.02  # moves with the ground
+    assert np.array_equal(trajectory.contact_state, [[0] * 5, [1] * 5, [2] * 5])
+    motion = motion_of(trajectory)
+    with Scene(motion, 640, 300) as scene:
+        images = [scene.image(frame) for frame in range(3)]
+    forces = [(image[:, :, 0] > 150) & (image[:, :, 1] < 60) & (image[:, :, 2] < 80)
+              for image in images]
+    for frame, image in enumerate(images):
+        for state in (1, 2):
+            seen = np.count_nonzero(close_to(image, rgb(STATE_COLOURS[state])))
+            assert seen > 5 * 30 if state == frame else seen == 0
+    assert not forces[0].any()
+    upright, slanted = (np.argwhere(force) for force in forces[1:])
+    assert len(upright) > 100
+    # Slip against the ground's motion: friction drags the body along +x, the arrows lean right.
+    top, bottom = slanted[:, 0].min(), slanted[:, 0].max()
+    lean = slanted[slanted[:, 0] < top + 5][:, 1].mean() \
+        - slanted[slanted[:, 0] > bottom - 5][:, 1].mean()
+    assert lean > 5
+
+
+@rendering
+@pytest.mark.parametrize(("length", "height"), [(0.2, 0.02), (0.02, 0.2), (0.1, 0.1)])
+def test_body_fills_the_frame_whatever_its_shape(length, height):
+    trajectory = run(basis(length, height, columns=10, rows=10), times=11, size=1e-6)
+    with Scene(motion_of(trajectory), 960, 430) as scene:
+        for frame in range(11):
+            coloured = np.ptp(scene.image(frame).astype(int), axis=2) > 50
+            rows, columns = (np.flatnonzero(coloured.any(axis=k)) for k in (1, 0))
+            assert rows[0] > 0
+            assert rows[-1] < 429
+            assert columns[0] > 0
+            assert columns[-1] < 959
+            assert len(rows) > 0.65 * 430 or len(columns) > 0.7 * 960
+
+
+@rendering
+def test_png_frames_have_the_size_and_the_body_moves(tmp_path):
+    trajectory = run(basis(columns=20, rows=4), times=21)
+    seen = []
+    (tmp_path / "run_0007.png").touch()
+    first = render(trajectory, tmp_path / "run.png", frames=4, size=SMALL,
+                   progress=lambda done, total: seen.append((done, total)))
+    assert first == tmp_path / "run_0000.png"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        f"run_{k:04d}.png" for k in range(4)]
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    images = [imread(tmp_path / f"run_{k:04d}.png") for k in range(4)]
+    assert all(image.shape[:2] == SMALL[::-1] for image in images)
+    for before, after in pairwise(images):
+        assert np.count_nonzero(np.abs(before - after).max(axis=2) > 0.1) > 500
+
+    folder = render(trajectory, tmp_path / "frames", frames=2, size=SMALL, colour="von_mises")
+    assert [path.name for path in sorted(folder.iterdir())] == ["frame_0000.png", "frame_0001.png"]
+
+
+@rendering
+def test_movie_has_its_frames_and_duration(tmp_path):
+    trajectory = run(basis(columns=20, rows=4), times=31)
+    path = render(trajectory, tmp_path / "run.mp4", frames=12, fps=8, size=SMALL, title="Bouncing",
+                  start=0.005)
+    assert imageio_ffmpeg.count_frames_and_secs(str(path)) == (12, pytest.approx(1.5, abs=0.01))
+    frames = imageio_ffmpeg.read_frames(str(path))
+    facts = next(frames)
+    assert facts["size"] == facts["source_size"] == SMALL
+    assert facts["fps"] == 8
+    assert facts["codec"] == "h264"
+    assert facts["pix_fmt"].startswith("yuv420p")
+    images = [np.frombuffer(frame, np.uint8).reshape(*SMALL[::-1], 3)
+              for frame in islice(frames, 7)]
+    frames.close()  # at the end of the movie it would leave its pipes open
+    assert np.count_nonzero(np.abs(images[0].astype(int) - images[6]).max(axis=2) > 60) > 500
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.mp4"]
+
+
+@rendering
+def test_picture_is_the_frame_nearest_to_a_time(tmp_path):
+    trajectory = run(basis(columns=20, rows=4), times=21)
+    picture(trajectory, tmp_path / "late.png", size=SMALL)
+    picture(trajectory, tmp_path / "early.png", time=0.0051, size=SMALL)
+    late, early = (imread(tmp_path / f"{name}.png") for name in ("late", "early"))
+    assert late.shape[:2] == SMALL[::-1]
+    assert (late != early).any()
+    picture(trajectory, tmp_path / "again.png", time=0.0049, size=SMALL)
+    assert (tmp_path / "again.png").read_bytes() == (tmp_path / "early.png").read_bytes()
+
+
+@rendering
+@pytest.mark.parametrize("name", ["run.mp4", "run.png", "frames"])
+def test_interrupted_rendering_leaves_nothing(tmp_path, name):
+    def stop(done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render(run(basis(columns=4, rows=2), times=5), tmp_path / name, size=SMALL, progress=stop)
+    assert not list(tmp_path.iterdir())
+
+
+def test_errors_say_what_is_wrong(tmp_path):
+    trajectory = run(basis(columns=4, rows=2), times=5)
+    for options, message in (
+        ({"size": (961, 540)}, "even width"), ({"size": (100, 100)}, "at least 320 x 180"),
+        ({"colour": "displacment"}, "did you mean 'displacement'"), ({"fps": 0}, "fps = 0"),
+        ({"frames": 0}, "at least 1"), ({"scale": -1.0}, "scale = -1.0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            render(trajectory, tmp_path / "run.mp4", **options)
+    with pytest.raises(InputError, match=r"\.mp4 for a movie"):
+        render(trajectory, tmp_path / "run.gif")
+    with pytest.raises(InputError, match=r"must end in \.png"):
+        picture(trajectory, tmp_path / "run.jpg")
+    for path in ("nowhere/run.mp4", "nowhere/run.png"):
+        with pytest.raises(InputError, match="does not exist"):
+            render(trajectory, tmp_path / path)
+
+
+@pytest.mark.parametrize(("attempt", "reason"), [
+    ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"),
+    ("raise ImportError('libGL.so.1: cannot open shared object file')", r"libGL\.so\.1"),
+])
+def test_missing_graphics_libraries_are_named(tmp_path, monkeypatch, attempt, reason):
+    monkeypatch.setattr(probe, "_ATTEMPT", attempt)
+    probe._attempt.cache_clear()
+    try:
+        with pytest.raises(MissingLibraryError, match=reason) as error:
+            movie.render(run(basis(columns=4, rows=2), times=5), tmp_path / "run.mp4")
+        assert "apt-get install -y libegl1 libgl1 libglu1-mesa libxcursor1 libxft2 libxinerama1 " \
+            "libgomp1" in str(error.value)
+        assert not list(tmp_path.iterdir())
+    finally:
+        probe._attempt.cache_clear()

@@ -1,0 +1,189 @@
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import basis, run
+
+from fecontact.basis import ModalBasis
+from fecontact.errors import InputError
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output import figures, plots
+from fecontact.output.figures import (
+    contact_map_figure,
+    energies_figure,
+    history_figure,
+    phase_figure,
+)
+from fecontact.output.mode_shapes import modes_figure
+
+
+def labels(figure):
+    return [axis.get_ylabel() for axis in figure.axes]
+
+
+def mesh_values(axis):
+    return np.asarray(axis.collections[0].get_array())
+
+
+def test_history_shows_each_point_in_suitable_units():
+    trajectory = run(times=101)
+    figure = history_figure(trajectory, ["B", 0, (0.2, 0.02)])
+    assert labels(figure) == [
+        "displacement x [µm]", "velocity x [mm/s]", "displacement y [µm]", "velocity y [mm/s]",
+        "total normal force [N]", "total friction force [mN]"]
+    assert [axis.get_xlabel() for axis in figure.axes] == ["", "", "", "", "time [ms]", "time [ms]"]
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert legend == ["B", "contact node 0", "(0.2, 0.02) m"]
+    line = figure.axes[2].lines[1]
+    np.testing.assert_allclose(line.get_xdata(), 1e3 * trajectory.time)
+    np.testing.assert_allclose(line.get_ydata(), 1e6 * trajectory.displacement(0)[:, 1])
+    np.testing.assert_allclose(figure.axes[4].lines[0].get_ydata(),
+                               trajectory.normal_force.sum(axis=1))
+
+
+def test_phase_plane_is_velocity_over_displacement_with_the_ground():
+    trajectory = run(times=101)
+    figure = phase_figure(trajectory, 2, "x")
+    plane = figure.axes[0]
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("displacement x [µm]", "velocity x [mm/s]")
+    np.testing.assert_allclose(plane.lines[0].get_xdata(), 1e6 * trajectory.displacement(2)[:, 0])
+    np.testing.assert_allclose(plane.lines[0].get_ydata(), 1e3 * trajectory.velocity(2)[:, 0])
+    assert list(plane.lines[2].get_ydata()) == [20.0, 20.0]  # the belt runs at 0.02 m/s
+    assert len(phase_figure(trajectory, "B", "y").axes[0].lines) == 2
+    with pytest.raises(InputError, match="axis = 'z'"):
+        phase_figure(trajectory, "B", "z")
+    with pytest.raises(InputError, match="no point 'Z'"):
+        phase_figure(trajectory, "Z")
+
+
+def test_contact_map_shows_pressure_and_states():
+    trajectory = run(times=101)
+    figure = contact_map_figure(trajectory)
+    upper, lower = figure.axes[:2]
+    assert upper.get_ylabel() == lower.get_ylabel() == "contact position x [mm]"
+    assert lower.get_xlabel() == "time [ms]"
+    assert "contact pressure [N/m]" in labels(figure)
+    np.testing.assert_allclose(mesh_values(upper), trajectory.pressure.T)
+    assert np.array_equal(mesh_values(lower), trajectory.contact_state.T)
+    names = [text.get_text() for axis in figure.axes if axis.get_ylabel() == "state"
+             for text in axis.get_yticklabels()]
+    assert names == ["open", "stick", "slip"]
+    assert upper.get_ylim() == pytest.approx((0.0, 200.0))
+    assert upper.get_xlim() == pytest.approx((0.0, 20.0))
+
+
+def test_contact_map_of_a_long_run_keeps_short_impacts():
+    trajectory = run(times=30_001)
+    force = np.zeros((30_001, 5))
+    force[12_345, 3] = 7.0
+    trajectory.__dict__["_contact"] = np.stack([force] + [0 * force] * 5, axis=2)
+    upper, lower = contact_map_figure(trajectory).axes[:2]
+    assert mesh_values(upper).shape == (5, 1500)
+    assert mesh_values(upper).max() == pytest.approx(7.0 / 0.04)
+    assert np.flatnonzero(mesh_values(upper)[3]) == [12_345 * 1500 // 30_001]
+    assert not mesh_values(lower).any()  # open in most of that column's times
+
+
+@pytest.mark.parametrize("times", [1, 2, 5])
+def test_contact_map_of_one_node_and_few_times(times):
+    trajectory = run(basis(contact_nodes=1), times=5)
+    short = Trajectory(trajectory.system, *(values[:times] for values in (
+        trajectory.time, trajectory.modal_coordinates, trajectory.modal_velocities,
+        trajectory.work)))
+    upper, lower = contact_map_figure(short).axes[:2]
+    assert mesh_values(upper).shape == mesh_values(lower).shape == (1, times)
+    assert upper.get_ylabel() == "contact node"
+
+
+def test_energies_leave_out_what_is_zero():
+    trajectory = run(times=101)
+    work = np.zeros((101, 7))
+    work[:, 6] = 1e-3 * np.linspace(0.0, 1.0, 101)
+    figure = energies_figure(replace(trajectory, work=work))
+    assert labels(figure) == ["stored energy [mJ]", "work put in [J]", "energy lost [mJ]"]
+    shown = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
+    assert shown == [["kinetic", "elastic", "contact", "total"], ["total"], ["friction", "total"]]
+    np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(),
+                               1e3 * trajectory.energies.kinetic)
+    np.testing.assert_allclose(figure.axes[2].lines[0].get_ydata(), 1e3 * work[:, 6])
+
+
+def test_modes_are_titled_by_their_frequencies():
+    body = basis(columns=12, rows=3)
+    figure = modes_figure(body)
+    titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
+    assert titles == ["mode 1: rigid", "mode 2: rigid", "mode 3: rigid", "mode 4: 2000 Hz",
+                      "mode 5: 9000 Hz"]
+    amplitude = mesh_values(figure.axes[4])
+    stretch = np.abs(body.field.nodes[:, 0] - 0.1) / 0.1
+    np.testing.assert_allclose(amplitude, stretch, atol=1e-12)
+    assert sum(bool(axis.get_title()) for axis in modes_figure(body, 2).axes) == 2
+    with pytest.raises(InputError, match="count = 0"):
+        modes_figure(body, 0)
+    plain = ModalBasis.from_matrices(np.eye(1), np.eye(1), {"contact": np.ones((1, 3, 1))})
+    with pytest.raises(InputError, match="no shapes"):
+        modes_figure(plain)
+
+
+def test_long_lines_are_thinned_without_losing_peaks():
+    t = np.linspace(0.0, 1.0, 100_003)
+    y = np.sin(2.0 * np.pi * 3.0 * t)
+    y[77_777], y[50_001], y[-1] = 5.0, -4.0, 3.0
+    x, thinned = figures._thinned(t, y)
+    assert len(x) < 5000
+    assert (thinned.max(), thinned.min()) == (5.0, -4.0)
+    assert x[np.argmax(thinned)] == t[77_777]
+    assert (x[0], x[-1], thinned[-1]) == (0.0, 1.0, 3.0)
+    assert (np.diff(x) > 0.0).all()
+    assert figures._thinned(t[:100], y[:100])[0] is not None
+    assert len(figures._thinned(t[:7999], y[:7999])[0]) == 7999
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_files_are_pictures(tmp_path, triangles):
+    body = basis(columns=8, rows=2, triangles=triangles)
+    trajectory = run(body, times=41)
+    made = [plots.plot_history(trajectory, tmp_path / "history.png"),
+            plots.plot_phase(trajectory, tmp_path / "phase.png", 0),
+            plots.plot_contact_map(trajectory, tmp_path / "map.png"),
+            plots.plot_energies(trajectory, tmp_path / "energies.png"),
+            plots.plot_modes(body, tmp_path / "modes.png")]
+    for path in made:
+        header = path.read_bytes()[:24]
+        width, height = struct.unpack(">II", header[16:24])
+        assert header[:8] == b"\x89PNG\r\n\x1a\n"
+        assert width >= 900
+        assert height >= 400
+    assert plots.plot_phase(trajectory, tmp_path / "phase.pdf").read_bytes()[:5] == b"%PDF-"
+    assert b"velocity x [mm/s]" in plots.plot_phase(trajectory, tmp_path / "phase.svg").read_bytes()
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".pdf", *[".png"] * 5, ".svg"]
+
+
+def test_interrupted_and_impossible_plots_leave_nothing(tmp_path, monkeypatch):
+    trajectory = run(times=11)
+    with pytest.raises(InputError, match=r"must end in \.png, \.pdf or \.svg"):
+        plots.plot_energies(trajectory, tmp_path / "energies.jpg")
+    with pytest.raises(InputError, match="does not exist"):
+        plots.plot_energies(trajectory, tmp_path / "nowhere" / "energies.png")
+
+    def stop(self, *args, **options):
+        args[0].write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", stop)
+    with pytest.raises(KeyboardInterrupt):
+        plots.plot_energies(trajectory, tmp_path / "energies.png")
+    assert not list(tmp_path.iterdir())
+
+
+def test_plots_leave_matplotlib_as_it_was(tmp_path):
+    import sys
+
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    pyplot = "matplotlib.pyplot" in sys.modules
+    plots.plot_energies(run(times=11), tmp_path / "energies.png")
+    assert dict(matplotlib.rcParams) == before
+    assert ("matplotlib.pyplot" in sys.modules) == pyplot
