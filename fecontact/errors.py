@@ -6,6 +6,7 @@ what to do about it.
 
 import difflib
 from collections.abc import Iterable
+from numbers import Real
 
 
 class FecontactError(Exception):
@@ -42,12 +43,25 @@ def nearest(name: str, names: Iterable[str]) -> str:
 def require_positive(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a finite number above zero."""
     for name, value in values.items():
-        if not 0.0 < value < float("inf"):
+        if not (_is_number(value) and 0.0 < value < float("inf")):
             raise InputError(f"{owner}: {name} = {value!r} must be a finite number above zero.")
 
 
 def require_not_negative(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a finite number of at least zero."""
     for name, value in values.items():
-        if not 0.0 <= value < float("inf"):
+        if not (_is_number(value) and 0.0 <= value < float("inf")):
             raise InputError(f"{owner}: {name} = {value!r} must be a finite number, zero or above.")
+
+
+def require_finite(owner: str, **values: float) -> None:
+    """Raise :class:`InputError` unless every value is a finite number."""
+    for name, value in values.items():
+        if not _is_number(value):
+            raise InputError(f"{owner}: {name} = {value!r} must be a number.")
+        if not abs(value) < float("inf"):
+            raise InputError(f"{owner}: {name} = {value!r} must be finite.")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)

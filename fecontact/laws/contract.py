@@ -24,7 +24,7 @@ one (stiffness, damping) is then the total of the contact face and is shared by 
 A parameter given as a sequence has one value per node and is not shared.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
@@ -77,14 +77,18 @@ class NodeLaw:
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            value = getattr(self, entry.name)
-            if isinstance(value, str) or not np.isrealobj(np.asarray(value)):
-                raise InputError(f"{self._title(entry.name)} = {value!r} must be a number.")
-            if isinstance(value, Sequence | np.ndarray):
-                value = tuple(float(item) for item in value)
-                object.__setattr__(self, entry.name, value)
+            given = getattr(self, entry.name)
+            try:
+                array = np.asarray(given)
+            except ValueError:
+                array = np.empty(0)
+            if array.dtype.kind not in "iuf" or array.ndim > 1 or not array.size:
+                raise InputError(f"{self._title(entry.name)} = {given!r} must be a number or a "
+                                 f"list of numbers, one per contact node.")
+            value = tuple(float(item) for item in array) if array.ndim else float(array)
             if not np.isfinite(value).all():
                 raise InputError(f"{self._title(entry.name)} = {value!r} must be finite.")
+            object.__setattr__(self, entry.name, value)
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters (n, k) of n nodes; ``share`` (n,) is each node's part of the face."""

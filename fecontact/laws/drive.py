@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError, require_not_negative
+from fecontact.errors import require_finite, require_not_negative
 from fecontact.laws.contract import motion
 
 
@@ -53,9 +53,7 @@ class Drive:
             damping_x=self.damping_x, damping_y=self.damping_y,
             angular_frequency=self.angular_frequency,
         )
-        for name in ("amplitude_x", "amplitude_y"):
-            if not math.isfinite(getattr(self, name)):
-                raise InputError(f"Drive: {name} = {getattr(self, name)!r} must be finite.")
+        require_finite("Drive", amplitude_x=self.amplitude_x, amplitude_y=self.amplitude_y)
 
     @property
     def frequency_hz(self) -> float:
@@ -81,5 +79,4 @@ class Load:
     normal: float = 0.0
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.normal):
-            raise InputError(f"Load: normal = {self.normal!r} must be finite.")
+        require_finite("Load", normal=self.normal)

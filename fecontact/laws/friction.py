@@ -93,7 +93,7 @@ def _largest_at(p: NDArray[np.float64]) -> float:
     from scipy.optimize import brentq
 
     law = _exponential.python
-    speeds = np.geomspace(1e-3, 1e9, 2000) / p[3]
+    speeds = np.geomspace(1e-3, 1e9, 2000) / max(p[2], p[3])
     force, slope = np.array([law(v, 1.0, p)[:2] for v in speeds]).T
     largest = int(np.argmax(force))
     if largest + 1 == len(speeds) or not (slope[: largest + 2] < 0.0).any():

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError, require_positive
+from fecontact.errors import require_finite, require_not_negative, require_positive
 from fecontact.laws.contract import ground_profile, motion
 
 
@@ -51,10 +51,8 @@ class Ground:
     wavelength: float = 2.5e-3
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.speed):
-            raise InputError(f"Ground: speed = {self.speed!r} must be finite.")
-        if not 0.0 <= self.amplitude < math.inf:
-            raise InputError(f"Ground: amplitude = {self.amplitude!r} must be zero or above.")
+        require_finite("Ground", speed=self.speed)
+        require_not_negative("Ground", amplitude=self.amplitude)
         require_positive("Ground", wavelength=self.wavelength)
 
     @property
