@@ -65,6 +65,8 @@ def test_round_off_on_strongly_graded_meshes(times):
     (FREE_FREE, {}, 3), (CLAMPED_FREE, {"left": "xy"}, 0),
     ([3.92660231204792, 7.06858274562873], {"left": "xy", "pin": "y"}, 0),
     ([3.92660231204792, 7.06858274562873], {"hinge": "xy"}, 1),
+    ([3.92660231204792, 7.06858274562873], {"left": "hinge"}, 1),
+    ([np.pi, 2.0 * np.pi], {"left": "hinge", "right": "hinge"}, 0),
 ])
 def test_slender_beams_agree_with_euler_bernoulli(roots, fixed, first):
     # Supports at single nodes act on the beam as such; nu = 0 frees the root of lateral strain.
@@ -243,6 +245,10 @@ SUPPORTS = [
     ({"bottom": "x"}, ["y", (1.0, 0.0)]),
     ({"bottom": "y"}, ["x"]),
     ({"left": "xy"}, []),
+    ({"left": "hinge"}, [(0.0, 0.5)]),
+    ({"left": "hinge", "d": "y"}, []),
+    ({"left": "hinge", "right": "hinge"}, []),
+    ({"b": "hinge"}, [(2.0, 1.0)]),
     ({"left": "x", "bottom": "y"}, []),
 ]
 
