@@ -263,3 +263,17 @@ def test_missing_graphics_libraries_are_named(tmp_path, monkeypatch, attempt, re
         assert not list(tmp_path.iterdir())
     finally:
         probe._attempt.cache_clear()
+
+
+@rendering
+def test_movie_that_the_encoder_cut_short_is_not_kept(tmp_path, monkeypatch):
+    def full_disk(path, *args, **options):
+        with open(path, "wb") as file:
+            while True:
+                frame = yield
+                file.write(frame[:1, :1].tobytes() if frame is not None else b"")
+
+    monkeypatch.setattr(imageio_ffmpeg, "write_frames", full_disk)
+    with pytest.raises(InputError, match=r"run\.mp4 cannot be written"):
+        render(run(basis(columns=4, rows=2), times=3), tmp_path / "run.mp4", size=SMALL)
+    assert not list(tmp_path.iterdir())

@@ -197,6 +197,10 @@ def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
             yield lambda image: writer.send(np.ascontiguousarray(image))
         finally:
             writer.close()
+        # The encoder's exit status is not passed on; a movie cut short cannot be opened.
+        check = imageio_ffmpeg.read_frames(str(part))
+        next(check)
+        check.close()
         os.replace(part, path)
     except OSError as error:
         raise InputError(f"{path} cannot be written "

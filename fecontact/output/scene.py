@@ -22,7 +22,7 @@ _LAYERS = {"ground": 0.0, "marks": 0.01, "surface": 0.02, "body": 0.03, "referen
 
 _MARGIN = 0.05  # of the view, beside and above the body
 _DEPTH = 0.20  # of the view's height, for the ground
-_ARROW = 0.15  # of the view's height, the longest
+_ARROW = 0.15  # of the view's height (in portrait of half its width), the longest
 _CORNERS = 20
 _COLUMNS = 2  # of the ground per pixel, so that short waves stay smooth
 
@@ -90,6 +90,7 @@ class Scene:
         depth = max(_DEPTH * height, 0.46 * (height - body), below + 2.0 * _MARGIN * height)
         middle = 0.5 * (left + right)
         self._height, self._bottom = height, level - depth
+        self._unit = height * min(1.0, 0.5 * aspect)  # sizes of arrows and marks
         self._x = (middle - 0.5 * aspect * height, middle + 0.5 * aspect * height)
         camera = self._plotter.camera
         centre = (middle, self._bottom + 0.5 * height, 0.0)
@@ -158,7 +159,7 @@ class Scene:
         count = int(np.ceil(view / spacing)) + 4
         self._spacing, self._period = spacing, 4 * int(np.ceil(count / 4)) * spacing
         self._marks = np.arange(4 * int(np.ceil(count / 4))) * spacing
-        size = min(0.035 * self._height, 0.8 * spacing)
+        size = min(0.035 * self._unit, 0.8 * spacing)
         self._mark_size = np.where(np.arange(len(self._marks)) % 4 == 0, 2.0 * size, size)
 
     def _draw_ground(self, frame: int) -> None:
@@ -212,8 +213,8 @@ class Scene:
         size = np.linalg.norm(forces, axis=1, keepdims=True)
         along = np.divide(forces, size, out=np.zeros_like(forces), where=size > 0.0)
         across = np.column_stack([-along[:, 1], along[:, 0]])
-        length = _ARROW * self._height * size / self._motion.largest_force
-        thick = self._slim * np.minimum(1.0, length / (0.05 * self._height)) * self._height
+        length = _ARROW * self._unit * size / self._motion.largest_force
+        thick = self._slim * np.minimum(1.0, length / (0.05 * self._unit)) * self._unit
         head = np.minimum(0.035 * thick, 0.6 * length)
         tips = tips - self._radius * along
         tail, neck = tips - length * along, tips - head * along
