@@ -3,13 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.damping import Damping, modal_damping
 from fecontact.errors import InputError, choices, nearest
+
+if TYPE_CHECKING:
+    from fecontact.basis_report import BasisReport
 
 Array = NDArray[np.float64]
 
@@ -45,6 +48,35 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
+class Quality:
+    """How a basis relates to the finite-element body that it came from.
+
+    Attributes
+    ----------
+    mass : float
+        Mass of the body [kg].
+    vibration_modes : int
+        Number of leading modes that are eigenmodes of the body; the others complete them.
+    residuals : (m,) array
+        ``|K s - w^2 M s| / (|K| |s|)`` of each mode s; small for eigenmodes only.
+    orthogonality : float
+        Largest entry of ``shapes^T M shapes - 1``.
+    participation : (2, m) array
+        ``s^T M 1`` for translations in x and in y [kg^(1/2)]; its square is the effective mass.
+    compliance : (P, 2) array
+        Elastic displacement of each point in x and y per unit force there, of the whole body
+        (inertia balances what the supports do not) [m/N].
+    """
+
+    mass: float
+    vibration_modes: int
+    residuals: Array
+    orthogonality: float
+    participation: Array
+    compliance: Array
+
+
+@dataclass(frozen=True, eq=False)
 class ModalBasis:
     """Mass-normalised modes ``q`` of a body and its motion at the points of interest.
 
@@ -68,6 +100,8 @@ class ModalBasis:
         Names of the points after the contact nodes.
     field : Field or None
         Modes over the whole body; None for a basis without geometry.
+    quality : Quality or None
+        How the basis relates to the body; None for a basis without one.
     """
 
     angular_frequencies: Array
@@ -77,6 +111,7 @@ class ModalBasis:
     tributary: Array
     extra: tuple[str, ...] = ()
     field: Field | None = None
+    quality: Quality | None = None
 
     def __post_init__(self) -> None:
         for name in ("angular_frequencies", "damping", "T", "positions", "tributary"):
@@ -242,6 +277,19 @@ class ModalBasis:
             tributary=np.full(n, 1.0 / n) if tributary is None else np.asarray(tributary, float),
             extra=tuple(names),
         )
+
+    @property
+    def elastic_compliance(self) -> Array:
+        """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes."""
+        elastic = self.angular_frequencies > 0.0
+        rows = self.T[:, :2, elastic] / self.angular_frequencies[elastic]
+        return np.asarray((rows**2).sum(axis=2))
+
+    def report(self) -> "BasisReport":
+        """How good the basis is, as numbers and as a text; see :class:`BasisReport`."""
+        from fecontact.basis_report import BasisReport
+
+        return BasisReport(self)
 
     def save(self, path: str | Path) -> None:
         """Write the basis to an HDF5 file, whole or not at all."""

@@ -16,6 +16,7 @@ from fecontact.supports import check_supports, expansion, fixed_dofs
 
 if TYPE_CHECKING:
     from fecontact.points import Place
+    from fecontact.reduction import Reduction
 
 Array = NDArray[np.float64]
 
@@ -212,6 +213,8 @@ class ElasticBody:
         C: "Place | None" = None,
         points: "Mapping[str, Place] | None" = None,
         damping: Damping = 0.0,
+        reduction: "Reduction" = "vibration",
+        tolerance: float = 0.1,
     ) -> ModalBasis:
         """Mass-normalised modes, and T at B, C and the contact nodes.
 
@@ -232,7 +235,15 @@ class ElasticBody:
         points : mapping of name to place, optional
             Further points to observe.
         damping : float, (m,) sequence, Rayleigh or (m, m) array
-            See :func:`fecontact.damping.modal_damping`.
+            See :func:`fecontact.damping.modal_damping`; modes that complete the given number
+            take the last ratio.
+        reduction : 'vibration', 'residual' or 'craig-bampton'
+            The lowest vibration modes alone; these completed by residual vectors of forces at
+            B, C and the contact nodes, so that static deflections there are right; or that many
+            fixed-interface modes with constraint modes.
+        tolerance : float
+            For 'residual': the part of its own static compliance that may be missing at any of
+            these points, in x or y. Zero keeps all residual vectors; the larger, the fewer.
 
         Raises
         ------
@@ -243,7 +254,8 @@ class ElasticBody:
         from fecontact.reduction import reduce_body
 
         return reduce_body(self, modes, contact=contact, contact_nodes=contact_nodes, B=B, C=C,
-                           points=points or {}, damping=damping)
+                           points=points or {}, damping=damping, reduction=reduction,
+                           tolerance=tolerance)
 
 
 def _pieces(mesh: Mesh) -> int:

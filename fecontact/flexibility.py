@@ -9,6 +9,7 @@ where G, the elastic flexibility, acts on loads that the inertia of the rigid mo
 holds the residual vectors of MacNeal and Rubin, ``W Y`` is the residual compliance.
 """
 
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -30,6 +31,14 @@ class Flexibility:
         self.rows = rows.tocsr()
         self._factors = SymmetricFactors(system.factors)
         self._places, self._half = self._factors.half_solved(self.rows[:, system.held])
+
+    def of_first(self, count: int) -> "Flexibility":
+        """The same for the first rows alone."""
+        part = copy(self)
+        part.rows, part._half = self.rows[:count], self._half[:, :count]
+        for name in ("compliance", "_balance"):
+            part.__dict__.pop(name, None)
+        return part
 
     @cached_property
     def _balance(self) -> tuple[Array, Array]:

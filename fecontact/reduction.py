@@ -1,22 +1,27 @@
 """From the finite-element body to its modal basis."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.basis import Field, ModalBasis
+from fecontact.basis import Field, ModalBasis, Quality
 from fecontact.contact_face import contact_nodes as nodes_of_face
-from fecontact.damping import Damping, modal_damping
-from fecontact.eigen import eigenmodes
-from fecontact.errors import InputError
+from fecontact.craig_bampton import craig_bampton
+from fecontact.damping import Damping, Rayleigh, modal_damping
+from fecontact.eigen import FreeSystem, backward_error, free_modes, strain_energies
+from fecontact.errors import InputError, choices, nearest
+from fecontact.flexibility import Flexibility, residual_modes
 from fecontact.points import Place, Rows, place_rows
 
 if TYPE_CHECKING:
     from fecontact.body import ElasticBody
 
 Array = NDArray[np.float64]
+
+
+Reduction = Literal["vibration", "residual", "craig-bampton"]
 
 
 def reduce_body(
@@ -29,6 +34,8 @@ def reduce_body(
     C: Place | None,
     points: Mapping[str, Place],
     damping: Damping,
+    reduction: Reduction,
+    tolerance: float,
 ) -> ModalBasis:
     """Modal basis of a body; see :meth:`fecontact.body.ElasticBody.modal_basis`."""
     import scipy.sparse as sp
@@ -36,16 +43,31 @@ def reduce_body(
     for name in points:
         if name in ("B", "C"):
             raise InputError(f"points: '{name}' is a name of its own; give it as {name}=...")
+    if reduction not in get_args(Reduction):
+        raise InputError(f"reduction = {reduction!r} must be one of {choices(get_args(Reduction))}"
+                         f"{nearest(str(reduction), get_args(Reduction))}.")
+    if not 0.0 <= tolerance < 1.0:
+        raise InputError(f"tolerance = {tolerance!r} must be zero or above, and below one.")
     face = nodes_of_face(body, contact, contact_nodes)
     named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
     further = [place_rows(body, place, name) for name, place in points.items()]
     restriction = sp.csr_array(sp.vstack(
         [*(row.matrix for row in named), face.matrix, *(row.matrix for row in further)]))
-    w, shapes = eigenmodes(body, modes)
+    system = FreeSystem.of(body)
+    # Forces act at B, C and the contact nodes in x and y; the rotation carries none.
+    loaded = np.flatnonzero(np.arange(restriction.shape[0]) % 3 < 2)
+    flexibility = Flexibility(system, sp.csr_array(restriction[loaded] @ body.expansion))
+    w, free_shapes, vibration = _modes(system, flexibility, modes, reduction, tolerance,
+                                       used=2 * (2 + len(face.tributary)))
+    shapes = body.expansion @ free_shapes
+    elastic = w > 0.0
+    w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
+    if not isinstance(damping, Rayleigh) and np.shape(damping) == (modes,) != (len(w),):
+        damping = np.concatenate([damping, np.full(len(w) - modes, np.asarray(damping)[-1])])
     return ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),
-        T=(restriction @ shapes).reshape(-1, 3, modes),
+        T=(restriction @ shapes).reshape(-1, 3, len(w)),
         positions=np.array([*(row.position for row in named), *face.positions,
                             *(row.position for row in further)]),
         tributary=face.tributary,
@@ -54,10 +76,45 @@ def reduce_body(
             nodes=body.nodes,
             cells=linear_cells(body),
             outline=_halved(body.edge_nodes(body.mesh.outline)),
-            shapes=shapes.reshape(-1, 2, modes),
+            shapes=shapes.reshape(-1, 2, len(w)),
             stress=modal_stress(body, shapes),
             restriction=restriction,
         ),
+        quality=_quality(body, system, flexibility, w, free_shapes, vibration),
+    )
+
+
+def _modes(
+    system: FreeSystem, flexibility: Flexibility, count: int, reduction: Reduction,
+    tolerance: float, used: int,
+) -> tuple[Array, Array, int]:
+    """Frequencies, shapes and the number of true eigenmodes among them."""
+    if reduction == "craig-bampton":
+        w, shapes = craig_bampton(system, flexibility.rows[:used], count)
+        return w, shapes, system.rigid.shape[1]
+    w, shapes = free_modes(system, count)
+    if reduction == "vibration":
+        return w, shapes, count
+    if count < system.rigid.shape[1]:
+        raise InputError(f"modes = {count} must be at least the number of rigid modes, "
+                         f"{system.rigid.shape[1]}, to be completed by residual vectors.")
+    more, completing = residual_modes(flexibility.of_first(used), w, shapes, tolerance)
+    return np.concatenate([w, more]), np.hstack([shapes, completing]), count
+
+
+def _quality(
+    body: "ElasticBody", system: FreeSystem, flexibility: Flexibility, w: Array, shapes: Array,
+    vibration: int,
+) -> Quality:
+    inertia = system.mass @ shapes
+    ones = np.eye(2)[np.arange(2 * len(body.nodes)) % 2]
+    return Quality(
+        mass=float(body.mesh.area * body.thickness * body.material.density),
+        vibration_modes=vibration,
+        residuals=backward_error(system.stiffness, system.mass, w**2, shapes),
+        orthogonality=float(np.abs(shapes.T @ inertia - np.eye(len(w))).max()),
+        participation=(ones.T @ body.mass) @ (body.expansion @ shapes),
+        compliance=np.maximum(np.diag(flexibility.compliance), 0.0).reshape(-1, 2),
     )
 
 

@@ -1,0 +1,141 @@
+"""How good a modal basis is: frequencies, effective masses, compliance at the contact."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.basis import ModalBasis
+
+Array = NDArray[np.float64]
+
+# Errors of static compliance below this need no remedy; contact laws are known less well.
+_GOOD = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class BasisReport:
+    """Figures of merit of a basis; ``str(report)`` is a table with a recommendation.
+
+    The figures that compare with the finite-element body are NaN for a basis without one.
+    """
+
+    basis: ModalBasis
+
+    @property
+    def effective_mass(self) -> Array:
+        """Share (2, m) of the body's mass that moves with each mode, in x and in y."""
+        quality = self.basis.quality
+        if quality is None:
+            return np.full((2, self.basis.modes), np.nan)
+        return np.asarray(quality.participation**2 / quality.mass)
+
+    @cached_property
+    def compliance_error(self) -> Array:
+        """Part (P, 2) of each point's elastic compliance, in x and in y, that the basis lacks.
+
+        Zero for points and directions that do not deflect.
+        """
+        quality = self.basis.quality
+        if quality is None:
+            return np.full((len(self.basis.T), 2), np.nan)
+        whole = quality.compliance
+        # Compliances are differences of rigid parts: smaller ones are round-off.
+        real = whole > 1e-10 * whole.max(initial=0.0)
+        error = 1.0 - np.divide(self.basis.elastic_compliance, whole, out=np.ones_like(whole),
+                                where=real)
+        return np.asarray(np.where(real, error, 0.0))
+
+    @property
+    def contact_error(self) -> Array:
+        """The same (n, 2) at the contact nodes."""
+        return self.compliance_error[2 : 2 + self.basis.contact_nodes]
+
+    @property
+    def orthogonality(self) -> float:
+        """Largest entry of ``shapes^T M shapes - 1``."""
+        return np.nan if self.basis.quality is None else self.basis.quality.orthogonality
+
+    @property
+    def residuals(self) -> Array:
+        """``|K s - w^2 M s| / (|K| |s|)`` of each mode (m,)."""
+        quality = self.basis.quality
+        return np.full(self.basis.modes, np.nan) if quality is None else quality.residuals
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """Highest frequency of the basis [Hz]."""
+        return float(self.basis.frequencies_hz[-1])
+
+    @property
+    def time_step(self) -> float:
+        """A twentieth of the shortest period [s], what resolving every mode takes."""
+        highest = self.highest_frequency_hz
+        return 0.05 / highest if highest > 0.0 else np.inf
+
+    @property
+    def recommendation(self) -> str:
+        """What to do about the basis, one or two sentences."""
+        quality, error = self.basis.quality, self.compliance_error
+        if quality is None:
+            return ("The basis came without a body, so its compliance at the contact cannot be "
+                    "judged; compare it with a static solution of the full model.")
+        # The load at C acts in y alone.
+        error = np.where(np.arange(len(error))[:, None] == 1, error * [0.0, 1.0], error)
+        worst = np.unravel_index(int(np.argmax(error)), error.shape)
+        if error[worst] <= _GOOD:
+            return (f"Static deflections are right to {100 * error[worst]:.2g} % at every point; "
+                    f"the basis can be used up to about {self._valid_hz:.4g} Hz.")
+        return (f"{self._name(int(worst[0]))} is too stiff: {100 * error[worst]:.0f} % of its "
+                f"elastic compliance in {'xy'[worst[1]]} is missing. Complete the modes with "
+                f"reduction = \"residual\" (tolerance {_GOOD:g} or less), or keep more modes.")
+
+    @property
+    def _valid_hz(self) -> float:
+        quality = self.basis.quality
+        assert quality is not None
+        known = self.basis.frequencies_hz[: quality.vibration_modes]
+        elastic = known[known > 0.0]
+        if elastic.size:
+            return float(elastic[-1]) / 1.5
+        above = self.basis.frequencies_hz[self.basis.frequencies_hz > 0.0]
+        return float(above[len(above) // 2]) / 1.5 if above.size else 0.0
+
+    def _name(self, point: int) -> str:
+        n = self.basis.contact_nodes
+        if point < 2:
+            return f"Point {'BC'[point]}"
+        if point < 2 + n:
+            return f"Contact node {point - 2}"
+        return f"Point {self.basis.extra[point - 2 - n]}"
+
+    def __str__(self) -> str:
+        basis, mass = self.basis, self.effective_mass
+        lines = [f"{'mode':>4s} {'frequency [Hz]':>15s} {'damping':>9s} {'mass x':>8s} "
+                 f"{'mass y':>8s}  kind"]
+        diagonal = np.diag(basis.damping)
+        for i, f in enumerate(basis.frequencies_hz):
+            w = basis.angular_frequencies[i]
+            ratio = f"{diagonal[i] / (2.0 * w):9.3%}" if w > 0.0 else f"{'-':>9s}"
+            shares = " ".join(f"{share:8.2%}" if np.isfinite(share) else f"{'-':>8s}"
+                              for share in mass[:, i])
+            lines.append(f"{i:4d} {f:15.6g} {ratio} {shares}  {self._kind(i)}")
+        error = self.contact_error
+        if np.isfinite(error).all() and error.size:
+            lines += ["", "missing static compliance at the contact nodes: "
+                          f"x {error[:, 0].max():.2%}, y {error[:, 1].max():.2%} at most, "
+                          f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
+                      f"effective mass kept: x {mass[0].sum():.2%}, y {mass[1].sum():.2%}",
+                      f"mass-orthogonality: {self.orthogonality:.1e}"]
+        lines += [f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by steps of "
+                  f"{self.time_step:.2g} s", self.recommendation]
+        return "\n".join(lines)
+
+    def _kind(self, mode: int) -> str:
+        if mode < self.basis.rigid_modes:
+            return "rigid"
+        quality = self.basis.quality
+        if quality is None or mode < quality.vibration_modes:
+            return "vibration"
+        return "reduced" if quality.vibration_modes == self.basis.rigid_modes else "completing"
