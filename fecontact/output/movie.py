@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -197,10 +198,7 @@ def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
             yield lambda image: writer.send(np.ascontiguousarray(image))
         finally:
             writer.close()
-        # The encoder's exit status is not passed on; a movie cut short cannot be opened.
-        check = imageio_ffmpeg.read_frames(str(part))
-        next(check)
-        check.close()
+        _require_readable(imageio_ffmpeg.get_ffmpeg_exe(), part)
         os.replace(part, path)
     except OSError as error:
         raise InputError(f"{path} cannot be written "
@@ -235,6 +233,14 @@ def _numbered_files(path: Path) -> Iterator[Callable[[Image], Any]]:
         raise InputError(f"{folder} cannot be written ({error.strerror or error}).") from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def _require_readable(ffmpeg: str, movie: Path) -> None:
+    """Raise OSError for a movie cut short: the encoder's exit status is not passed on."""
+    done = subprocess.run([ffmpeg, "-v", "error", "-i", str(movie), "-frames:v", "1", "-f", "null",
+                           "-"], capture_output=True, check=False, stdin=subprocess.DEVNULL)
+    if done.returncode != 0:
+        raise OSError("the encoder did not finish; the disk may be full")
 
 
 def _save(path: Path, image: Image) -> None:
