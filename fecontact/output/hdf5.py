@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.basis import Field, ModalBasis
+from fecontact.basis import Field, ModalBasis, Quality
 from fecontact.errors import InputError
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
@@ -71,6 +71,10 @@ def write_basis(group: Any, basis: ModalBasis) -> None:
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
     group.attrs["extra"] = list(basis.extra)
+    if basis.quality is not None:
+        quality = group.create_group("quality")
+        for name, value in vars(basis.quality).items():
+            quality.create_dataset(name, data=value)
     if basis.field is None:
         return
     field = group.create_group("field")
@@ -97,8 +101,15 @@ def read_basis(group: Any) -> ModalBasis:
                 shape=tuple(int(k) for k in matrix.attrs["shape"]),
             ),
         )
+    quality = None
+    if "quality" in group:
+        stored = {name: item[()] for name, item in group["quality"].items()}
+        quality = Quality(**stored | {"mass": float(stored["mass"]),
+                                      "vibration_modes": int(stored["vibration_modes"]),
+                                      "orthogonality": float(stored["orthogonality"])})
     extra = tuple(str(name) for name in np.atleast_1d(group.attrs["extra"]))
-    return ModalBasis(**{name: group[name][()] for name in _PLAIN}, extra=extra, field=field)
+    return ModalBasis(**{name: group[name][()] for name in _PLAIN}, extra=extra, field=field,
+                      quality=quality)
 
 
 def _reason(path: Path, error: OSError) -> str:
