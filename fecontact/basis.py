@@ -1,14 +1,14 @@
 """The modal basis: eigenfrequencies, damping and the rows of T at the points of interest."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.damping import Damping, modal_damping
+from fecontact.damping import Damping
 from fecontact.errors import InputError, choices, nearest
 
 if TYPE_CHECKING:
@@ -191,92 +191,108 @@ class ModalBasis:
     @classmethod
     def from_matrices(
         cls,
-        mass: ArrayLike,
-        stiffness: ArrayLike,
-        rows: Mapping[str, ArrayLike],
+        mass: Any,
+        stiffness: Any,
+        rows: Mapping[str, Any],
         *,
-        damping: Damping = 0.0,
+        damping: Any = 0.0,
+        modes: int | None = None,
+        rigid: int | None = None,
         contact_x: ArrayLike | None = None,
         tributary: ArrayLike | None = None,
     ) -> "ModalBasis":
-        """Basis of all modes of given matrices, for bodies meshed elsewhere or chains of masses.
+        """Basis of given matrices, for bodies meshed elsewhere or chains of masses.
+
+        Rigid modes are the displacements that the stiffness does not resist; they get the
+        frequency zero. A first largest component of each mode is positive.
 
         Parameters
         ----------
-        mass, stiffness : (d, d) arrays
-            Symmetric; the mass positive definite, the stiffness positive semi-definite.
+        mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
+            Symmetric; the mass positive definite [kg], the stiffness positive semi-definite
+            [N/m]. Degrees of freedom with a stiffness of 1e35 or more on the diagonal are held.
         rows : mapping
-            ``contact`` (n, 3, d): displacements x, y and rotation of each contact node from the
-            d degrees of freedom; ``B`` and ``C`` (3, d), zero when left out; further named
-            points (3, d).
-        damping : float, (d,) sequence, Rayleigh or (d, d) array
+            ``contact``: displacements x, y and rotation of each of the n contact nodes from the d
+            degrees of freedom, as (n, 3, d), sparse (3 n, d) or n sparse (3, d). ``B``, ``C``
+            and further named points: dense or sparse (3, d); B and C are zero when left out.
+            Two rows, x and y, in the place of three mean no rotation.
+            :func:`fecontact.rows.rows_from_dofs` makes them from numbers.
+        damping : float, (m,) sequence, Rayleigh or (d, d) array
             Ratios of the modes, Rayleigh factors, or the damping matrix in the given degrees
-            of freedom.
+            of freedom, dense, sparse or AssembledMatrix [N s/m].
+        modes : int, optional
+            Number m of modes, the rigid ones included, lowest first; all, up to d = 2000.
+        rigid : int, optional
+            Number of rigid modes, for stiffness matrices that carry few digits or were
+            condensed; found from the stiffness when left out.
         contact_x, tributary : (n,) arrays, optional
-            Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes.
+            Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes
+            [m].
 
         Raises
         ------
         InputError
-            For matrices that are not square, of one size, symmetric or definite as required,
-            and for rows of another width.
+            For matrices that are not square, of one size, finite, symmetric or definite as
+            required, and for rows of another width.
+        AnalysisError
+            If the modes cannot be computed accurately.
         """
-        from scipy.linalg import LinAlgError, eigh
+        from fecontact.assembled import basis_of_matrices
 
-        mass, stiffness = _real("mass", mass), _real("stiffness", stiffness)
-        d = len(mass) if mass.ndim else 0
-        for name, matrix in (("mass", mass), ("stiffness", stiffness)):
-            if not d or matrix.shape != (d, d):
-                raise InputError(f"The {name} matrix must be square, not empty and of the mass "
-                                 f"matrix's size, not of shape {matrix.shape}.")
-            if not np.isfinite(matrix).all():
-                raise InputError(f"The {name} matrix holds values that are not finite.")
-            asymmetry = np.abs(matrix - matrix.T).max() / max(np.abs(matrix).max(), 1e-300)
-            if asymmetry > 1e-10:
-                raise InputError(f"The {name} matrix is not symmetric: its largest asymmetry is "
-                                 f"{asymmetry:.1e} of its largest entry.")
-        try:
-            squares, shapes = eigh(stiffness, mass)
-        except LinAlgError:
-            raise InputError("The mass matrix is not positive definite.") from None
-        digit = np.finfo(float).eps * max(abs(squares[-1]), abs(squares[0]))
-        if squares[0] < -10.0 * d * digit:
-            raise InputError(f"The stiffness matrix is not positive semi-definite: its smallest "
-                             f"eigenvalue relative to the mass is {squares[0]:.3e} 1/s^2.")
-        # Rayleigh quotients: those of rigid modes come out below a tenth of the last digit of the
-        # largest, for any number of unknowns, and the lowest of a slender body not far above.
-        squares = (shapes * (stiffness @ shapes)).sum(axis=0)
-        w = np.sqrt(np.where(squares <= 100.0 * digit, 0.0, squares))
-        order = np.argsort(w, kind="stable")
-        w, shapes = w[order], shapes[:, order]
-        shapes = shapes * fixed_signs(shapes)
-        contact = _rows("contact", rows, d, "(n, 3, d)")
-        names = [name for name in rows if name not in ("B", "C", "contact")]
-        points = [_rows(name, rows, d, "(3, d)") for name in ("B", "C")]
-        T = np.concatenate([*points, contact, *(_rows(name, rows, d, "(3, d)") for name in names)])
-        n = len(contact)
-        positions = np.zeros((len(T), 2))
-        for name, given in (("contact_x", contact_x), ("tributary", tributary)):
-            if given is not None and _real(name, given).shape != (n,):
-                raise InputError(f"{name} must have one value for each of the {n} contact nodes, "
-                                 f"not shape {np.shape(given)}.")
-        if contact_x is not None:
-            positions[2 : 2 + n, 0] = contact_x
-        physical = np.ndim(damping) == 2 if not hasattr(damping, "mass_factor") else False
-        if physical:
-            matrix = np.asarray(damping, dtype=float)
-            if matrix.shape != (d, d):
-                raise InputError(f"The damping matrix must have shape ({d}, {d}), not "
-                                 f"{matrix.shape}.")
-            damping = shapes.T @ matrix @ shapes
-        return cls(
-            angular_frequencies=w,
-            damping=modal_damping(damping, w),
-            T=T @ shapes,
-            positions=positions,
-            tributary=np.full(n, 1.0 / n) if tributary is None else np.asarray(tributary, float),
-            extra=tuple(names),
-        )
+        return basis_of_matrices(mass, stiffness, rows, damping=damping, modes=modes, rigid=rigid,
+                                 contact_x=contact_x, tributary=tributary)
+
+    @classmethod
+    def from_modes(
+        cls,
+        shapes: ArrayLike,
+        rows: Mapping[str, Any],
+        *,
+        frequencies_hz: ArrayLike | None = None,
+        angular_frequencies: ArrayLike | None = None,
+        mass: Any = None,
+        modal_mass: ArrayLike | None = None,
+        damping: Damping = 0.0,
+        orthogonality: float = 1e-3,
+        contact_x: ArrayLike | None = None,
+        tributary: ArrayLike | None = None,
+    ) -> "ModalBasis":
+        """Basis of modes that were computed elsewhere or measured.
+
+        The shapes are scaled to unit modal mass, ordered by frequency, and their signs fixed;
+        :func:`fecontact.normalisation.normalisation` says how they were scaled.
+
+        Parameters
+        ----------
+        shapes : (d, m) array
+            Real mode shapes, one a column.
+        rows : mapping
+            As for :meth:`from_matrices`.
+        frequencies_hz, angular_frequencies : (m,) array
+            One of the two [Hz, rad/s]; exactly zero for rigid modes.
+        mass : dense or sparse (d, d) array, or AssembledMatrix
+            Mass matrix [kg], to find the scale of the shapes and check that they are orthogonal.
+        modal_mass : float or (m,) array
+            In the place of a mass matrix: the shapes' modal masses, 1 for mass-normalised shapes.
+        damping : float, (m,) sequence, Rayleigh or (m, m) array
+            Ratios in the order of the shapes, Rayleigh factors, or the modal damping matrix
+            of the mass-normalised shapes [1/s].
+        orthogonality : float
+            Largest product ``|s_i^T M s_j|`` of two mass-normalised shapes that is accepted.
+        contact_x, tributary : (n,) arrays, optional
+            As for :meth:`from_matrices`.
+
+        Raises
+        ------
+        InputError
+            For arrays that do not fit, and for shapes that are complex or not mass-orthogonal.
+        """
+        from fecontact.normalisation import basis_of_modes
+
+        return basis_of_modes(
+            shapes, rows, frequencies_hz=frequencies_hz, angular_frequencies=angular_frequencies,
+            mass=mass, modal_mass=modal_mass, damping=damping, orthogonality=orthogonality,
+            contact_x=contact_x, tributary=tributary)
 
     @property
     def elastic_compliance(self) -> Array:
@@ -284,6 +300,54 @@ class ModalBasis:
         elastic = self.angular_frequencies > 0.0
         rows = self.T[:, :2, elastic] / self.angular_frequencies[elastic]
         return np.asarray((rows**2).sum(axis=2))
+
+    def with_dashpots(self, dashpots: Mapping[str | int, tuple[float, float]]) -> "ModalBasis":
+        """A copy with dashpots between points of the body and the inertial frame.
+
+        Parameters
+        ----------
+        dashpots : mapping of point to (b_x, b_y)
+            Points by name, contact nodes by number; damping in x and in y, zero or above
+            [N s/m]. ``b row^T row`` is added to the modal damping matrix, which they make full.
+
+        Raises
+        ------
+        InputError
+            For a point that does not exist, or a damping that is negative or not finite.
+        """
+        damping = np.array(self.damping)
+        for point, values in dashpots.items():
+            for row, b in zip(self.T[self.point_index(point)], values, strict=False):
+                if not 0.0 <= b < np.inf:
+                    raise InputError(f"Dashpot at {point!r}: damping {b!r} must be finite and "
+                                     f"zero or above.")
+                damping += b * np.outer(row, row)
+        return replace(self, damping=damping)
+
+    def select(self, modes: Sequence[int]) -> "ModalBasis":
+        """A copy with the given modes alone, by number from 0, each once and in ascending order.
+
+        A block's tilting, say, is left out by leaving out its rigid rotation. Raises InputError
+        for a mode that does not exist.
+        """
+        chosen = np.unique(np.asarray(modes, dtype=int))
+        if not chosen.size or len(chosen) != len(modes) or chosen[0] < 0 or (
+                chosen[-1] >= self.modes):
+            raise InputError(f"modes {list(modes)} must be different numbers from 0 to "
+                             f"{self.modes - 1}, at least one.")
+        field, quality = self.field, self.quality
+        return replace(
+            self,
+            angular_frequencies=self.angular_frequencies[chosen],
+            damping=self.damping[np.ix_(chosen, chosen)],
+            T=self.T[:, :, chosen],
+            field=None if field is None else replace(
+                field, shapes=field.shapes[..., chosen], stress=field.stress[..., chosen]),
+            quality=None if quality is None else replace(
+                quality, residuals=quality.residuals[chosen],
+                participation=quality.participation[:, chosen],
+                vibration_modes=int(np.count_nonzero(chosen < quality.vibration_modes))),
+        )
 
     def report(self) -> "BasisReport":
         """How good the basis is, as numbers and as a text; see :class:`BasisReport`."""
@@ -324,17 +388,3 @@ def _real(name: str, values: ArrayLike) -> Array:
     except (TypeError, ValueError):
         raise InputError(f"{name} must be an array of real numbers, not "
                          f"{type(values).__name__}.") from None
-
-
-def _rows(name: str, rows: Mapping[str, ArrayLike], d: int, shape: str) -> Array:
-    if name not in rows:
-        if name == "contact":
-            raise InputError("rows must have an entry 'contact' of shape (n, 3, d).")
-        return np.zeros((1, 3, d))
-    block = _real(f"rows['{name}']", rows[name])
-    if block.ndim == 2 and shape == "(3, d)":
-        block = block[None]
-    if block.ndim != 3 or block.shape[1:] != (3, d) or not len(block):
-        raise InputError(f"rows['{name}'] must have shape {shape} with d = {d}, not "
-                         f"{np.shape(rows[name])}.")
-    return block

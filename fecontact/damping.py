@@ -32,7 +32,25 @@ class Rayleigh:
                              stiffness_factor=self.stiffness_factor)
 
 
-Damping = float | Sequence[float] | NDArray[np.float64] | Rayleigh
+@dataclass(frozen=True)
+class LossFactor:
+    """Damping ratios from the loss factor of the material: ``D = value / 2`` in every mode.
+
+    At resonance, the energy lost per cycle is ``2 pi value`` times the largest elastic energy.
+
+    Parameters
+    ----------
+    value : float
+        Zero or above.
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        require_not_negative("LossFactor", value=self.value)
+
+
+Damping = float | Rayleigh | LossFactor | Sequence[float] | NDArray[np.float64]
 
 
 def modal_damping(
@@ -42,8 +60,9 @@ def modal_damping(
 
     Parameters
     ----------
-    damping : float, (m,) sequence, :class:`Rayleigh` or (m, m) array
-        One damping ratio for all modes, one per mode, Rayleigh factors, or the full matrix.
+    damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
+        One damping ratio for all modes, one per mode, Rayleigh factors, a loss factor, or the
+        full matrix.
         A ratio D gives ``2 D w``, so that it does nothing to rigid modes.
     angular_frequencies : (m,) array
         [rad/s].
@@ -57,6 +76,8 @@ def modal_damping(
     if isinstance(damping, Rayleigh):
         return np.diag(damping.mass_factor
                        + damping.stiffness_factor * angular_frequencies**2)
+    if isinstance(damping, LossFactor):
+        damping = 0.5 * damping.value
     try:
         values = np.asarray(damping, dtype=float)
     except (TypeError, ValueError):

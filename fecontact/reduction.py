@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fecontact.basis import Field, ModalBasis, Quality
 from fecontact.contact_face import contact_nodes as nodes_of_face
 from fecontact.craig_bampton import craig_bampton
-from fecontact.damping import Damping, Rayleigh, modal_damping
+from fecontact.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.eigen import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.errors import InputError, choices, nearest
 from fecontact.flexibility import Flexibility, residual_modes
@@ -62,8 +62,10 @@ def reduce_body(
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
-    if not isinstance(damping, Rayleigh) and np.shape(damping) == (modes,) != (len(w),):
-        damping = np.concatenate([damping, np.full(len(w) - modes, np.asarray(damping)[-1])])
+    if not isinstance(damping, Rayleigh | LossFactor | float | int):
+        given = np.asarray(damping, dtype=float)
+        if given.shape == (modes,) and len(w) > modes:
+            damping = np.append(given, np.full(len(w) - modes, given[-1]))
     return ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fecontact import contact_kernels as kernels
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError, choices, nearest
+from fecontact.gap import Gap, gap_values
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction, FrictionLaw
 from fecontact.laws.ground import Ground
@@ -41,8 +42,9 @@ class ContactSystem:
         Base excitation of B.
     load : Load
         Constant load at C.
-    gap : float or (n,) sequence
-        Initial distance g_j of the contact nodes from flat ground, zero or above [m].
+    gap : float, (n,) sequence, Crown or function of x
+        Initial distance g_j of the contact nodes from flat ground, zero or above [m]; kept as
+        numbers.
     """
 
     basis: ModalBasis
@@ -51,16 +53,10 @@ class ContactSystem:
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
-    gap: float | tuple[float, ...] = 0.0
+    gap: Gap = 0.0
 
     def __post_init__(self) -> None:
-        gap = np.asarray(self.gap, dtype=float)
-        if gap.shape not in ((), (self.basis.contact_nodes,)):
-            raise InputError(f"gap has {gap.size} values for {self.basis.contact_nodes} contact "
-                             f"nodes; give one number or one per node.")
-        if not np.isfinite(gap).all() or (gap < 0).any():
-            raise InputError(f"gap = {self.gap} must be finite and zero or above.")
-        object.__setattr__(self, "gap", tuple(gap.tolist()) if gap.ndim else float(gap))
+        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
         _ = self.arrays
 
     @property

@@ -1,0 +1,74 @@
+"""Initial gaps: crowned faces from the circle, not from chords."""
+
+import numpy as np
+import pytest
+
+from fecontact.basis import ModalBasis
+from fecontact.errors import InputError
+from fecontact.gap import Crown, gap_values
+from fecontact.laws.drive import Load
+from fecontact.laws.normal import RoughSurface
+from fecontact.statics import static_equilibrium
+from fecontact.system import ContactSystem
+
+
+def rigid_mass(count, length):
+    """A mass that moves in y alone, with contact nodes in the middle of equal segments."""
+    row = np.array([[0.0], [1.0], [0.0]])
+    middles = ((np.arange(count) + 0.5) / count - 0.5) * length
+    return ModalBasis.from_matrices([[1.0]], [[0.0]], {"C": row, "contact": [row] * count},
+                                    contact_x=middles, tributary=np.full(count, length / count))
+
+
+def test_crown_is_the_circle_to_the_last_digit():
+    crown = Crown(radius=0.5, centre=0.1)
+    x = np.array([0.1, 0.1 + 1e-7, 0.13, 0.6])
+    # 1 - cos(t) = 2 sin^2(t / 2), which cancels nothing.
+    angle = np.arcsin((x - 0.1) / 0.5)
+    np.testing.assert_allclose(crown(x), 2.0 * 0.5 * np.sin(angle / 2) ** 2, rtol=1e-14)
+
+
+def test_pressed_cylinder_on_independent_springs():
+    """F = 2/3 sqrt(8 R) k u^(3/2) for stiffness k per length under a parabola; R large."""
+    radius, length, stiffness, load = 2.0, 0.02, 1e9, 50.0
+    system = ContactSystem(
+        rigid_mass(4000, length),
+        normal=RoughSurface(stiffness=stiffness * length, roughness_height=1e-12, damping=0.0),
+        load=Load(load), gap=Crown(radius))
+    q = static_equilibrium(system)
+    approach = -(system.basis.T[1, 1] @ q)
+    expected = (1.5 * load / stiffness / np.sqrt(8.0 * radius)) ** (2.0 / 3.0)
+    assert approach == pytest.approx(expected, rel=2e-4)
+    pressed = system.contact_history(np.zeros(1), np.concatenate([q, [0.0]])[None])[0, :, 0] > 0.0
+    half_width = np.abs(system.basis.contact_x[pressed]).max()
+    assert half_width == pytest.approx(np.sqrt(2.0 * radius * expected), rel=5e-3)
+
+
+def test_chords_would_miss_the_circle_by_the_height_of_the_roughness():
+    edge, radius = 0.005, 0.5
+    crown = Crown(radius)
+    ends = crown(np.array([0.0, edge]))
+    sagitta = ends.mean() - crown(np.array([edge / 2]))[0]
+    assert sagitta == pytest.approx(edge**2 / (8.0 * radius), rel=1e-4)
+    assert sagitta > 5.2e-6
+
+
+def test_functions_sequences_and_numbers_are_taken():
+    x = np.linspace(0.0, 1.0, 3)
+    assert gap_values(1e-6, x) == 1e-6
+    assert gap_values([0.0, 1e-6, 2e-6], x) == (0.0, 1e-6, 2e-6)
+    assert gap_values(lambda place: 2.0 * place, x) == (0.0, 1.0, 2.0)
+    system = ContactSystem(rigid_mass(3, 0.01), gap=lambda place: np.abs(place))
+    np.testing.assert_allclose(system.arrays.gap, [0.01 / 3, 0.0, 0.01 / 3], atol=1e-18)
+
+
+def test_bad_gaps_are_refused():
+    x = np.linspace(0.0, 1.0, 3)
+    with pytest.raises(InputError, match="gap has 2 values for 3 contact nodes"):
+        gap_values([0.0, 1.0], x)
+    with pytest.raises(InputError, match=r"gap = -1.* must be finite and zero or above"):
+        gap_values(-1e-6, x)
+    with pytest.raises(InputError, match=r"beyond the radius 0\.5"):
+        gap_values(Crown(0.5), x)
+    with pytest.raises(InputError, match="radius = 0"):
+        Crown(0.0)
