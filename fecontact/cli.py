@@ -252,8 +252,9 @@ def doctor() -> int:
 
     with waiting("Looking"):
         found = examine()
-    _show(table("", "", rows=[(finding.what if finding.works else f"MISSING {finding.what}",
-                               finding.detail) for finding in found]))
+    rows = [(finding.what if finding.works else f"MISSING {finding.what}", finding.detail)
+            for finding in found]
+    _show(table("", "", left=2, rows=rows))
     remedies = dict.fromkeys(finding.remedy for finding in found if not finding.works)
     for remedy in filter(None, remedies):
         _say(f"To repair: {remedy}")

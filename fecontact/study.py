@@ -107,8 +107,10 @@ class Study:
         try:
             text = path.read_text(encoding="utf-8")
         except FileNotFoundError:
-            others = (other.name for other in path.parent.glob("*.toml"))
-            raise InputError(f"{path} does not exist{nearest(path.name, others)}.") from None
+            # Endings are alike, so that only the names before them tell what was meant.
+            others = [other.stem for other in path.parent.glob("*.toml")]
+            hint = nearest(path.stem, others).replace("'?", ".toml'?")
+            raise InputError(f"{path} does not exist{hint}.") from None
         except (OSError, UnicodeDecodeError):
             raise InputError(f"{path} cannot be read as a study; give a text file in "
                              f"TOML.") from None

@@ -1,0 +1,282 @@
+"""Study files: what they describe, round trips, and what is said of mistakes."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from fecontact.body import ElasticBody, Material
+from fecontact.damping import Rayleigh
+from fecontact.errors import FecontactError, InputError, MeshError
+from fecontact.geometry import generate
+from fecontact.integrate.initial import RigidStart
+from fecontact.laws.drive import Load
+from fecontact.laws.friction import ExponentialFriction
+from fecontact.laws.ground import Ground
+from fecontact.mesh_io import write_mesh
+from fecontact.points import Patch
+from fecontact.shapes import Beam, Block, Pendulum
+from fecontact.study import Study
+from fecontact.system import ContactSystem
+from fecontact.templates import TEMPLATES, template
+
+TINY = """
+gap = 1e-6
+
+[geometry]
+shape = "beam"
+length = 0.1
+height = 0.01
+element_size = 0.01
+
+[body]
+material = "aluminium"
+thickness = 0.02
+
+[basis]
+modes = 5
+contact_nodes = 4
+damping = 0.01
+C = { at = "C", radius = 0.01 }
+points = { tip = [0.1, 0.01], face = "right" }
+
+[friction]
+static_coefficient = [0.5, 0.6, 0.7, 0.8]
+kinetic_coefficient = 0
+
+[ground]
+speed = 1
+
+[load]
+normal = 10.0
+
+[simulation]
+t_end = 1e-3
+outputs = 11
+"""
+
+
+@pytest.fixture
+def tiny():
+    return Study.from_toml(TINY)
+
+
+def test_study_is_the_system_written_by_hand(tiny):
+    body = ElasticBody(generate(Beam(length=0.1, height=0.01, element_size=0.01)),
+                       Material.named("aluminium"), thickness=0.02)
+    basis = body.modal_basis(5, contact_nodes=4, damping=0.01, C=Patch("C", 0.01),
+                             points={"tip": (0.1, 0.01), "face": "right"})
+    by_hand = ContactSystem(
+        basis, friction=ExponentialFriction(static_coefficient=(0.5, 0.6, 0.7, 0.8),
+                                            kinetic_coefficient=0.0),
+        ground=Ground(speed=1.0), load=Load(normal=10.0), gap=1e-6)
+    system = tiny.system()
+    assert system.parameters() == by_hand.parameters()
+    state = np.random.default_rng(1).normal(scale=1e-6, size=10)
+    np.testing.assert_array_equal(system.rhs(0.3, state), by_hand.rhs(0.3, state))
+    assert basis.extra == tiny.basis().extra == ("tip", "face")
+
+
+def test_run_covers_the_times_asked_for(tiny):
+    seen = []
+    trajectory = tiny.with_(**{"simulation.t_start": 5e-4}).run(seen.append)
+    np.testing.assert_allclose(trajectory.time, np.linspace(5e-4, 1e-3, 11), rtol=1e-12)
+    assert seen[-1] == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("text", [TINY, *(template(shape) for shape in TEMPLATES)])
+def test_resolved_study_reads_back_the_same(text):
+    study = Study.from_toml(text)
+    resolved = study.to_toml()
+    assert Study.from_toml(resolved) == study
+    assert Study.from_toml(resolved).to_toml() == resolved
+
+
+def test_resolved_study_has_every_key_that_has_a_value(tiny):
+    tables = tiny.tables()
+    assert set(tables["ground"]) == {entry.name for entry in fields(Ground)}
+    assert tables["simulation"]["rtol"] == 1e-6
+    assert tables["geometry"]["shape"] == "beam"
+    assert "B" not in tables["basis"]
+
+
+def test_templates_have_no_key_at_a_wrong_place_and_can_be_started():
+    shapes = {"beam": Beam, "pendulum": Pendulum, "block": Block}
+    assert set(TEMPLATES) == set(shapes)
+    for shape, kind in shapes.items():
+        study = Study.from_toml(template(shape))
+        assert isinstance(study.geometry, kind)
+        basis = study.basis()
+        assert basis.rigid_modes == {"beam": 3, "pendulum": 1, "block": 3}[shape]
+        assert study.t_end > 0.0
+
+
+def test_pendulum_template_is_the_impact_oscillator():
+    """Mass 0.092 kg at the stop, first bending mode near 230 Hz with 0.6 times its amplitude."""
+    basis = Study.from_toml(template("pendulum")).basis()
+    rigid, bending = basis.T[2, 1, :2]
+    assert 1.0 / rigid**2 == pytest.approx(0.092, rel=0.02)
+    assert basis.frequencies_hz[1] == pytest.approx(230.0, rel=0.03)
+    assert abs(bending / rigid) == pytest.approx(0.6, rel=0.05)
+
+
+def test_changes_by_dotted_names(tiny):
+    changed = tiny.with_(**{"ground.speed": 2, "gap": [0, 1e-6, 0, 1e-6], "basis.damping": {
+        "mass_factor": 1.0}, "simulation.initial": {"velocity": [0, 1, 0]},
+        "body.fixed.left": "x", "friction.static_coefficient": np.array([0.1, 0.2, 0.3, 0.4]),
+        "basis.C.radius": 0.02})
+    assert changed.ground.speed == 2.0
+    assert changed.gap == (0.0, 1e-6, 0.0, 1e-6)
+    assert changed.basis_settings.damping == Rayleigh(mass_factor=1.0)
+    assert changed.basis_settings.C.radius == 0.02
+    assert changed.simulation.initial == RigidStart(velocity=(0.0, 1.0, 0.0))
+    assert changed.body_settings.fixed == {"left": "x"}
+    assert changed.friction.static_coefficient == (0.1, 0.2, 0.3, 0.4)
+    assert tiny.ground.speed == 1.0
+    assert changed.load == tiny.load
+
+
+def test_another_shape_when_nothing_was_said_of_the_first():
+    study = Study.from_toml('geometry = { shape = "beam" }')
+    assert study.with_(**{"geometry.shape": "block"}).geometry == Block()
+
+
+def test_material_values_replace_those_of_the_named_one(tiny):
+    material = tiny.with_(**{"body.density": 3000}).body_settings.elastic_material
+    assert (material.density, material.youngs_modulus) == (3000.0, 7.0e10)
+    assert Study.from_toml('geometry = { shape = "beam" }').body().material == Material()
+
+
+def test_mesh_file_is_found_beside_the_study(tmp_path):
+    mesh = generate(Beam(length=100.0, height=10.0, element_size=10.0))
+    (tmp_path / "parts").mkdir()
+    write_mesh(mesh, tmp_path / "parts" / "part.msh")
+    path = tmp_path / "study.toml"
+    path.write_text("""
+        [geometry]
+        file = "parts/part.msh"
+        scale = 1e-3
+        boundaries = { shoe = "contact", half = [-1, 0.009, 0.051, 0.011] }
+        points = { tip = [0.1, 0.01], corner = "C" }
+        [basis]
+        contact = "shoe"
+        modes = 4
+    """)
+    study = Study.read(path)
+    assert study.mesh().area == pytest.approx(1e-3)
+    assert {"shoe", "half"} <= set(study.mesh().boundaries)
+    assert {"tip", "corner"} <= set(study.mesh().points)
+    assert study.basis().modes == 4
+    assert study.mesh() is study.mesh()
+    assert Study.from_toml(study.to_toml(), path) == study
+    assert study.results == tmp_path / "results"
+
+
+MISTAKES = [
+    ({"ground.sped": 1}, r"\[ground\] has no key 'sped' \(did you mean 'speed'\?\); its keys are"),
+    ({"grond.speed": 1}, r"unknown section or key 'grond' \(did you mean 'ground'\?\)"),
+    ({"ground.speed": "fast"}, r'\[ground\]: speed = "fast" must be a number\.$'),
+    ({"ground.speed": True}, r"\[ground\]: speed = true must be a number\.$"),
+    ({"ground": 3}, r"\[ground\] must be a table of keys and values, not 3"),
+    ({"ground.speed.x": 3}, r"ground\.speed\.x cannot be set, because ground\.speed = 1\.0"),
+    ({"ground.wavelength": 0}, r"\[ground\]: wavelength = 0\.0 must be a finite number above"),
+    ({"friction.decay": -1}, r"s.toml: \[friction\]: decay = -1\.0 must be zero or above\.$"),
+    ({"friction.decay": "high"}, r'decay = "high" must be a number or a list of numbers\.$'),
+    ({"friction.decay": [1, 2, 3]}, r"\[friction\]: decay has 3 values for 4 contact nodes"),
+    ({"normal.roughness_height": -1}, r"\[normal\]: roughness_height = -1\.0 must be above zero"),
+    ({"drive.damping_y": -1}, r"\[drive\]: damping_y = -1\.0 must be a finite number, zero"),
+    ({"load.normal": float("inf")}, r"\[load\]: normal = inf must be finite"),
+    ({"gap": -1}, r"s.toml: gap = -1 must be finite and zero or above"),
+    ({"gap": "a"}, r's.toml: gap = "a" must be a number or a list of numbers'),
+    ({"gap": [0, 0]}, r"s.toml: gap has 2 values for 4 contact nodes"),
+    ({"body.material": "steal"}, r"\[body\]: There is no material 'steal' \(did you mean 'steel'"),
+    ({"body.material": 7}, r"\[body\]: material = 7 must be a text in quotes"),
+    ({"body.youngs_modulus": -1}, r"\[body\]: youngs_modulus = -1\.0 must be a finite number ab"),
+    ({"body.density": 0}, r"\[body\]: density = 0\.0 must be a finite number above zero"),
+    ({"body.poisson_ratio": 0.5}, r"\[body\]: poisson_ratio = 0\.5 must be above -1 and below"),
+    ({"body.thickness": -1}, r"s.toml: \[body\]: thickness = -1\.0 must be a finite number above"),
+    ({"body.plane": "stres"}, r'\[body\]: plane = "stres" must be "stress" or "strain"\.$'),
+    ({"body.degree": 3}, r"\[body\]: degree = 3 must be 1 or 2\.$"),
+    ({"body.fixed.left": "z"}, r'\[body\.fixed\]: left = "z" must be "x", "y" or "xy"\.$'),
+    ({"body.fixed.lft": "x"}, r"\[body\]: The mesh has no boundary or point 'lft'.*'left'"),
+    ({"basis.modes": 0}, r"\[basis\]: modes = 0 must be at least 1"),
+    ({"basis.modes": 9999}, r"s.toml: \[basis\]: modes = 9999 must be .*number of unknowns"),
+    ({"basis.contact_nodes": 999}, r"\[basis\]: contact_nodes = 999 must be 'all' or a whole"),
+    ({"basis.contact_nodes": "some"}, r'contact_nodes = "some" must be a whole number or "all"'),
+    ({"basis.contact_nodes": 0}, r'contact_nodes = 0 must be at least 1, or "all"'),
+    ({"basis.contact": "contct"}, r"\[basis\]: The mesh has no boundary named 'contct' \(did"),
+    ({"basis.B": {"at": "B"}}, r"\[basis\.B\] lacks the key 'radius'"),
+    ({"basis.C.radius": -1}, r"\[basis\.C\]: radius = -1\.0 must be a finite number above zero"),
+    ({"basis.B": 3}, r"\[basis\]: B = 3 must be a text in quotes, a list of two numbers or a tab"),
+    ({"basis.damping": [0.1]}, r"\[basis\]: Damping must be one ratio, 5 ratios"),
+    ({"basis.damping.mass_facto": 1}, r"cannot be set, because basis\.damping = 0\.01 is not a"),
+    ({"basis.points.tip": [9, 9]}, r"\[basis\]: Point tip: \(9, 9\) lies outside the body"),
+    ({"simulation.initial": "rst"}, r'initial = "rst" must be "rest", "sliding" or a table of'),
+    ({"simulation.initial": {"displacement": [0, 1]}},
+     r"\[simulation\.initial\]: displacement = \[0, 1\] must be a list of three numbers"),
+    ({"simulation.outputs": 3.5}, r"\[simulation\]: outputs = 3\.5 must be a whole number"),
+    ({"simulation.t_end": 0}, r"\[simulation\]: t_end = 0\.0 must be a finite time after"),
+    ({"simulation.rtol": 0}, r"\[simulation\]: rtol = 0\.0 must be a finite number above zero"),
+    ({"simulation.method": "Eulr"}, r"\[simulation\]: method = 'Eulr' must be one of"),
+    ({"geometry.shape": "bem"}, r"\[geometry\]: shape = \"bem\" must be one of .*mean 'beam'"),
+    ({"geometry.length": -1}, r"\[geometry\]: length = -1\.0 must be a finite number above zero"),
+    ({"geometry.file": "x.msh"}, r"\[geometry\] must have either a shape .* or the file of a"),
+    ({"render.size": [321, 240]}, r"\[render\]: size = \[321, 240\] must be an even width"),
+    ({"render.colour": "red"}, r'colour = "red" must be "displacement" or "von_mises"'),
+    ({"output.frames": -1}, r"\[output\]: frames = -1 must be zero or above"),
+    ({"output.points": [1.5]}, r"points = \[1\.5\] must be a list of texts in quotes or whole num"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), MISTAKES,
+                         ids=["-".join(changes) for changes, _ in MISTAKES])
+def test_mistakes_are_one_sentence_with_file_and_section(changes, message, tmp_path):
+    tiny = Study.from_toml(TINY, tmp_path / "s.toml")
+    with pytest.raises(FecontactError, match=message) as caught:
+        tiny.with_(**changes).run()
+    text = str(caught.value)
+    assert text.startswith(f"{tmp_path / 's.toml'}")
+    assert text.count("s.toml") == 1
+    assert text.endswith(".")
+    assert "\n" not in text
+
+
+def test_half_a_material_is_refused():
+    with pytest.raises(InputError, match="'density' alone does not describe a material"):
+        Study.from_toml('geometry = { shape = "beam" }\nbody = { density = 1.0 }')
+
+
+def test_geometry_and_end_of_run_are_needed():
+    with pytest.raises(InputError, match=r"lacks the section \[geometry\]"):
+        Study.from_toml("")
+    with pytest.raises(InputError, match=r"\[simulation\] lacks the key 't_end'"):
+        Study.from_toml('geometry = { shape = "beam" }').run()
+    with pytest.raises(InputError, match=r"\[geometry\] must have either a shape"):
+        Study.from_toml("[geometry]\nlength = 1.0")
+    with pytest.raises(InputError, match=r"scale = 0\.0 must be a finite number above zero"):
+        Study.from_toml('[geometry]\nfile = "a.msh"\nscale = 0')
+
+
+def test_files_that_are_no_studies(tmp_path):
+    (tmp_path / "beam.toml").write_text("[geometry]\nshape = beam\n")
+    with pytest.raises(InputError, match=r"beam\.toml is not valid TOML: .*line 2"):
+        Study.read(tmp_path / "beam.toml")
+    with pytest.raises(InputError, match=r"baem\.toml does not exist \(did you mean 'beam\.toml'"):
+        Study.read(tmp_path / "baem.toml")
+    with pytest.raises(InputError, match="cannot be read as a study"):
+        Study.read(tmp_path)
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(InputError, match="cannot be read as a study"):
+        Study.read(tmp_path / "binary.toml")
+
+
+def test_mesh_files_that_are_no_plane_meshes(tmp_path):
+    (tmp_path / "text.msh").write_text("hello")
+    (tmp_path / "solid.msh").write_text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
+        "$EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n")
+    for name, message in (("text.msh", "no complete section"), ("solid.msh", "solid|3-D|three"),
+                          ("none.msh", "there is no such file")):
+        study = Study.from_toml(f'[geometry]\nfile = "{name}"', tmp_path / "s.toml")
+        with pytest.raises((MeshError, InputError), match=message):
+            study.mesh()
