@@ -132,9 +132,8 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
 
 @app.command(sort_key=3)
 def modes(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
-    """Print the frequencies and damping of the modes, and draw their shapes."""
+    """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
     from fecontact.console import output_folder, waiting
-    from fecontact.report import modes_table
     from fecontact.results import read_study
 
     described = read_study(study, set_)
@@ -143,7 +142,7 @@ def modes(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             basis = described.basis()
-        _show(modes_table(basis))
+        _say(str(basis.report()))
         picture = folder / f"{described.name}-modes.png"
         plot_modes(basis, picture)
         _say_written(picture)

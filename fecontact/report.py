@@ -1,4 +1,4 @@
-"""What commands print of a mesh, of modes and of a run."""
+"""What commands print of a mesh and of a run."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -6,10 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.errors import InputError
-
 if TYPE_CHECKING:
-    from fecontact.basis import ModalBasis
     from fecontact.integrate.trajectory import Trajectory
     from fecontact.mesh import Mesh
 
@@ -41,20 +38,6 @@ def mesh_table(mesh: "Mesh") -> Any:
         ("x", f"{low[0]:g} ... {high[0]:g} m"), ("y", f"{low[1]:g} ... {high[1]:g} m"),
         ("area", f"{mesh.area:.4g} m²"), *groups, *points,
     ])
-
-
-def modes_table(basis: "ModalBasis") -> Any:
-    """Frequency, damping ratio and kind of each mode."""
-    try:
-        ratios = [f"{ratio:.3g}" for ratio in basis.damping_ratios]
-    except InputError:
-        ratios = ["not modal"] * basis.modes
-    rows = []
-    for number, (frequency, ratio) in enumerate(zip(basis.frequencies_hz, ratios, strict=True), 1):
-        rigid = frequency == 0.0
-        rows.append((str(number), f"{frequency:.4g}" if rigid else f"{frequency:.2f}",
-                     "" if rigid else ratio, "rigid" if rigid else "elastic"))
-    return table("mode", "frequency [Hz]", "damping ratio", "kind", rows=rows)
 
 
 def run_table(trajectory: "Trajectory") -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody
 from fecontact.errors import InputError, choices, nearest
+from fecontact.gap import Crown
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.drive import Drive, Load
@@ -37,7 +38,7 @@ from fecontact.tables import (
     to_table,
 )
 
-Gap = float | tuple[float, ...]
+Gap = float | tuple[float, ...] | Crown
 
 SHAPES: Mapping[str, type] = {"beam": Beam, "pendulum": Pendulum, "block": Block}
 
@@ -67,8 +68,9 @@ class Study:
     normal, friction, ground, drive, load
         ``[normal]``, ... : laws, ground, drive and load; see
         :class:`~fecontact.system.ContactSystem`.
-    gap : float or (n,) tuple
-        Initial distance of the contact nodes from flat ground [m]; stands above all sections.
+    gap : float, (n,) tuple or Crown
+        Initial distance of the contact nodes from flat ground [m], ``{radius, centre}`` for a
+        face that is an arc; stands above all sections.
     simulation : SimulationSettings
         ``[simulation]``
     output : OutputSettings
@@ -292,6 +294,7 @@ def _geometry(table: Any, where: str) -> Any:
 
 def _gap(value: Any, title: str) -> Gap:
     gap: Gap = convert(value, Gap, title, "gap")
-    if not all(0.0 <= item < float("inf") for item in (gap if isinstance(gap, tuple) else (gap,))):
+    numbers = () if isinstance(gap, Crown) else gap if isinstance(gap, tuple) else (gap,)
+    if not all(0.0 <= number < float("inf") for number in numbers):
         raise InputError(f"{title}: gap = {shown(value)} must be finite and zero or above.")
     return gap

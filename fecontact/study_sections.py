@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
-from fecontact.damping import Rayleigh
-from fecontact.errors import InputError, choices, require_positive
+from fecontact.damping import Damping, LossFactor, Rayleigh
+from fecontact.errors import InputError, choices, require_not_negative, require_positive
 from fecontact.integrate.initial import RigidStart
 from fecontact.mesh import Mesh
 from fecontact.points import Patch
@@ -104,6 +104,22 @@ class BodySettings:
 
 
 @dataclass(frozen=True)
+class Loss:
+    """``damping = { loss_factor = value }``; see :class:`fecontact.damping.LossFactor`.
+
+    Parameters
+    ----------
+    loss_factor : float
+        Twice the damping ratio of all modes, zero or above.
+    """
+
+    loss_factor: float
+
+    def __post_init__(self) -> None:
+        require_not_negative("Loss", loss_factor=self.loss_factor)
+
+
+@dataclass(frozen=True)
 class BasisSettings:
     """``[basis]``: modes and points; see :meth:`fecontact.body.ElasticBody.modal_basis`.
 
@@ -119,8 +135,17 @@ class BasisSettings:
         ``{at = name or [x, y], radius = r}``.
     points : mapping of name to place
         Further points to observe.
-    damping : float, list or Rayleigh
-        One damping ratio, one per mode, or ``{mass_factor, stiffness_factor}``.
+    damping : float, list, Rayleigh or Loss
+        One damping ratio, one per mode, ``{mass_factor, stiffness_factor}`` or
+        ``{loss_factor}``.
+    reduction : 'vibration', 'residual' or 'craig-bampton'
+        What completes the vibration modes.
+    tolerance : float
+        For 'residual': part of the static compliance at the points that may be missing.
+    dashpots : mapping of point to [b_x, b_y]
+        Between points, or contact nodes by number, and the inertial frame [N s/m].
+    select : list, optional
+        Numbers of the modes to keep, from 0; all by default.
     """
 
     modes: int = 20
@@ -129,7 +154,11 @@ class BasisSettings:
     B: Place | None = None
     C: Place | None = None
     points: Mapping[str, Place] = field(default_factory=dict)
-    damping: float | tuple[float, ...] | Rayleigh = 0.0
+    damping: float | tuple[float, ...] | Rayleigh | Loss = 0.0
+    reduction: Literal["vibration", "residual", "craig-bampton"] = "vibration"
+    tolerance: float = 0.1
+    dashpots: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    select: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.modes < 1:
@@ -140,9 +169,16 @@ class BasisSettings:
 
     def basis(self, body: ElasticBody) -> ModalBasis:
         """The modal basis of a body."""
-        return body.modal_basis(self.modes, contact=self.contact,
-                                contact_nodes=self.contact_nodes, B=self.B, C=self.C,
-                                points=self.points, damping=self.damping)
+        given = self.damping
+        damping: Damping = LossFactor(given.loss_factor) if isinstance(given, Loss) else given
+        basis = body.modal_basis(
+            self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
+            C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
+            damping=damping)
+        if self.dashpots:
+            basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
+                                         for point, values in self.dashpots.items()})
+        return basis if self.select is None else basis.select(self.select)
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,11 @@ class _MismatchError(Exception):
 
 
 def _converted(value: Any, hint: Any, where: str) -> Any:
-    for option in _options(hint):
+    options = _options(hint)
+    if isinstance(value, Mapping):
+        # Of several tables that may stand here, the one that shares the most keys is meant.
+        options = sorted(options, key=lambda option: -_shared_keys(option, value))
+    for option in options:
         try:
             return _converted_to(value, option, where)
         except _MismatchError:
@@ -200,7 +204,11 @@ def _converted_to(value: Any, hint: Any, where: str) -> Any:
     raise _MismatchError
 
 
-def _options(hint: Any) -> tuple[Any, ...]:
+def _shared_keys(hint: Any, table: Mapping[str, Any]) -> int:
+    return sum(entry.name in table for entry in fields(hint)) if is_dataclass(hint) else 0
+
+
+def _options(hint: Any) -> Sequence[Any]:
     return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
 
 

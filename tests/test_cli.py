@@ -71,9 +71,9 @@ def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
     code, out, _ = cli("modes", "beam.toml", *small)
     assert code == 0
     assert out.count("rigid") == 3
-    assert out.count("elastic") == 3
+    assert out.count("vibration") == 3
     # Euler-Bernoulli: first bending frequency of a free beam, 0.2 m x 4 mm of steel
-    first = next(line for line in out.splitlines() if "elastic" in line)
+    first = next(line for line in out.splitlines() if "vibration" in line)
     assert float(first.split()[1]) == pytest.approx(531.6, rel=5e-3)
 
     code, out, err = cli("run", "beam.toml", *small)

@@ -136,6 +136,26 @@ def test_changes_by_dotted_names(tiny):
     assert changed.load == tiny.load
 
 
+def test_basis_keys_reach_the_basis(tiny):
+    plain = tiny.basis()
+    damped = tiny.with_(**{"basis.dashpots": {"B": [2.0, 0.0], "3": [0.0, 5.0]}}).basis()
+    rows = plain.T[0, 0], plain.T[2 + 3, 1]
+    np.testing.assert_allclose(
+        damped.damping, plain.damping + 2.0 * np.outer(rows[0], rows[0])
+        + 5.0 * np.outer(rows[1], rows[1]), rtol=1e-12, atol=1e-12)
+    assert tiny.with_(**{"basis.select": [0, 1, 3]}).basis().modes == 3
+    assert tiny.with_(**{"basis.reduction": "residual", "basis.tolerance": 0.0}).basis().modes > 5
+    lossy = tiny.with_(**{"basis.damping": {"loss_factor": 0.04}}).basis()
+    np.testing.assert_allclose(lossy.damping_ratios[3:], 0.02)
+
+
+def test_gap_of_a_crowned_face(tiny):
+    crowned = tiny.with_(gap={"radius": 2.0, "centre": 0.05})
+    x = crowned.basis().contact_x
+    np.testing.assert_allclose(crowned.system().gap, (x - 0.05) ** 2 / 4.0, rtol=1e-3)
+    assert Study.from_toml(crowned.to_toml()) == crowned
+
+
 def test_another_shape_when_nothing_was_said_of_the_first():
     study = Study.from_toml('geometry = { shape = "beam" }')
     assert study.with_(**{"geometry.shape": "block"}).geometry == Block()
@@ -187,7 +207,7 @@ MISTAKES = [
     ({"drive.damping_y": -1}, r"\[drive\]: damping_y = -1\.0 must be a finite number, zero"),
     ({"load.normal": float("inf")}, r"\[load\]: normal = inf must be finite"),
     ({"gap": -1}, r"s.toml: gap = -1 must be finite and zero or above"),
-    ({"gap": "a"}, r's.toml: gap = "a" must be a number or a list of numbers'),
+    ({"gap": "a"}, r's.toml: gap = "a" must be a number, a list of numbers or a table of'),
     ({"gap": [0, 0]}, r"s.toml: gap has 2 values for 4 contact nodes"),
     ({"body.material": "steal"}, r"\[body\]: There is no material 'steal' \(did you mean 'steel'"),
     ({"body.material": 7}, r"\[body\]: material = 7 must be a text in quotes"),
@@ -209,6 +229,13 @@ MISTAKES = [
     ({"basis.C.radius": -1}, r"\[basis\.C\]: radius = -1\.0 must be a finite number above zero"),
     ({"basis.B": 3}, r"\[basis\]: B = 3 must be a text in quotes, a list of two numbers or a tab"),
     ({"basis.damping": [0.1]}, r"\[basis\]: Damping must be one ratio, 5 ratios"),
+    ({"basis.damping": {"mass_facto": 1}}, r"\[basis\.damping\] has no key 'mass_facto' \(did you"),
+    ({"basis.damping": {"loss_factor": -1}}, r"\[basis\.damping\]: loss_factor = -1\.0 must be"),
+    ({"basis.reduction": "guyan"}, r'reduction = "guyan" must be "vibration", "residual" or "cra'),
+    ({"basis.select": [7]}, r"\[basis\]: modes \[7\] must be different numbers from 0 to 4"),
+    ({"basis.dashpots": {"D": [1, 1]}}, r"\[basis\]: There is no point 'D'"),
+    ({"gap": {"radius": -1}}, r"s.toml: \[gap\]: radius = -1\.0 must be a finite number above"),
+    ({"gap": [0, -1, 0, 0]}, r"s.toml: gap = \[0, -1, 0, 0\] must be finite and zero or above"),
     ({"basis.damping.mass_facto": 1}, r"cannot be set, because basis\.damping = 0\.01 is not a"),
     ({"basis.points.tip": [9, 9]}, r"\[basis\]: Point tip: \(9, 9\) lies outside the body"),
     ({"simulation.initial": "rst"}, r'initial = "rst" must be "rest", "sliding" or a table of'),
