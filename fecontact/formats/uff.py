@@ -1,0 +1,298 @@
+"""Universal files (UFF, UNV) of modes, as test laboratories and preprocessors write them.
+
+Read by pyuff: data sets 55 (data at nodes), 15 and 2411 (nodes), 164 (units), 2420 (coordinate
+systems). Set 55 carries six digits.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.errors import InputError, MissingLibraryError
+
+if TYPE_CHECKING:
+    from fecontact.basis import ModalBasis
+
+Array = NDArray[np.float64]
+
+_NORMAL_MODES, _COMPLEX_MODES = 2, (3, 7)
+_DISPLACEMENTS = (0, 1, 8)  # unknown, general, displacement
+_REAL_ENOUGH = 0.1
+_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class UffModes:
+    """Modes of a universal file, in SI units where the file says its own.
+
+    Attributes
+    ----------
+    frequencies_hz : (m,) array
+        Undamped eigenfrequencies [Hz].
+    shapes : (N, 3, m) or (N, 6, m) array
+        Displacements x, y, z (and rotations about x, y, z); zero at nodes that a mode leaves out.
+    node_labels : (N,) integer array
+        Ascending.
+    coordinates : (N, 3) array
+        Places of the nodes [m]; not a number where the file does not give them.
+    damping_ratios : (m,) array
+        Viscous damping ratios, half the hysteretic ones where only these are given.
+    modal_masses : (m,) array or None
+        None where the file does not give them for every mode.
+    source : str
+        The file, for messages.
+    """
+
+    frequencies_hz: Array
+    shapes: Array
+    node_labels: NDArray[np.int64]
+    coordinates: Array
+    damping_ratios: Array
+    modal_masses: Array | None
+    source: str
+
+    def modal_basis(
+        self,
+        contact: Sequence[int],
+        *,
+        B: int | None = None,
+        C: int | None = None,
+        points: Mapping[str, int] | None = None,
+        axes: tuple[str, str] = ("x", "y"),
+        modal_mass: ArrayLike | None = None,
+        damping: Any = None,
+        contact_x: ArrayLike | None = None,
+        tributary: ArrayLike | None = None,
+    ) -> "ModalBasis":
+        """The modal basis with points of interest at nodes of the file.
+
+        Parameters
+        ----------
+        contact : sequence of int
+            Labels of the contact nodes.
+        B, C : int, optional
+            Labels of excitation and load point; without, they do not move.
+        points : mapping of name to label, optional
+            Further points.
+        axes : (str, str)
+            The file's directions that are x, along the ground, and y, away from it: 'x', 'y' or
+            'z', with a minus sign for the opposite direction.
+        modal_mass : float or (m,) array, optional
+            In the place of the file's modal masses [kg].
+        damping : float, (m,) sequence, Rayleigh or (m, m) array, optional
+            In the place of the file's damping ratios.
+        contact_x, tributary : (n,) arrays, optional
+            As for :meth:`ModalBasis.from_modes`; the default for contact_x is the file's.
+
+        Raises
+        ------
+        InputError
+            For labels that are not there, axes that are not at right angles, and where neither
+            the file nor the call gives modal masses.
+        """
+        from fecontact.basis import ModalBasis
+        from fecontact.rows import rows_from_dofs
+
+        (first, sign_x), (second, sign_y) = self._axis(axes[0]), self._axis(axes[1])
+        if first == second:
+            raise InputError(f"{self.source}: axes = {axes!r} must be two different directions.")
+        masses = self.modal_masses if modal_mass is None else modal_mass
+        if masses is None:
+            raise InputError(f"{self.source}: the file does not give the modal masses; give "
+                             f"modal_mass, 1 for mass-normalised shapes.")
+        out_of_plane = 3 - first - second
+        turn = sign_x * sign_y * (1.0 if (second - first) % 3 == 1 else -1.0)
+        components = [sign_x * self.shapes[:, first], sign_y * self.shapes[:, second]]
+        if self.shapes.shape[1] == 6:
+            components.append(turn * self.shapes[:, 3 + out_of_plane])
+        shapes = np.stack(components, axis=1)
+        N, width, m = shapes.shape
+
+        def dofs(label: int) -> list[int]:
+            return [width * self.node(label) + k for k in range(width)]
+
+        def place(label: int | None) -> list[int] | None:
+            return None if label is None else dofs(label)
+
+        rows = rows_from_dofs(
+            N * width, [dofs(label) for label in contact], B=place(B), C=place(C),
+            points={name: dofs(label) for name, label in (points or {}).items()})
+        if contact_x is None:
+            where = sign_x * self.coordinates[[self.node(label) for label in contact], first]
+            contact_x = where if np.isfinite(where).all() else None
+        return ModalBasis.from_modes(
+            shapes.reshape(-1, m), rows, frequencies_hz=self.frequencies_hz, modal_mass=masses,
+            damping=self.damping_ratios if damping is None else damping, contact_x=contact_x,
+            tributary=tributary)
+
+    def node(self, label: int) -> int:
+        """Place of a node in the arrays; InputError if the file does not have it."""
+        at = int(np.searchsorted(self.node_labels, label))
+        if at == len(self.node_labels) or self.node_labels[at] != label:
+            raise InputError(f"{self.source}: there is no node {label!r} in the modes; its nodes "
+                             f"run from {self.node_labels[0]} to {self.node_labels[-1]}.")
+        return at
+
+    def _axis(self, name: str) -> tuple[int, float]:
+        letter = str(name).removeprefix("-").removeprefix("+")
+        if letter not in _AXES:
+            raise InputError(f"{self.source}: axis {name!r} must be 'x', 'y' or 'z', with a minus "
+                             f"sign for the opposite direction.")
+        return _AXES.index(letter), -1.0 if str(name).startswith("-") else 1.0
+
+
+def read_uff(path: str | Path) -> UffModes:
+    """Read the modes of a universal file (.uff, .unv).
+
+    Complex modes are turned to the phase in which they are most nearly real, and what is then
+    left of their imaginary part is dropped.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Raises
+    ------
+    MissingLibraryError
+        If pyuff is not installed.
+    InputError
+        If there is no such file, it is damaged or holds no modes, or a mode is not in
+        displacements, or far from real.
+    """
+    path = Path(path)
+    sets = _data_sets(path)
+    try:
+        return _modes(sets, str(path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _data_sets(path: Path) -> list[dict[str, Any]]:
+    try:
+        import pyuff
+    except ImportError:
+        raise MissingLibraryError("Universal files are read by pyuff, which is not installed: "
+                                  "pip install pyuff") from None
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file.")
+    try:
+        file = pyuff.UFF(str(path))
+        kinds = file.get_set_types()
+        wanted = [k for k, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2420)]
+        # One at a time: what pyuff returns for one set is no list, and its message for several
+        # does not say which one is damaged.
+        sets = []
+        for k in wanted:
+            try:
+                sets.append(file.read_sets(k))
+            except Exception:
+                raise InputError(f"{path}: data set {k + 1} of the file, of type {kinds[k]}, "
+                                 f"cannot be read; it is damaged or in a form that pyuff does not "
+                                 f"know.") from None
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{path}: the file cannot be read as a universal file "
+                         f"({error}).") from None
+    return sets
+
+
+def _modes(sets: list[dict[str, Any]], source: str) -> UffModes:
+    modes = [one for one in sets
+             if one["type"] == 55 and one["analysis_type"] in (_NORMAL_MODES, *_COMPLEX_MODES)]
+    if not modes:
+        raise InputError("The file holds no modes; they are read from data sets 55 of normal or "
+                         "complex modes (not from 2414).")
+    for number, mode in enumerate(modes, 1):
+        _require_displacements(mode, number)
+    labels = np.unique(np.concatenate([mode["node_nums"] for mode in modes])).astype(np.int64)
+    width = max(int(mode["n_data_per_node"]) for mode in modes)
+    shapes = np.zeros((len(labels), width, len(modes)))
+    scalars = np.zeros((3, len(modes)))
+    for k, mode in enumerate(modes):
+        values, scalars[:, k] = _one_mode(mode, k + 1)
+        shapes[np.searchsorted(labels, mode["node_nums"]), : values.shape[1], k] = values
+    frequencies, ratios, masses = scalars
+    length, force = _units(sets)
+    shapes[:, :3] /= length
+    return UffModes(
+        frequencies_hz=frequencies,
+        shapes=shapes,
+        node_labels=labels,
+        coordinates=_coordinates(sets, labels) / length,
+        damping_ratios=ratios,
+        modal_masses=masses / (force * length) if (masses > 0.0).all() else None,
+        source=source,
+    )
+
+
+def _require_displacements(mode: Mapping[str, Any], number: int) -> None:
+    if mode["spec_data_type"] not in _DISPLACEMENTS:
+        raise InputError(f"Mode {number} holds data of type {mode['spec_data_type']}, not "
+                         f"displacements (8); export the mode shapes as displacements.")
+    if mode["n_data_per_node"] not in (3, 6) or mode["data_ch"] not in (0, 2, 3):
+        raise InputError(f"Mode {number} has {mode['n_data_per_node']} values at a node (data "
+                         f"characteristic {mode['data_ch']}); there must be 3 displacements, or 3 "
+                         f"displacements and 3 rotations.")
+
+
+def _one_mode(mode: Mapping[str, Any], number: int) -> tuple[Array, tuple[float, float, float]]:
+    """Real shape (k, 3 or 6), and frequency [Hz], damping ratio and modal mass (0: unknown)."""
+    columns = [mode[f"r{k + 1}"] for k in range(mode["n_data_per_node"])]
+    if any(len(column) != len(mode["node_nums"]) for column in columns):
+        raise InputError(f"Mode {number} has another number of values than "
+                         f"{len(columns)} at each of its nodes.")
+    values = np.stack(columns, axis=1)
+    turn = 1.0 + 0.0j
+    if np.iscomplexobj(values):
+        # The phase that makes the sum of squares of the real parts largest.
+        turn = np.exp(-0.5j * np.angle((values**2).sum()))
+        values = values * turn
+        rest = float(np.linalg.norm(values.imag)) / (float(np.linalg.norm(values)) or 1.0)
+        if rest > _REAL_ENOUGH:
+            raise InputError(f"Mode {number} is complex: its imaginary part is {rest:.2g} of it in "
+                             f"the best phase, more than {_REAL_ENOUGH:g}; identify real (normal) "
+                             f"modes.")
+        values = values.real
+    if mode["analysis_type"] == _NORMAL_MODES:
+        ratio = mode["modal_damp_vis"] or 0.5 * mode["modal_damp_his"]
+        return values, (mode["freq"], ratio, mode["modal_m"])
+    root = complex(mode["eig"])
+    w = abs(root)
+    # Modal A of a proportionally damped system is 2 i w_d times the modal mass.
+    mass = float((complex(mode["modal_a"]) * turn**2).imag) / (2.0 * abs(root.imag) or np.inf)
+    return values, (w / (2.0 * np.pi), -root.real / w if w else 0.0, abs(mass))
+
+
+def _units(sets: list[dict[str, Any]]) -> tuple[float, float]:
+    """Units of the file per metre and per newton; one without a data set 164."""
+    for one in sets:
+        if one["type"] == 164:
+            length, force = float(one["length"]), float(one["force"])
+            if not (length > 0.0 and force > 0.0):
+                raise InputError(f"The units of the file (data set 164) are {length:g} per metre "
+                                 f"and {force:g} per newton; both must be above zero.")
+            return length, force
+    return 1.0, 1.0
+
+
+def _coordinates(sets: list[dict[str, Any]], labels: NDArray[np.int64]) -> Array:
+    """Places (N, 3) of the nodes in the file's unit, not a number where it does not give them."""
+    for one in sets:
+        if one["type"] == 2420 and not all(
+                np.array_equal(matrix, np.eye(4, 3)) for matrix in one["CS_matrices"]):
+            raise InputError("The file has local coordinate systems (data set 2420); export it in "
+                             "the global one.")
+    places = np.full((len(labels), 3), np.nan)
+    for one in sets:
+        if one["type"] in (15, 2411):
+            numbers = np.asarray(one["node_nums"], dtype=np.int64)
+            xyz = np.column_stack([one["x"], one["y"], one["z"]])
+            known = np.isin(numbers, labels)
+            places[np.searchsorted(labels, numbers[known])] = xyz[known]
+    return places
