@@ -54,10 +54,11 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
     # Where only the y direction is driven, the motion in x has nothing to show.
     drive = system.drive
     vertical = drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0
+    middle = system.basis.contact_nodes // 2
+    point = points[0] if points else "B" if system.basis.T[0].any() else middle
     return [
         plots.plot_history(trajectory, file("history"), points),
-        plots.plot_phase(trajectory, file("phase"), points[0] if points else "B",
-                         "y" if vertical else "x"),
+        plots.plot_phase(trajectory, file("phase"), point, "y" if vertical else "x"),
         plots.plot_contact_map(trajectory, file("contact")),
         plots.plot_energies(trajectory, file("energies")),
     ]

@@ -247,6 +247,10 @@ class Study:
     def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; ``progress`` is called with the time [s]."""
         settings, t_end, system = self.simulation, self.t_end, self.system()
+        with located(f"{_title(self.path)}: [output]:"):
+            # Found out after a long run, a wrong name would be found out too late.
+            for point in self.output.points:
+                system.basis.point_index(point)
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=settings.initial, outputs=settings.outputs,

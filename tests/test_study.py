@@ -251,6 +251,8 @@ MISTAKES = [
     ({"render.size": [321, 240]}, r"\[render\]: size = \[321, 240\] must be an even width"),
     ({"render.colour": "red"}, r'colour = "red" must be "displacement" or "von_mises"'),
     ({"output.frames": -1}, r"\[output\]: frames = -1 must be zero or above"),
+    ({"output.points": ["D"]}, r"\[output\]: There is no point 'D'"),
+    ({"output.points": [4]}, r"\[output\]: Contact node 4 does not exist"),
     ({"output.points": [1.5]}, r"points = \[1\.5\] must be a list of texts in quotes or whole num"),
 ]
 
