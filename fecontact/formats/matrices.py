@@ -130,7 +130,10 @@ def _from_hdf5(item: Any) -> Any:
     import scipy.sparse as sp
 
     if isinstance(item, h5py.Dataset):
-        return item[()].T if not item.attrs.get("MATLAB_empty", 0) else np.zeros((0, 0))
+        if item.attrs.get("MATLAB_class", b"double") in (b"char", b"cell") or item.dtype.kind == "O":
+            return None
+        value = item[()].T
+        return value["real"] + 1j * value["imag"] if value.dtype.names else value
     if "MATLAB_sparse" not in item.attrs:
         return None
     starts = item["jc"][()].astype(np.int64)
@@ -158,7 +161,7 @@ def _read_npy(path: Path, name: str | None) -> tuple[Any, None]:
 def _chosen(variables: Mapping[str, Any], name: str | None) -> Any:
     """The variable of that name, or the only matrix among them."""
     matrices = {key: value for key, value in variables.items()
-                if getattr(value, "ndim", 0) == 2 and value.dtype.kind in "biufcV"}
+                if getattr(value, "ndim", 0) == 2 and value.dtype.kind in "biufc"}
     if name is None:
         large = {key: value for key, value in matrices.items() if min(value.shape) > 1} or matrices
         if len(large) != 1:
@@ -179,7 +182,7 @@ def _require_no_name(name: str | None) -> None:
 def _real(path: Path, matrix: Any) -> Any:
     import scipy.sparse as sp
 
-    if matrix.dtype.kind in "cV":
+    if matrix.dtype.kind == "c":
         raise InputError(f"{path}: the matrix is complex; write its real part.")
     if matrix.ndim != 2 or matrix.dtype.kind not in "biuf":
         raise InputError(f"{path}: the array of shape {matrix.shape} and type {matrix.dtype} is "
