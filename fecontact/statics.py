@@ -58,7 +58,12 @@ def static_equilibrium(
             ground_motion_parameters=np.array([travel], dtype=float),
         )
     problem = _Balance(arrays)
+    origin = np.zeros(len(arrays.constant_load))
+    if not problem.force(origin, 1.0).any():
+        return origin
     solution = problem.solve(problem.guess(1.0), 1.0)
+    if solution is None:
+        solution = problem.solve(problem.descend(problem.guess(1.0), 1.0), 1.0)
     if solution is None:
         solution = _continued(problem)
     if solution is None:
@@ -75,11 +80,13 @@ class _Balance:
         m = len(self.load)
         self._rate, self._matrix = np.empty(2 * m), np.empty((2 * m, 2 * m))
         self._state = np.zeros(2 * m)
-        # Stiffness of a face with every asperity in contact, and what offset force it has.
+        # Stiffness of a face with every asperity in contact, and its force on undisplaced nodes.
         far = 1e3 * np.max(np.abs(arrays.normal_parameters[:, 1]))
         values = np.array([_normal(arrays, far, j) for j in range(len(arrays.gap))])
         self.face_stiffness = values[:, 1]
-        self.face_offset = values[:, 1] * far - values[:, 0]
+        undisplaced = np.empty((len(arrays.gap), kernels.STATE_COLUMNS))
+        kernels.contact_state(0.0, self._state, arrays, undisplaced)
+        self.face_force = values[:, 0] + values[:, 1] * (undisplaced[:, kernels.PENETRATION] - far)
         tangential = (arrays.Tx**2).T @ self.face_stiffness
         normal = (arrays.Ty**2).T @ self.face_stiffness
         diagonal = np.diag(arrays.stiffness)
@@ -105,8 +112,7 @@ class _Balance:
         """Equilibrium of a face that is all in contact, and that could also pull."""
         arrays = self.arrays
         stiffness = arrays.stiffness + (arrays.Ty.T * self.face_stiffness) @ arrays.Ty
-        flat = arrays.gap * self.face_stiffness + self.face_offset
-        force = load * self.load - arrays.Ty.T @ flat
+        force = load * self.load + arrays.Ty.T @ self.face_force
         return self._solve(stiffness, force, 1e-10)
 
     def solve(self, q: Array, load: float) -> Array | None:
@@ -135,12 +141,56 @@ class _Balance:
                     return q
         return None
 
-    def holds(self, q: Array) -> tuple[Array, Array]:
-        """Relative stiffnesses (ascending) and their directions (m, k) at q."""
+    def descend(self, q: Array, load: float) -> Array:
+        """Newton steps, each as long as the body is pushed along it.
+
+        Without friction there is a convex potential, which falls to its minimum this way, however
+        far the ground is and whichever nodes come into contact. Ends where it does not go on.
+        """
+        for _ in range(200):
+            force = self.force(q, load)
+            step = self._solve(self._upright(q), force, 1e-10)
+            low, high = 0.0, 1.0
+            if force @ step <= 0.0 or self._size(force) <= self._noise(q, load):
+                return q
+            while self.force(q + high * step, load) @ step < 0.0:
+                low, high = (0.0, 0.1 * high) if low == 0.0 else (low, high)
+                if high < 1e-14:
+                    return q
+                if self.force(q + high * step, load) @ step >= 0.0:
+                    low, high = high, 10.0 * high
+                    break
+            if low > 0.0:
+                for _ in range(30):
+                    middle = 0.5 * (low + high)
+                    pushed = self.force(q + middle * step, load) @ step >= 0.0
+                    low, high = (middle, high) if pushed else (low, middle)
+                high = low
+            q = q + high * step
+        return q
+
+    def _upright(self, q: Array) -> Array:
+        """Stiffness (m, m) at q, symmetric: of ground that is level under each node."""
+        arrays = self.arrays
+        n = len(arrays.gap)
+        self._state[: len(q)] = q
+        state, force, slope = np.empty((n, kernels.STATE_COLUMNS)), np.empty(n), np.empty(n)
+        kernels.contact_state(0.0, self._state, arrays, state)
+        kernels.normal_values(arrays.normal, state[:, kernels.PENETRATION].copy(), np.zeros(n),
+                              arrays.normal_parameters, force, slope)
+        return np.asarray(arrays.stiffness + (arrays.Ty.T * slope) @ arrays.Ty)
+
+    def loose(self, q: Array) -> Array | None:
+        """Direction (m,) in which the body is pushed at q and nothing holds it, if there is one."""
         root = np.sqrt(self.scale)
         scaled = -self.gradient(q) / np.outer(root, root)
         _, values, rows = np.linalg.svd(scaled)
-        return np.asarray(values[::-1]), np.asarray((rows[::-1] / root).T)
+        loose = rows[values < 1e-9]
+        force = self.force(q, 1.0) / root
+        push = loose.T @ (loose @ force)
+        if np.linalg.norm(push) <= 1e-9 * np.linalg.norm(force):
+            return None
+        return np.asarray(push / root)
 
     def _solve(self, stiffness: Array, force: Array, shift: float) -> Array:
         return np.asarray(np.linalg.solve(stiffness + np.diag(shift * self.scale), force))
@@ -182,27 +232,23 @@ def _continued(problem: _Balance) -> Array | None:
 
 def _reason(system: ContactSystem, problem: _Balance, friction: bool) -> str:
     kind = "steady sliding" if friction else "static equilibrium"
-    q = problem.guess(1.0)
-    values, directions = problem.holds(q)
-    force = problem.force(q, 1.0)
-    for value, direction in zip(values, directions.T, strict=True):
-        if value > 1e-9:
-            break
-        pull = abs(direction @ force)
-        if pull > 1e-9 * np.linalg.norm(direction) * np.linalg.norm(force):
-            return (f"There is no {kind}: nothing holds the body against "
-                    f"{_named(system, direction)}; give it a spring at B (drive.stiffness_x, "
-                    f"drive.stiffness_y) or a support.")
+    direction = problem.loose(problem.guess(1.0))
+    if direction is not None:
+        return (f"There is no {kind}: nothing holds the body against "
+                f"{_named(system, direction)}; give it a spring at B (drive.stiffness_x, "
+                f"drive.stiffness_y) or a support.")
     return (f"There is no {kind}: under load.normal = {system.load.normal:g} N the body lifts off "
             f"or tips over; check the sign and place of the load, and the length of the contact.")
 
 
 def _named(system: ContactSystem, direction: Array) -> str:
-    motion = system.basis.contact_T @ direction
-    x, y = np.abs(motion[:, 0]).max(), np.abs(motion[:, 1]).max()
+    basis = system.basis
+    x, y, turn = np.abs(basis.contact_T @ direction).max(axis=0)
+    size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
+    if turn * size > 0.1 * max(x, y):
+        return "a rotation"
     if x > 10.0 * y:
         return "a translation along the ground (x)"
-    spread = np.ptp(motion[:, 1])
-    if y > 10.0 * x and spread < 0.1 * y:
+    if y > 10.0 * x:
         return "a translation away from the ground (y)"
-    return "a rotation"
+    return "a translation"
