@@ -130,7 +130,7 @@ def _from_hdf5(item: Any) -> Any:
     import scipy.sparse as sp
 
     if isinstance(item, h5py.Dataset):
-        if item.attrs.get("MATLAB_class", b"double") in (b"char", b"cell") or item.dtype.kind == "O":
+        if item.attrs.get("MATLAB_class") in (b"char", b"cell"):
             return None
         value = item[()].T
         return value["real"] + 1j * value["imag"] if value.dtype.names else value
