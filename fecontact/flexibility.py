@@ -118,8 +118,8 @@ def residual_modes(
 
 def diagonalised(system: FreeSystem, vectors: Array) -> tuple[Array, Array]:
     """Squared frequencies (p,) and mass-normalised shapes (f, p) of the span of some vectors."""
-    K, M = system.stiffness, system.mass
-    stiffness, mass = vectors.T @ (K @ vectors), vectors.T @ (M @ vectors)
+    stiffness = vectors.T @ (system.stiffness @ vectors)
+    mass = vectors.T @ (system.mass @ vectors)
     scale = 1.0 / np.sqrt(np.diag(stiffness))
     values, directions = np.linalg.eigh(stiffness * np.outer(scale, scale))
     kept = values > 1e-11 * values[-1]
@@ -127,6 +127,8 @@ def diagonalised(system: FreeSystem, vectors: Array) -> tuple[Array, Array]:
     inverse, turned = np.linalg.eigh(span.T @ mass @ span)
     inverse, turned = inverse[::-1], turned[:, ::-1]
     shapes = vectors @ (span @ (turned / np.sqrt(inverse)))
-    # One symmetric step squares what round-off has left of the orthogonality.
-    shapes = shapes @ (1.5 * np.eye(len(inverse)) - 0.5 * (shapes.T @ (M @ shapes)))
+    if inverse[0] * values[-1] > 1e6 * inverse[-1] * values[kept][0]:
+        # One symmetric step squares what round-off has left of the orthogonality.
+        gram = shapes.T @ (system.mass @ shapes)
+        shapes = shapes @ (1.5 * np.eye(len(gram)) - 0.5 * gram)
     return 1.0 / inverse, shapes * fixed_signs(shapes)

@@ -1,5 +1,8 @@
 """Substitutions with sparse triangular factors for many sparse right-hand sides at once."""
 
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -14,10 +17,10 @@ _index = types.Array(types.int32, 1, "C")
 _flags = types.Array(types.boolean, 1, "C")
 
 # Columns treated at once: enough to vectorise, few enough for the cache.
-_BLOCK = 64
+_BLOCK = 32
 
 
-@kernel(types.void(_index, _index, vector, matrix, _flags))
+@kernel(types.void(_index, _index, vector, matrix, _flags), nogil=True)
 def _forward(indptr, indices, data, x, active):  # type: ignore[no-untyped-def]
     """Solve L x = b in place, L unit lower triangular by columns; zero rows are passed over."""
     n, width = x.shape
@@ -32,7 +35,7 @@ def _forward(indptr, indices, data, x, active):  # type: ignore[no-untyped-def]
                         x[i, c] -= entry * x[j, c]
 
 
-@kernel(types.void(_index, _index, vector, matrix))
+@kernel(types.void(_index, _index, vector, matrix), nogil=True)
 def _backward(indptr, indices, data, x):  # type: ignore[no-untyped-def]
     """Solve L^T x = b in place."""
     n, width = x.shape
@@ -68,8 +71,8 @@ class SymmetricFactors:
         """
         size, count = len(self.order), rows.shape[0]
         columns = rows.tocsr()
-        blocks, places = [], np.zeros(size, dtype=bool)
-        for first in range(0, count, _BLOCK):
+
+        def solved(first: int) -> tuple[NDArray[np.int64], Array]:
             part = columns[first : first + _BLOCK].tocoo()
             x = np.zeros((size, part.shape[0]))
             x[self.order[part.coords[1]], part.coords[0]] = part.data
@@ -77,8 +80,12 @@ class SymmetricFactors:
             active[self.order[part.coords[1]]] = True
             _forward(*self.L, x, active)
             reached = np.flatnonzero(active)
-            places |= active
-            blocks.append((reached, x[reached]))
+            return reached, x[reached]
+
+        blocks = _in_threads(solved, range(0, count, _BLOCK))
+        places = np.zeros(size, dtype=bool)
+        for reached, _ in blocks:
+            places[reached] = True
         kept = np.flatnonzero(places)
         result = np.zeros((len(kept), count))
         column = 0
@@ -89,9 +96,20 @@ class SymmetricFactors:
 
     def completed(self, places: NDArray[np.int64], half: Array) -> Array:
         """``A^-1 W^T C`` (n, p) from combinations ``half @ C`` (r, p) of half-solved columns."""
-        x = np.zeros((len(self.order), half.shape[1]))
-        x[places] = half / np.sqrt(self.diagonal[places, None])
-        _backward(*self.L, x)
-        return x[self.order]
+        scaled = half / np.sqrt(self.diagonal[places, None])
+        result = np.empty((len(self.order), half.shape[1]))
+
+        def solve(first: int) -> None:
+            part = scaled[:, first : first + _BLOCK]
+            x = np.zeros((len(self.order), part.shape[1]))
+            x[places] = part
+            _backward(*self.L, x)
+            result[:, first : first + _BLOCK] = x[self.order]
+
+        _in_threads(solve, range(0, half.shape[1], _BLOCK))
+        return result
 
 
+def _in_threads(work: Callable[[int], Any], items: Iterable[int]) -> list[Any]:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(work, items))
