@@ -52,7 +52,12 @@ def gap_values(gap: Gap, abscissae: Array) -> float | tuple[float, ...]:
     InputError
         For another number of values than nodes, or a value that is negative or not finite.
     """
-    values = np.asarray(gap(abscissae) if callable(gap) else gap, dtype=float)
+    given = gap(abscissae) if callable(gap) else gap
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"gap = {given!r} must be a number, one per contact node, or a function "
+                         f"of x.") from None
     if values.shape not in ((), abscissae.shape):
         raise InputError(f"gap has {values.size} values for {abscissae.size} contact nodes; give "
                          f"one number, one per node, or a function of x.")

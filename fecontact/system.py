@@ -20,6 +20,16 @@ Array = NDArray[np.float64]
 
 PARTS = ("normal", "friction", "ground", "drive", "load")
 
+# What each part must offer; normal and friction functions have the same signature.
+_CONTRACTS = {
+    "basis": ("T", "tributary"),
+    "normal": ("kernel", "table", "stored_energy"),
+    "friction": ("kernel", "table", "stick_velocity"),
+    "ground": ("profile_kernel", "motion_kernel"),
+    "drive": ("motion_kernel", "stiffness_x"),
+    "load": ("normal",),
+}
+
 
 @dataclass(frozen=True, eq=False)
 class ContactSystem:
@@ -56,6 +66,11 @@ class ContactSystem:
     gap: Gap = 0.0
 
     def __post_init__(self) -> None:
+        for name, needs in _CONTRACTS.items():
+            part = getattr(self, name)
+            if not all(hasattr(part, need) for need in needs):
+                raise InputError(f"ContactSystem: {name} = {part!r} cannot serve as {name}; it "
+                                 f"must have {', '.join(needs)}.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
         _ = self.arrays
 
@@ -101,14 +116,14 @@ class ContactSystem:
     def rhs(self, t: float, y: Array) -> Array:
         """Rate y' (2 m,) of the state y = [q, q']."""
         out = np.empty(2 * self.basis.modes)
-        kernels.right_hand_side(float(t), np.ascontiguousarray(y, dtype=float), self.arrays, out)
+        kernels.right_hand_side(float(t), self._checked(y), self.arrays, out)
         return out
 
     def jacobian(self, t: float, y: Array) -> Array:
         """Jacobian dy'/dy (2 m, 2 m)."""
         size = 2 * self.basis.modes
         out = np.empty((size, size))
-        kernels.jacobian(float(t), np.ascontiguousarray(y, dtype=float), self.arrays, out)
+        kernels.jacobian(float(t), self._checked(y), self.arrays, out)
         return out
 
     def contact_history(self, times: Array, states: Array) -> Array:
@@ -117,9 +132,13 @@ class ContactSystem:
         The columns are normal force [N], friction force [N], penetration [m], its rate [m/s],
         slip velocity [m/s] and the rate of the ground's height under the node [m/s].
         """
+        times = np.ascontiguousarray(times, dtype=float)
+        states = np.ascontiguousarray(states, dtype=float)
+        if times.ndim != 1 or states.shape != (len(times), 2 * self.basis.modes):
+            raise InputError(f"The states at {times.size} times must have shape ({times.size}, "
+                             f"{2 * self.basis.modes}), not {states.shape}.")
         out = np.empty((len(times), self.basis.contact_nodes, kernels.STATE_COLUMNS))
-        kernels.contact_history(np.ascontiguousarray(times, dtype=float),
-                                np.ascontiguousarray(states, dtype=float), self.arrays, out)
+        kernels.contact_history(times, states, self.arrays, out)
         return out
 
     def with_(self, **changes: Any) -> "ContactSystem":
@@ -133,17 +152,19 @@ class ContactSystem:
         InputError
             If there is no such parameter (with those that exist), or the value is out of range.
         """
-        parts: dict[str, Any] = {}
+        whole = {entry.name for entry in fields(self)}
+        parts = {name: value for name, value in changes.items() if name in whole}
+        parameters: dict[str, dict[str, Any]] = {}
         for name, value in changes.items():
             part, _, parameter = name.partition(".")
-            if not parameter:
-                if part not in {entry.name for entry in fields(self)}:
-                    raise self._unknown(name)
-                parts[part] = value
+            if name in whole:
                 continue
-            if name not in self.parameters():
+            if part not in PARTS or parameter not in {
+                    entry.name for entry in fields(parts.get(part, getattr(self, part)))}:
                 raise self._unknown(name)
-            parts[part] = replace(parts.get(part, getattr(self, part)), **{parameter: value})
+            parameters.setdefault(part, {})[parameter] = value
+        for part, values in parameters.items():
+            parts[part] = replace(parts.get(part, getattr(self, part)), **values)
         return replace(self, **parts)
 
     def parameters(self) -> dict[str, float | tuple[float, ...]]:
@@ -153,6 +174,13 @@ class ContactSystem:
             for part in PARTS
             for entry in fields(getattr(self, part))
         }
+
+    def _checked(self, y: Array) -> Array:
+        state = np.ascontiguousarray(y, dtype=float)
+        if state.shape != (2 * self.basis.modes,):
+            raise InputError(f"A state of this system has {2 * self.basis.modes} values [q, q'], "
+                             f"not shape {state.shape}.")
+        return state
 
     def _unknown(self, name: str) -> InputError:
         names = (*self.parameters(), "gap", *PARTS)
