@@ -12,6 +12,7 @@ from fecontact.errors import InputError
 from fecontact.flexibility import Flexibility
 from fecontact.substitution import SymmetricFactors
 
+
 class Beam(ElasticBody):
     """Its bottom is the contact face."""
 
