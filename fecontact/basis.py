@@ -204,7 +204,7 @@ class ModalBasis:
         """Basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
         Rigid modes are the displacements that the stiffness does not resist; they get the
-        frequency zero. A first largest component of each mode is positive.
+        frequency zero. The first of the largest components of each mode is positive.
 
         Parameters
         ----------
@@ -217,9 +217,9 @@ class ModalBasis:
             and further named points: dense or sparse (3, d); B and C are zero when left out.
             Two rows, x and y, in the place of three mean no rotation.
             :func:`fecontact.rows.rows_from_dofs` makes them from numbers.
-        damping : float, (m,) sequence, Rayleigh or (d, d) array
-            Ratios of the modes, Rayleigh factors, or the damping matrix in the given degrees
-            of freedom, dense, sparse or AssembledMatrix [N s/m].
+        damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
+            Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
+            given degrees of freedom, dense, sparse or AssembledMatrix [N s/m].
         modes : int, optional
             Number m of modes, the rigid ones included, lowest first; all, up to d = 2000.
         rigid : int, optional
@@ -274,9 +274,9 @@ class ModalBasis:
             Mass matrix [kg], to find the scale of the shapes and check that they are orthogonal.
         modal_mass : float or (m,) array
             In the place of a mass matrix: the shapes' modal masses, 1 for mass-normalised shapes.
-        damping : float, (m,) sequence, Rayleigh or (m, m) array
-            Ratios in the order of the shapes, Rayleigh factors, or the modal damping matrix
-            of the mass-normalised shapes [1/s].
+        damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
+            Ratios in the order of the shapes, Rayleigh factors, a loss factor, or the modal
+            damping matrix of the mass-normalised shapes [1/s].
         orthogonality : float
             Largest product ``|s_i^T M s_j|`` of two mass-normalised shapes that is accepted.
         contact_x, tributary : (n,) arrays, optional
@@ -380,11 +380,3 @@ def fixed_signs(shapes: Array) -> Array:
     size = np.abs(shapes)
     first = np.argmax(size >= 0.99 * size.max(axis=0), axis=0)
     return np.where(shapes[first, np.arange(shapes.shape[1])] < 0.0, -1.0, 1.0)
-
-
-def _real(name: str, values: ArrayLike) -> Array:
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be an array of real numbers, not "
-                         f"{type(values).__name__}.") from None

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _ROUND_OFF = 1e-15
 _DENSE = 600
+# More rigid modes than half of this are taken for a mistake.
+_MANY = 1000
 
 
 def relative_energies(K: Any, shapes: Array) -> Array:
@@ -116,29 +118,39 @@ def _dense(K: Any, M: Any, rigid: int | None, name: str) -> tuple[Array, Array]:
 
 
 def _sparse(K: Any, M: Any, rigid: int | None, name: str) -> tuple[Array, Array]:
-    from scipy.sparse.linalg import LinearOperator, eigsh
-
+    """Lowest eigenpairs by inverse iteration of a block, which finds multiple ones, too."""
     d = K.shape[0]
     largest = float((K.diagonal() / M.diagonal()).max())
-    if largest <= 0.0:
-        if K.nnz and abs(K).max() > 0.0:
-            raise _not_definite(name, "its diagonal is not positive anywhere")
-        return np.zeros(d), np.eye(d)
-    shift = largest * (1e-13 if rigid is None else 1e-8)
+    if largest <= 0.0 and K.nnz and abs(K).max() > 0.0:
+        raise _not_definite(name, "its diagonal is not positive anywhere")
+    # Well above round-off, below the squares of the frequencies that can be told from it.
+    shift = (largest or 1.0) * (1e-13 if rigid is None else 1e-8)
     factors = symmetric_factors((K + shift * M).tocsc())
     negative = int(np.count_nonzero(factors.U.diagonal() < 0.0))
     if negative:
         raise _not_definite(name, f"it has {negative} negative eigenvalue{'s' * (negative > 1)}")
-    inverse = LinearOperator(K.shape, factors.solve, dtype=float)
-    start = np.random.default_rng(0).standard_normal(d)
-    count = 4 if rigid is None else max(int(rigid), 1)
-    while True:
-        values, vectors = eigsh(K, k=count, M=M, sigma=-shift, v0=start, OPinv=inverse)
-        order = np.argsort(values)
-        values, vectors = values[order], vectors[:, order]
+    random = np.random.default_rng(0)
+    count = 8 if rigid is None else int(rigid) + 4
+    while count <= min(d, _MANY):
+        vectors = random.standard_normal((d, count))
+        for _ in range(5):
+            values, vectors = _ritz(K, M, factors.solve(np.asarray(M @ vectors)))
         if rigid is not None or relative_energies(K, vectors)[-1] > _ROUND_OFF:
             return values, vectors
-        count = min(2 * count, d - 1)
+        count *= 2
+    if d <= _MANY:
+        return _dense(K, M, rigid, name)
+    raise InputError(f"{name} leaves more than {_MANY // 2} displacements without resistance; "
+                     f"leave out the degrees of freedom that nothing is fastened to.")
+
+
+def _ritz(K: Any, M: Any, vectors: Array) -> tuple[Array, Array]:
+    """Ascending Ritz values (k,) and mass-normalised vectors (d, k) of a span."""
+    from scipy.linalg import eigh
+
+    vectors = np.linalg.qr(vectors)[0]
+    values, turn = eigh(vectors.T @ (K @ vectors), vectors.T @ (M @ vectors))
+    return values, vectors @ turn
 
 
 def _not_definite(name: str, what: str) -> InputError:

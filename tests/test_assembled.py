@@ -102,14 +102,17 @@ def test_soft_springs_are_not_taken_for_rigid():
     assert basis.angular_frequencies[1:3] ** 2 == pytest.approx([tilt, 2.0 * k / m], rel=2e-4)
 
 
-def test_several_pieces_have_more_rigid_modes():
+@pytest.mark.parametrize("pieces", [3, 7])
+def test_several_pieces_have_more_rigid_modes(pieces):
+    """Below and above the size for the dense solver."""
     _, M, K, _ = body_and_matrices(6, 3, {})
-    both = [sp.block_diag([one] * 3) for one in (M, K)]
-    basis = ModalBasis.from_matrices(*both, {"contact": np.zeros((1, 3, 3 * M.shape[0]))}, modes=12)
-    assert basis.rigid_modes == 9
+    all_of = [sp.block_diag([one] * pieces) for one in (M, K)]
+    r, d = 3 * pieces, pieces * M.shape[0]
+    basis = ModalBasis.from_matrices(*all_of, {"contact": sp.csr_array((3, d))}, modes=r + pieces)
+    assert basis.rigid_modes == r
     alone = ModalBasis.from_matrices(M, K, {"contact": np.zeros((1, 3, M.shape[0]))}, modes=4)
-    assert basis.angular_frequencies[9:] == pytest.approx(
-        np.full(3, alone.angular_frequencies[3]), rel=1e-10)
+    assert basis.angular_frequencies[r:] == pytest.approx(
+        np.full(pieces, alone.angular_frequencies[3]), rel=1e-10)
 
 
 @pytest.mark.parametrize("d", [4, 700])
@@ -311,6 +314,8 @@ def test_large_matrices_are_checked():
     negative[5, 5] = negative[100, 100] = -9.0
     with pytest.raises(InputError, match="not positive semi-definite: it has 2 negative eigenval"):
         ModalBasis.from_matrices(identity, negative, rows, modes=3)
+    with pytest.raises(InputError, match="leaves more than 500 displacements without resistance"):
+        ModalBasis.from_matrices(identity, sp.csc_array((d, d)), rows, modes=3)
     with pytest.raises(InputError, match="not positive semi-definite: its diagonal"):
         ModalBasis.from_matrices(identity, -chain, rows, modes=3)
     with pytest.raises(InputError, match="mass matrix is not positive definite, although"):
