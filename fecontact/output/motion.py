@@ -93,7 +93,7 @@ class Motion:
             return float(self.given_scale)
         extent = float(np.linalg.norm(np.ptp(self.field.nodes, axis=0)))
         gap = float(self.trajectory.system.arrays.gap.min())
-        size = max(self._largest["displacement"], self.trajectory.system.ground.amplitude, gap)
+        size = max(self._largest["shape"], self.trajectory.system.ground.amplitude, gap)
         return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
 
     @cached_property
@@ -121,13 +121,14 @@ class Motion:
         motion = displacement(self.field, q)[0]
         colours = np.linalg.norm(motion, axis=1) if self.colour == "displacement" else \
             von_mises(self.field, q)[0]
-        return self.field.nodes + self.scale * motion, colours
+        return self.field.nodes + self._scaled(motion[None], q)[0], colours
 
     def contact_places(self, frame: int) -> Array:
         """Drawn places (n, 2) of the contact nodes [m]."""
         basis = self.trajectory.system.basis
-        motion = basis.contact_T[:, :2] @ self._q(frame)[0]
-        return basis.positions[2 : 2 + basis.contact_nodes] + self.scale * motion
+        q = self._q(frame)
+        motion = basis.contact_T[:, :2] @ q[0]
+        return basis.positions[2 : 2 + basis.contact_nodes] + self._scaled(motion[None], q)[0]
 
     def ground(self, frame: int, x: Array) -> Array:
         """Drawn heights (k,) of the ground at the drawn abscissae x (k,) [m]."""
@@ -136,10 +137,30 @@ class Motion:
 
     @cached_property
     def travel(self) -> Array:
-        """Travel (F,) of the ground [m]."""
+        """Drawn travel (F,) of the ground [m]."""
         ground = self.trajectory.system.ground
         law, parameters = ground.motion_kernel.python, ground.motion_parameters()
-        return np.array([law(float(time), parameters)[0] for time in self.times])
+        return self._drift_scale * np.array(
+            [law(float(time), parameters)[0] for time in self.times])
+
+    @property
+    def _drift_scale(self) -> float:
+        """Factor of the ground's travel and of the body's drift along it.
+
+        Both have the same factor, so that a node that sticks stays with the marks of the ground.
+        Over waves, which are drawn in their true length, the factor is one.
+        """
+        return 1.0 if self.trajectory.system.ground.amplitude > 0.0 else self.scale
+
+    def _drift(self, q: Array) -> Array:
+        """Mean displacement (k,) of the contact nodes along the ground [m]."""
+        return np.asarray(q @ self.trajectory.system.basis.contact_T[:, 0].mean(axis=0))
+
+    def _scaled(self, motion: Array, q: Array) -> Array:
+        """Drawn motion (k, N, 2) from displacements (k, N, 2) at coordinates q (k, m)."""
+        drawn = self.scale * motion
+        drawn[..., 0] += (self._drift_scale - self.scale) * self._drift(q)[:, None]
+        return drawn
 
     def _q(self, frame: int) -> Array:
         which = self.indices[frame]
@@ -149,19 +170,24 @@ class Motion:
     def _extremes(self) -> tuple[Array, Array]:
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
         for which in blocks(self.indices, len(self.field.nodes)):
-            places = self.field.nodes + self.scale * displacement(
-                self.field, self.trajectory.modal_coordinates[which])
+            q = self.trajectory.modal_coordinates[which]
+            places = self.field.nodes + self._scaled(displacement(self.field, q), q)
             low = np.minimum(low, places.min(axis=(0, 1)))
             high = np.maximum(high, places.max(axis=(0, 1)))
         return low, high
 
     @cached_property
     def _largest(self) -> dict[str, float]:
-        largest = dict.fromkeys(COLOURS, 0.0)
+        largest = dict.fromkeys((*COLOURS, "shape"), 0.0)
+        wavy = self.trajectory.system.ground.amplitude > 0.0
         for which in blocks(self.indices, len(self.field.nodes)):
             q = self.trajectory.modal_coordinates[which]
-            size = np.linalg.norm(displacement(self.field, q), axis=2).max()
+            motion = displacement(self.field, q)
+            size = np.linalg.norm(motion, axis=2).max()
             largest["displacement"] = max(largest["displacement"], float(size))
+            motion[..., 0] -= wavy * self._drift(q)[:, None]
+            size = np.linalg.norm(motion, axis=2).max()
+            largest["shape"] = max(largest["shape"], float(size))
             if self.colour == "von_mises":
                 stress = float(von_mises(self.field, q).max())
                 largest["von_mises"] = max(largest["von_mises"], stress)

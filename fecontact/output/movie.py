@@ -43,10 +43,12 @@ def render(
 ) -> Path:
     """Draw a run as a movie or as numbered pictures, whole or not at all.
 
-    One sees the body in scaled displacement and its undeformed outline, the ground, whose marks
-    travel at its true speed and whose waves are scaled as the body is, the contact nodes in the
-    colour of their state, and the forces of the ground on them, the longest arrow being the
-    largest force of the movie. Scale and colour range hold for all frames.
+    One sees the body in scaled displacement and its undeformed outline, the ground, whose waves
+    are as high in scale, the contact nodes in the colour of their state, and the forces of the
+    ground on them, the longest arrow being the largest force of the movie. The marks on flat
+    ground travel in scale too, so that a node that sticks stays with them; over waves, whose
+    length is true, so are the travel of the ground and the drift of the body along it. Scale and
+    colour range hold for all frames.
 
     Parameters
     ----------
