@@ -65,13 +65,14 @@ def basis_of_matrices(
     C = _damping_matrix(damping, M)
     given = gathered_rows(rows, d)
     held = K.matrix.diagonal() >= _HELD
+    if held.all():
+        raise InputError(f"{K.name} holds every degree of freedom (entries of 1e35 or more).")
     if held.any():
         M, K = M.without(held), K.without(held)
         given = replace(given, restriction=given.restriction[:, ~held])
         C = None if C is None else C[~held][:, ~held]
         d = M.matrix.shape[0]
-    for matrix in (M, K):
-        _require_symmetric(matrix)
+    M, K = _symmetric(M), _symmetric(K)
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
     return assembled_basis(
@@ -176,13 +177,16 @@ def _damping_matrix(damping: Any, mass: Given) -> Any:
     return given.matrix
 
 
-def _require_symmetric(given: Given) -> None:
+def _symmetric(given: Given) -> Given:
+    """The symmetric part of a matrix that is symmetric but for its last digits."""
     import scipy.sparse as sp
 
     difference = sp.coo_array(abs(given.matrix - given.matrix.T))
     largest = float(abs(given.matrix).max())
-    if difference.nnz and difference.data.max() > _ASYMMETRY * largest:
-        worst = int(np.argmax(difference.data))
+    if not difference.nnz or not difference.data.max():
+        return given
+    worst = int(np.argmax(difference.data))
+    if difference.data[worst] > _ASYMMETRY * largest:
         row, column = sorted((int(difference.row[worst]), int(difference.col[worst])))
         raise InputError(
             f"{given.name} is not symmetric: the entries in row {row}, column {column} "
@@ -190,6 +194,7 @@ def _require_symmetric(given: Given) -> None:
             f"({given.matrix[column, row]:.6g}), counted from 0, differ by "
             f"{difference.data[worst] / largest:.1e} of the largest entry."
         )
+    return replace(given, matrix=sp.csc_array(0.5 * (given.matrix + given.matrix.T)))
 
 
 def _require_positive_mass(mass: Given) -> None:

@@ -50,12 +50,15 @@ def lowest_vectors(K: Any, M: Any, name: str, rigid: int | None) -> Array:
         raise InputError(f"rigid = {rigid!r} must be None or a whole number from 0 to the number "
                          f"of degrees of freedom, {d}.")
     values, vectors = (_dense if d <= _DENSE else _sparse)(K, M, rigid, name)
-    resisted = relative_energies(K, vectors)
-    count = int(np.count_nonzero(resisted <= _ROUND_OFF)) if rigid is None else int(rigid)
-    if rigid is None and resisted.min(initial=0.0) < -_ROUND_OFF:
+    energies = relative_energies(K, vectors)
+    free = int(np.count_nonzero(energies <= _ROUND_OFF))
+    if rigid is None and energies.min(initial=0.0) < -_ROUND_OFF:
         raise _not_definite(name, f"its lowest eigenvalue relative to the mass is "
                                   f"{values.min():.3e} 1/s^2")
-    return vectors[:, :count]
+    if rigid is not None and free > rigid:
+        raise InputError(f"rigid = {rigid}, but {name[0].lower()}{name[1:]} leaves {free} "
+                         f"displacements without resistance.")
+    return vectors[:, :free if rigid is None else int(rigid)]
 
 
 def null_space(K: Any, M: Any, vectors: Array) -> Array:
@@ -110,8 +113,7 @@ def _dense(K: Any, M: Any, rigid: int | None, name: str) -> tuple[Array, Array]:
 
     full, mass = K.toarray(), M.toarray()
     values = eigh(full, mass, eigvals_only=True)
-    count = int(rigid) if rigid is not None else int(np.count_nonzero(
-        values <= 1e-9 * np.abs(values).max()))
+    count = max(int(rigid or 0), int(np.count_nonzero(values <= 1e-9 * np.abs(values).max())))
     if not count:
         return values[:0], np.zeros((len(full), 0))
     return eigh(full, mass, subset_by_index=[0, count - 1])

@@ -160,6 +160,20 @@ def test_condensed_matrices_with_a_given_number_of_rigid_modes():
         ModalBasis.from_matrices(M, K, rows, modes=8, rigid=4)
 
 
+@pytest.mark.parametrize("columns", [6, 24])
+def test_too_few_rigid_modes(columns):
+    _, M, K, rows = body_and_matrices(columns, columns // 2, {})
+    with pytest.raises(InputError, match="rigid = 1, but the stiffness matrix leaves 3 displ"):
+        ModalBasis.from_matrices(M, K, rows, modes=8, rigid=1)
+
+
+def test_asymmetry_of_the_last_digits():
+    expected, M, K, rows = body_and_matrices(6, 3, {"left": "xy"})
+    noise = sp.csr_array(np.triu(np.random.default_rng(1).standard_normal(K.shape)))
+    uneven = [A + 1e-12 * np.abs(A).max() * noise for A in (M, K)]
+    assert_same(ModalBasis.from_matrices(*uneven, rows, modes=12), expected, 1e-7, 1e-6)
+
+
 def test_large_matrices_with_a_given_number_of_rigid_modes():
     expected, M, K, rows = body_and_matrices(24, 12, {})
     assert_same(ModalBasis.from_matrices(M, K, rows, modes=12, rigid=3), expected)
