@@ -77,19 +77,18 @@ class BasisReport:
     @property
     def recommendation(self) -> str:
         """What to do about the basis, one or two sentences."""
-        quality, error = self.basis.quality, self.compliance_error
-        if quality is None:
+        if self.basis.quality is None:
             return ("The basis came without a body, so its compliance at the contact cannot be "
                     "judged; compare it with a static solution of the full model.")
-        # The load at C acts in y alone.
-        error = np.where(np.arange(len(error))[:, None] == 1, error * [0.0, 1.0], error)
-        worst = np.unravel_index(int(np.argmax(error)), error.shape)
-        if error[worst] <= _GOOD:
-            return (f"Static deflections are right to {100 * error[worst]:.2g} % at every point; "
+        error = self.contact_error
+        node, axis = np.unravel_index(int(np.argmax(error)), error.shape)
+        worst = float(error[node, axis])
+        if worst <= _GOOD:
+            return (f"Static deflections of the contact nodes are right to {100 * worst:.2g} %; "
                     f"the basis can be used up to about {self._valid_hz:.4g} Hz.")
-        return (f"{self._name(int(worst[0]))} is too stiff: {100 * error[worst]:.0f} % of its "
-                f"elastic compliance in {'xy'[worst[1]]} is missing. Complete the modes with "
-                f"reduction = \"residual\" (tolerance {_GOOD:g} or less), or keep more modes.")
+        return (f"Contact node {node} is too stiff: {100 * worst:.0f} % of its elastic compliance "
+                f"in {'xy'[axis]} is missing. Complete the modes with reduction = \"residual\" "
+                f"(tolerance {_GOOD:g} or less), or keep more modes.")
 
     @property
     def _valid_hz(self) -> float:
@@ -102,13 +101,11 @@ class BasisReport:
         above = self.basis.frequencies_hz[self.basis.frequencies_hz > 0.0]
         return float(above[len(above) // 2]) / 1.5 if above.size else 0.0
 
-    def _name(self, point: int) -> str:
-        n = self.basis.contact_nodes
-        if point < 2:
-            return f"Point {'BC'[point]}"
-        if point < 2 + n:
-            return f"Contact node {point - 2}"
-        return f"Point {self.basis.extra[point - 2 - n]}"
+    def _loaded_points(self) -> list[tuple[str, str, float]]:
+        """B in x and y, C in y, where they have rows."""
+        rows = np.asarray(np.abs(self.basis.T[:2, :2]).max(axis=2)) > 0.0
+        return [("BC"[point], "xy"[axis], float(self.compliance_error[point, axis]))
+                for point, axis in ((0, 0), (0, 1), (1, 1)) if rows[point, axis]]
 
     def __str__(self) -> str:
         basis, mass = self.basis, self.effective_mass
@@ -126,6 +123,8 @@ class BasisReport:
             lines += ["", "missing static compliance at the contact nodes: "
                           f"x {error[:, 0].max():.2%}, y {error[:, 1].max():.2%} at most, "
                           f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
+                      *(f"missing static compliance at {name}: {axis} {error:.2%}"
+                        for name, axis, error in self._loaded_points()),
                       f"effective mass kept: x {mass[0].sum():.2%}, y {mass[1].sum():.2%}",
                       f"mass-orthogonality: {self.orthogonality:.1e}"]
         lines += [f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by steps of "

@@ -131,7 +131,16 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
 
 
 @app.command(sort_key=3)
-def modes(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
+def modes(
+    study: StudyFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Folder = None,
+    converge: Annotated[bool, Parameter(negative=(), help=(
+        "Refine the mesh twice, and take more modes: what changes, as a table and a plot."))]
+    = False,
+) -> None:
     """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
     from fecontact.console import output_folder, waiting
     from fecontact.results import read_study
@@ -146,6 +155,26 @@ def modes(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -
         picture = folder / f"{described.name}-modes.png"
         plot_modes(basis, picture)
         _say_written(picture)
+        if converge:
+            _converge(described, folder / f"{described.name}-convergence.png")
+
+
+def _converge(study: Any, picture: Path) -> None:
+    from dataclasses import replace
+
+    from fecontact.console import progress_bar
+    from fecontact.mode_convergence import mode_convergence
+    from fecontact.output.plots import plot_convergence
+
+    settings = replace(study.basis_settings, select=None)
+    with progress_bar("Refining", 1.0) as progress:
+        result = mode_convergence(
+            study.body(), lambda body, count: replace(settings, modes=count).basis(body),
+            settings.modes, levels=4 if study.body().mass.shape[0] < 4000 else 3,
+            progress=lambda done, steps: progress(done / steps))
+    _say(f"\n{result}")
+    plot_convergence(result, picture)
+    _say_written(picture)
 
 
 @app.command(sort_key=4)

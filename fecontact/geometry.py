@@ -10,6 +10,7 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact import system_libraries
 from fecontact.errors import InputError, MissingLibraryError
 from fecontact.grids import Grid, grid_of, nearest_line
 from fecontact.hole_rim import Rim
@@ -183,8 +184,8 @@ def _import_gmsh() -> Any:
     except OSError as error:
         raise MissingLibraryError(
             f"Gmsh, which makes the mesh, lacks a library of the system ({error}); on Debian or "
-            f"Ubuntu install it with: apt-get install libegl1 libgl1 libglu1-mesa libxcursor1 "
-            f"libxft2 libxinerama1 libgomp1"
+            f"Ubuntu install it with: "
+            f"apt-get install -y {' '.join(system_libraries.PACKAGES.values())}"
         ) from None
     return gmsh
 

@@ -116,6 +116,38 @@ class Mesh:
         cells: NDArray[np.int64] = count[edge.ravel()]
         return cells
 
+    def refined(self) -> "Mesh":
+        """The mesh with every cell cut into four; named boundaries and points keep their names.
+
+        Nodes keep their numbers; those of the edges' middles follow, then, for quadrilaterals,
+        those of the cells' centres.
+        """
+        count, corners = len(self.nodes), self.cells.shape[1]
+        edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2)
+        ends, number = np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0,
+                                 return_inverse=True)
+        middles = count + number.reshape(-1, corners)
+        nodes = [self.nodes, self.nodes[ends].mean(axis=1)]
+        parts = [np.column_stack([self.cells[:, i], middles[:, i], middles[:, i - 1]])
+                 for i in range(corners)]
+        if corners == 3:
+            cells = np.concatenate([*parts, middles])
+        else:
+            centres = count + len(ends) + np.arange(len(self.cells))
+            nodes.append(self.nodes[self.cells].mean(axis=1))
+            cells = np.concatenate([np.column_stack([part[:, :2], centres, part[:, 2]])
+                                    for part in parts])
+        keys = ends[:, 0] * count + ends[:, 1]
+
+        def halves(boundary: NDArray[np.int64]) -> NDArray[np.int64]:
+            ordered = np.sort(boundary, axis=1)
+            middle = count + np.searchsorted(keys, ordered[:, 0] * count + ordered[:, 1])
+            return np.stack([boundary[:, 0], middle, middle, boundary[:, 1]],
+                            axis=1).reshape(-1, 2)
+
+        return Mesh(np.concatenate(nodes), cells,
+                    {name: halves(group) for name, group in self.boundaries.items()}, self.points)
+
     @property
     def area(self) -> float:
         """Area of the meshed region [m^2]."""

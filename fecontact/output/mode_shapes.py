@@ -1,4 +1,4 @@
-"""Figure of the mode shapes of a body."""
+"""Figures of the modes of a body: their shapes, and how they converge."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fecontact.basis import Field, ModalBasis
 from fecontact.errors import InputError
+from fecontact.mode_convergence import ModeConvergence
 from fecontact.output.figures import new_figure
 
 if TYPE_CHECKING:
@@ -40,9 +41,33 @@ def modes_figure(basis: ModalBasis, count: int = 12) -> "Figure":
     for mode, axis in enumerate(grid.flat[:shown]):
         drawn = _draw_mode(axis, field, mode, reach)
         hertz = basis.frequencies_hz[mode]
-        axis.set_title(f"mode {mode + 1}: " + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
+        axis.set_title(f"mode {mode}: " + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
     figure.colorbar(drawn, ax=grid, location="bottom", label="amplitude, relative to the largest",
                     aspect=50, shrink=0.5, pad=0.02)
+    return figure
+
+
+def convergence_figure(result: ModeConvergence) -> "Figure":
+    """Frequencies and contact compliance against unknowns, missing compliance against modes."""
+    figure = new_figure(1.2 * _WIDTH, 4.0)
+    meshes, modes = figure.subplots(1, 2)
+    sizes = result.unknowns[:-1]
+    change = np.abs(result.frequencies_hz[:-1] / result.frequencies_hz[-1] - 1.0)
+    for i, values in enumerate(change.T):
+        hertz = result.frequencies_hz[-1, i]
+        meshes.loglog(sizes, values, "o-", label=f"f{i + 1} = {hertz:.5g} Hz")
+    compliance = np.abs(result.compliance[:-1] / result.compliance[-1] - 1.0)
+    for values, axis, style in zip(compliance.T, "xy", ("s--", "^--"), strict=True):
+        meshes.loglog(sizes, values, style, color="#707070", label=f"contact compliance in {axis}")
+    meshes.set(xlabel="unknowns of the mesh", ylabel="relative distance from the finest mesh")
+    meshes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    for values, axis, style in zip(result.missing.T, "xy", ("s-", "^-"), strict=True):
+        modes.semilogx(result.modes, 100.0 * values, style, label=f"in {axis}")
+    modes.set(xlabel="modes", ylabel="missing contact compliance, worst node [%]")
+    modes.set_xticks(result.modes, [str(count) for count in result.modes])
+    modes.minorticks_off()
+    modes.set_ylim(bottom=0.0)
+    modes.legend()
     return figure
 
 

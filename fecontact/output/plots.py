@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.mode_convergence import ModeConvergence
 from fecontact.output import figures
 from fecontact.output.figures import Point
-from fecontact.output.mode_shapes import modes_figure
+from fecontact.output.mode_shapes import convergence_figure, modes_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -146,6 +147,29 @@ def plot_modes(basis: ModalBasis, path: str | Path, *, count: int = 12) -> Path:
         written.
     """
     return _save(path, lambda: modes_figure(basis, count))
+
+
+def plot_convergence(result: ModeConvergence, path: str | Path) -> Path:
+    """Plot how frequencies and contact compliance change with the mesh and the modes.
+
+    Parameters
+    ----------
+    result : ModeConvergence
+        What :func:`fecontact.mode_convergence.mode_convergence` found.
+    path : str or Path
+        A .png, .pdf or .svg file; it is replaced if it exists.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
+    """
+    return _save(path, lambda: convergence_figure(result))
 
 
 def _save(path: str | Path, figure: Callable[[], "Figure"]) -> Path:

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 
+from fecontact import system_libraries
 from fecontact.errors import MissingLibraryError
 
-PACKAGES = "libegl1 libgl1 libglu1-mesa libxcursor1 libxft2 libxinerama1 libgomp1"
 _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
 
 # VTK ends the process with a segmentation fault where graphics libraries are missing, so the
@@ -84,4 +84,5 @@ def _attempt() -> tuple[str | None, str | None]:
 
 def _reason(what: str) -> str:
     return (f"Pictures cannot be rendered here ({what.rstrip('.')}); on Debian or Ubuntu install "
-            f"the graphics libraries with: apt-get install -y {PACKAGES}")
+            f"the graphics libraries with: "
+            f"apt-get install -y {' '.join(system_libraries.PACKAGES.values())}")
