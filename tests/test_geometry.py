@@ -258,7 +258,7 @@ def test_gmsh_is_closed_after_a_failure(monkeypatch: pytest.MonkeyPatch) -> None
     ("failure", "message"),
     [
         ("raise OSError('libGLU.so.1: cannot open shared object file')",
-         r"lacks a library of the system \(libGLU.so.1: .*\); .* apt-get install libegl1 libgl1 "
+         r"lacks a library of the system \(libGLU.so.1: .*\); .* apt-get install -y libegl1 libgl1 "
          "libglu1-mesa libxcursor1 libxft2 libxinerama1 libgomp1"),
         ("raise ImportError('no gmsh')", "Gmsh.* is not installed; .* pip install gmsh"),
     ],
