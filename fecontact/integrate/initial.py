@@ -66,8 +66,12 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     if isinstance(initial, RigidStart):
         return np.concatenate([_rigid(system.basis, initial.displacement, "displacement"),
                                _rigid(system.basis, initial.velocity, "velocity")])
-    state = np.array(initial.states[-1] if isinstance(initial, Trajectory) else initial,
-                     dtype=float)
+    given = initial.states[-1] if isinstance(initial, Trajectory) else initial
+    try:
+        state = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"initial = {initial!r} must be 'rest', 'sliding', a RigidStart, a "
+                         f"Trajectory or an array of numbers.") from None
     if state.shape != (2 * m,):
         raise InputError(f"The initial state must have {2 * m} values [q, q'], not shape "
                          f"{state.shape}.")
@@ -78,7 +82,10 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
 
 def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> Array:
     q = np.zeros(basis.modes)
-    wanted = np.asarray(motion, dtype=float)
+    try:
+        wanted = np.asarray(motion, dtype=float)
+    except (TypeError, ValueError):
+        wanted = np.zeros(0)
     if wanted.shape != (3,) or not np.isfinite(wanted).all():
         raise InputError(f"initial: {what} = {motion!r} must be three finite numbers x, y, phi.")
     if not wanted.any():

@@ -41,7 +41,7 @@ def integrate(
     arrays = system.arrays
     modal = np.array(system.basis.damping)
     dashpots = arrays.damping - modal
-    counts = {"right_hand_sides": 0, "jacobians": 0}
+    counts: dict[str, Any] = {"right_hand_sides": 0, "jacobians": 0}
 
     def rhs(t: float, y: Array) -> Array:
         counts["right_hand_sides"] += 1
@@ -65,12 +65,17 @@ def integrate(
         jac=jacobian, rtol=rtol, atol=tolerance, max_step=longest_step(system, times))
     result = np.empty((len(times), size + extra))
     result[0] = solver.y
-    done, steps = 1, 0
+    done, steps, stalled = 1, 0, 0
     status = Status.FINISHED
     try:
         while done < len(times):
-            message = solver.step()
-            if solver.status == "failed":
+            before = solver.t
+            message = _step(solver)
+            # LSODA repeats steps that do not move the time, for ever.
+            stalled = stalled + 1 if solver.t == before else 0
+            if stalled == 100:
+                message = "Required step size is less than spacing between numbers."
+            if message is not None:
                 status = Status.FAILED
                 counts["message"] = message
                 break
@@ -88,6 +93,19 @@ def integrate(
     statistics = {"method": method, "rtol": rtol, "steps": steps, **counts,
                   "seconds": clock.perf_counter() - begin}
     return times[:done], result[:done, :size], result[:done, size:], status, statistics
+
+
+def _step(solver: Any) -> str | None:
+    """One step; a sentence that says why if it failed."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            message = solver.step()
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+        # What scipy's linear algebra says to values that are not finite.
+        return "The motion grew beyond all numbers."
+    if solver.status == "failed":
+        return str(message)
+    return None if np.isfinite(solver.y).all() else "The motion grew beyond all numbers."
 
 
 def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:

@@ -1,6 +1,7 @@
 """Running a contact system in time."""
 
 from collections.abc import Callable
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,8 @@ def simulate(
         If there is no equilibrium to start from.
     """
     times = _output_times(t_start, t_end, outputs)
-    if not 0.0 < rtol <= 1e-2:
-        raise InputError(f"rtol = {rtol!r} must be above zero and at most 0.01.")
+    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
+        raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     if method not in METHODS:
         raise InputError(f"method = {method!r} must be one of {choices(METHODS)}"
                          f"{nearest(str(method), METHODS)}.")
@@ -72,13 +73,17 @@ def simulate(
 
 
 def _output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:
-    if not (np.isfinite(t_start) and np.isfinite(t_end) and t_end > t_start):
+    if not (isinstance(t_start, Real) and isinstance(t_end, Real)
+            and -np.inf < t_start < t_end < np.inf):
         raise InputError(f"t_end = {t_end!r} must be a finite time after t_start = {t_start!r}.")
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         if outputs < 2:
             raise InputError(f"outputs = {outputs} must be at least 2.")
         return np.linspace(t_start, t_end, int(outputs))
-    times = np.array(outputs, dtype=float)
+    try:
+        times = np.array(outputs, dtype=float)
+    except (TypeError, ValueError):
+        times = np.zeros(0)
     if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0.0).all() or (
             times[0] != t_start or times[-1] != t_end):
         raise InputError("outputs must be a number of times, or ascending times from t_start to "
