@@ -175,7 +175,7 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
 
         start = np.random.default_rng(0).standard_normal(size)
         squares, shapes = eigsh(
-            K, k=count, M=M, sigma=0.0, v0=system.without_rigid(start),
+            K, k=count, M=M, sigma=0.0, v0=system.without_rigid(start), tol=1e-12,
             OPinv=LinearOperator(K.shape, system.deflection, dtype=float))
     shapes = system.without_rigid(shapes)
     shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))

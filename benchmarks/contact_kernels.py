@@ -1,0 +1,67 @@
+"""Right-hand side and Jacobian of a contact system: compiled kernels against vectorised numpy.
+
+Usage: python benchmarks/contact_kernels.py
+"""
+
+import timeit
+
+import numpy as np
+
+from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
+
+
+def system(nodes: int, modes: int) -> ContactSystem:
+    """Random modes; about half of the nodes are in contact."""
+    rng = np.random.default_rng(0)
+    basis = ModalBasis(np.linspace(0.0, 1e5, modes), np.eye(modes),
+                       rng.normal(size=(nodes + 2, 3, modes)), np.zeros((nodes + 2, 2)),
+                       np.ones(nodes))
+    return ContactSystem(basis, ground=Ground(0.1, 1e-6, 1e-2), load=Load(10.0),
+                         drive=Drive(stiffness_x=1e3, amplitude_x=1e-3, angular_frequency=10.0))
+
+
+def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
+    """The same equations with numpy, all nodes at once."""
+    s, m = system.arrays, system.basis.modes
+    q, v = y[:m], y[m:]
+    x, height, x_rate, height_rate = s.Tx @ q, s.Ty @ q, s.Tx @ v, s.Ty @ v
+    ground, speed = system.ground, system.ground.speed
+    k = 2.0 * np.pi / ground.wavelength
+    xi = s.abscissa + x - speed * t
+    slip = x_rate - speed
+    u = ground.amplitude * np.sin(k * xi) - height - s.gap
+    rate = ground.amplitude * k * np.cos(k * xi) * slip - height_rate
+    c, R, b = s.normal_parameters.T
+    z = u / R
+    elastic = c * R * np.where(z <= 0.0, 0.0, np.where(z < 1.0, 0.5 * z * z, z - 0.5))
+    F = np.maximum(0.0, elastic + b * np.clip(z, 0.0, 1.0) * rate)
+    mu0, mu, decay, slope = s.friction_parameters.T
+    friction = ((mu0 - mu) * np.exp(-decay * np.abs(slip)) + mu) * F * (
+        2.0 / np.pi) * np.arctan(slope * slip)
+    drive = system.drive
+    force = (s.constant_load + drive.amplitude_x * np.sin(drive.angular_frequency * t)
+             * s.drive_shapes[0] - s.stiffness @ q - s.damping @ v + s.Ty.T @ F
+             - s.Tx.T @ friction)
+    return np.concatenate([v, force])
+
+
+def main() -> None:
+    """Print the table."""
+    print(f"{'nodes':>6s} {'modes':>6s} {'numpy rhs [us]':>15s} {'rhs [us]':>9s} {'ratio':>6s} "
+          f"{'Jacobian [us]':>14s}")
+    for nodes, modes in ((1, 3), (40, 20), (400, 40)):
+        tried = system(nodes, modes)
+        y = 1e-6 * np.random.default_rng(1).normal(size=2 * modes)
+        difference = np.abs(numpy_rhs(tried, 0.3, y) - tried.rhs(0.3, y)).max()
+        assert difference < 1e-9 * np.abs(tried.rhs(0.3, y)).max()
+        theirs, ours, jacobian = (
+            min(timeit.repeat(call, number=200, repeat=7)) / 200 * 1e6
+            for call in (lambda s=tried, y=y: numpy_rhs(s, 0.3, y),
+                         lambda s=tried, y=y: s.rhs(0.3, y),
+                         lambda s=tried, y=y: s.jacobian(0.3, y)))
+        print(f"{nodes:6d} {modes:6d} {theirs:15.1f} {ours:9.1f} {theirs / ours:6.1f} "
+              f"{jacobian:14.1f}")
+
+
+if __name__ == "__main__":
+    main()
