@@ -16,7 +16,7 @@ from fecontact.points import Patch
 from fecontact.tables import located
 
 Place = str | tuple[float, float] | Patch
-Directions = Literal["x", "y", "xy"]
+Support = Literal["x", "y", "xy", "hinge"]
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class BodySettings:
     thickness: float = 1.0
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
-    fixed: Mapping[str, Directions] = field(default_factory=dict)
+    fixed: Mapping[str, Support] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_positive("BodySettings", thickness=self.thickness)
