@@ -55,6 +55,7 @@ def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Fig
         ("displacement", "m", [trajectory.displacement(point) for point in points]),
         ("velocity", "m/s", [trajectory.velocity(point) for point in points]),
     )):
+        values = _without_round_off(values)
         for row, name in enumerate(_AXES):
             factor = _labelled(axes[row, column], f"{quantity} {name}", unit,
                                *(value[:, row] for value in values))
@@ -71,6 +72,12 @@ def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Fig
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center",
                   ncols=max(1, min(len(points), 6)))
     return figure
+
+
+def _without_round_off(values: list[Array]) -> list[Array]:
+    """Histories (N, k) with components at rest, of a billionth of the largest, put to zero."""
+    largest = max(float(np.abs(value[:, :2]).max()) for value in values)
+    return [np.where(np.abs(value).max(axis=0) > 1e-9 * largest, value, 0.0) for value in values]
 
 
 def phase_figure(trajectory: Trajectory, point: Point = "B", axis: str = "x") -> "Figure":
@@ -114,6 +121,8 @@ def contact_map_figure(trajectory: Trajectory) -> "Figure":
 
     counts = np.stack([np.add.reduceat((trajectory.contact_state == k).astype(np.int32), starts,
                                        axis=0) for k in range(3)])
+    # A column of several times shows contact if there was any, as the pressure above it does.
+    counts[0] *= counts[1:].sum(axis=0) == 0
     image = lower.pcolormesh(edges / time_unit, places, counts.argmax(axis=0).T,
                              cmap=ListedColormap([colour for _, colour in STATES]),
                              norm=BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3))
