@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.basis import ModalBasis, fixed_signs
+from fecontact.basis import ModalBasis
 from fecontact.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.eigen import FreeSystem, free_modes
 from fecontact.errors import InputError
+from fecontact.field import fixed_signs
 from fecontact.formats.matrices import AssembledMatrix
 from fecontact.null_space import lowest_vectors, null_space, relative_energies
 from fecontact.rows import GivenRows, gathered_rows

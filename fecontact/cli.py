@@ -142,11 +142,11 @@ def modes(
     = False,
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
-    from fecontact.console import output_folder, waiting
-    from fecontact.results import read_study
+    from fecontact.console import output_folder, progress_bar, waiting
+    from fecontact.results import convergence_of, read_study
 
     described = read_study(study, set_)
-    from fecontact.output.plots import plot_modes
+    from fecontact.output.plots import plot_convergence, plot_modes
 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
@@ -156,25 +156,12 @@ def modes(
         plot_modes(basis, picture)
         _say_written(picture)
         if converge:
-            _converge(described, folder / f"{described.name}-convergence.png")
-
-
-def _converge(study: Any, picture: Path) -> None:
-    from dataclasses import replace
-
-    from fecontact.console import progress_bar
-    from fecontact.mode_convergence import mode_convergence
-    from fecontact.output.plots import plot_convergence
-
-    settings = replace(study.basis_settings, select=None)
-    with progress_bar("Refining", 1.0) as progress:
-        result = mode_convergence(
-            study.body(), lambda body, count: replace(settings, modes=count).basis(body),
-            settings.modes, levels=4 if study.body().mass.shape[0] < 4000 else 3,
-            progress=lambda done, steps: progress(done / steps))
-    _say(f"\n{result}")
-    plot_convergence(result, picture)
-    _say_written(picture)
+            with progress_bar("Refining", 1.0) as progress:
+                result = convergence_of(described, progress)
+            _say(f"\n{result}")
+            picture = folder / f"{described.name}-convergence.png"
+            plot_convergence(result, picture)
+            _say_written(picture)
 
 
 @app.command(sort_key=4)

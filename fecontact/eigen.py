@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.basis import fixed_signs
 from fecontact.errors import AnalysisError, InputError
+from fecontact.field import fixed_signs
 from fecontact.supports import rigid_modes
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
 
         start = np.random.default_rng(0).standard_normal(size)
         squares, shapes = eigsh(
-            K, k=count, M=M, sigma=0.0, v0=system.without_rigid(start), tol=1e-12,
+            K, k=count, M=M, sigma=0.0, v0=system.without_rigid(start),
             OPinv=LinearOperator(K.shape, system.deflection, dtype=float))
     shapes = system.without_rigid(shapes)
     shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))

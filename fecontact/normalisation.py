@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.assembled import assembled_basis, given_matrix
-from fecontact.basis import ModalBasis, fixed_signs
+from fecontact.basis import ModalBasis
 from fecontact.damping import Damping, LossFactor, Rayleigh
 from fecontact.errors import InputError
+from fecontact.field import fixed_signs
 from fecontact.rows import gathered_rows
 
 Array = NDArray[np.float64]

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.basis import Field, ModalBasis, Quality
+from fecontact.basis import ModalBasis
 from fecontact.contact_face import contact_nodes as nodes_of_face
 from fecontact.craig_bampton import craig_bampton
 from fecontact.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.eigen import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.errors import InputError, choices, nearest
+from fecontact.field import Field, Quality
 from fecontact.flexibility import Flexibility, residual_modes
 from fecontact.points import Place, Rows, place_rows
 

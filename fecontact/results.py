@@ -1,7 +1,7 @@
 """From studies to files: what ``run``, ``render`` and the demonstration share."""
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from fecontact.errors import FecontactError, InputError
 
 if TYPE_CHECKING:
     from fecontact.integrate.trajectory import Trajectory
+    from fecontact.mode_convergence import ModeConvergence
     from fecontact.study import Study
     from fecontact.study_sections import RenderSettings
 
@@ -134,3 +135,18 @@ def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") ->
                       size=settings.size, colour=settings.colour, scale=settings.scale,
                       title=settings.title, start=settings.start, end=settings.end,
                       progress=lambda done, total: progress(done * settings.frames / total))
+
+
+def convergence_of(study: "Study", progress: Callable[[float], None]) -> "ModeConvergence":
+    """Frequencies and contact compliance of a study as its mesh is refined and modes are added.
+
+    ``progress`` is told the part that is done.
+    """
+    from fecontact.mode_convergence import mode_convergence
+
+    settings = replace(study.basis_settings, select=None)
+    body = study.body()
+    return mode_convergence(
+        body, lambda part, count: replace(settings, modes=count).basis(part), settings.modes,
+        levels=4 if body.mass.shape[0] < 4000 else 3,
+        progress=lambda done, steps: progress(done / steps))

@@ -3,7 +3,8 @@
 import numpy as np
 import scipy.sparse as sp
 
-from fecontact.basis import Field, ModalBasis
+from fecontact.basis import ModalBasis
+from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.basis import ModalBasis, fixed_signs
+from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
 from fecontact.damping import Rayleigh, modal_damping
 from fecontact.errors import InputError
+from fecontact.field import fixed_signs
 
 NO_CONTACT = {"contact": np.zeros((1, 3, 2))}
 

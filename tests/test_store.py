@@ -9,8 +9,9 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from fecontact.basis import Field, ModalBasis
+from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
+from fecontact.field import Field
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output import pvd, store
 from fecontact.output.frames import frame_indices, von_mises

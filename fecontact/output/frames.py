@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.basis import Field
 from fecontact.errors import InputError
+from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
 
 Array = NDArray[np.float64]

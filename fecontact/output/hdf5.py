@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.basis import Field, ModalBasis, Quality
+from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
+from fecontact.field import Field, Quality
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
 _FIELD = ("nodes", "cells", "outline", "shapes", "stress")

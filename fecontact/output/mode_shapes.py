@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.basis import Field, ModalBasis
+from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
+from fecontact.field import Field
 from fecontact.mode_convergence import ModeConvergence
 from fecontact.output.figures import new_figure
 

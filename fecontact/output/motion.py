@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.basis import Field
 from fecontact.errors import InputError, choices, nearest, require_positive
+from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.frames import (
     blocks,
