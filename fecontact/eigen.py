@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import AnalysisError, InputError
+from fecontact.factorisation import Factors, factorised
 from fecontact.field import fixed_signs
 from fecontact.supports import rigid_modes
 
@@ -62,19 +63,12 @@ class FreeSystem:
         return np.setdiff1d(np.arange(size), pivots[:rigid])
 
     @cached_property
-    def factors(self) -> Any:
-        """Factors of the stiffness of the isostatically held body.
-
-        It is positive definite, so that no pivoting is needed and the fill of an ordering for
-        symmetric matrices is kept.
-        """
-        from scipy.sparse.linalg import splu
-
+    def factors(self) -> Factors:
+        """Factors of the stiffness of the isostatically held body, which is positive definite."""
         K = self.stiffness
         if len(self.held) < K.shape[0]:
             K = K[self.held][:, self.held]
-        return splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                    options={"SymmetricMode": True})
+        return factorised(K)
 
     @cached_property
     def inertia(self) -> Array:

@@ -10,6 +10,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.compiled import kernel, matrix, vector
+from fecontact.factorisation import Factors
 
 Array = NDArray[np.float64]
 
@@ -49,21 +50,18 @@ def _backward(indptr, indices, data, x):  # type: ignore[no-untyped-def]
 
 
 class SymmetricFactors:
-    """``A = P^T L D L^T P`` from SuperLU's factors of a symmetric positive definite matrix.
+    """Substitutions with the factors ``A = P^T L D L^T P`` of a positive definite matrix.
 
     The forward substitution of sparse right-hand sides touches only the rows that they reach,
     a small part for loads on a boundary. It alone gives ``W A^-1 W^T`` for all of them; the
     backward substitution is done for the few combinations that are wanted in full.
     """
 
-    def __init__(self, factors: Any) -> None:
-        if (factors.perm_r != factors.perm_c).any():
-            raise ArithmeticError("the factors are not symmetric")
-        L = factors.L
+    def __init__(self, factors: Factors) -> None:
+        L, diagonal, order = factors.triangle()
         self.L = (L.indptr.astype(np.int32), L.indices.astype(np.int32),
                   np.ascontiguousarray(L.data))
-        self.diagonal = np.asarray(factors.U.diagonal())
-        self.order = factors.perm_r
+        self.diagonal, self.order = np.asarray(diagonal), order
 
     def half_solved(self, rows: Any) -> tuple[NDArray[np.int64], Array]:
         """``D^-1/2 L^-1 P W^T`` of sparse rows W (k, n): the places of its non-zero rows (r,)
