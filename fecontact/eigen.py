@@ -168,8 +168,9 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
         from scipy.sparse.linalg import LinearOperator, eigsh
 
         start = np.random.default_rng(0).standard_normal(size)
+        # By rows, the product with M is quicker.
         squares, shapes = eigsh(
-            K, k=count, M=M, sigma=0.0, v0=system.without_rigid(start),
+            K, k=count, M=M.T, sigma=0.0, v0=system.without_rigid(start),
             OPinv=LinearOperator(K.shape, system.deflection, dtype=float))
     shapes = system.without_rigid(shapes)
     shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))

@@ -33,7 +33,7 @@ def integrate(
     Returns
     -------
     times (k,), states (k, 2 m), work (k, 7), status, statistics
-        k is smaller than the number of times asked for if the run ended early.
+        If the run ended early, those until then, and the last state that was reached.
     """
     import scipy.integrate
 
@@ -92,7 +92,10 @@ def integrate(
         status = Status.INTERRUPTED
     statistics = {"method": method, "rtol": rtol, "steps": steps, **counts,
                   "seconds": clock.perf_counter() - begin}
-    return times[:done], result[:done, :size], result[:done, size:], status, statistics
+    times, result = times[:done], result[:done]
+    if status is not Status.FINISHED and solver.t > times[-1] and np.isfinite(solver.y).all():
+        times, result = np.append(times, solver.t), np.vstack([result, solver.y])
+    return times, result[:, :size], result[:, size:], status, statistics
 
 
 def _step(solver: Any) -> str | None:

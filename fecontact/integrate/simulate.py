@@ -18,7 +18,7 @@ def simulate(
     system: ContactSystem,
     t_end: float,
     *,
-    t_start: float = 0.0,
+    t_start: float | None = None,
     initial: Initial = "rest",
     outputs: int | ArrayLike = 1001,
     method: str = "Radau",
@@ -31,8 +31,10 @@ def simulate(
     ----------
     system : ContactSystem
         What moves.
-    t_end, t_start : float
-        End and start of the run [s].
+    t_end : float
+        End of the run [s].
+    t_start : float, optional
+        Its start [s]; default the end of the run that it continues, else zero.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m,) array
         Where it starts; see :func:`fecontact.integrate.initial.initial_state`.
     outputs : int or (N,) array
@@ -59,6 +61,8 @@ def simulate(
     AnalysisError
         If there is no equilibrium to start from.
     """
+    if t_start is None:
+        t_start = float(initial.time[-1]) if isinstance(initial, Trajectory) else 0.0
     times = _output_times(t_start, t_end, outputs)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
