@@ -80,6 +80,9 @@ class BasisReport:
         if self.basis.quality is None:
             return ("The basis came without a body, so its compliance at the contact cannot be "
                     "judged; compare it with a static solution of the full model.")
+        if self.basis.rigid_modes == self.basis.modes:
+            return ("The basis is rigid: the body moves, but does not deform. Keep more modes "
+                    "where its vibration or its elasticity at the contact matters.")
         error = self.contact_error
         node, axis = np.unravel_index(int(np.argmax(error)), error.shape)
         worst = float(error[node, axis])
@@ -119,7 +122,7 @@ class BasisReport:
                               for share in mass[:, i])
             lines.append(f"{i:4d} {f:15.6g} {ratio} {shares}  {self._kind(i)}")
         error = self.contact_error
-        if np.isfinite(error).all() and error.size:
+        if np.isfinite(error).all() and error.size and basis.rigid_modes < basis.modes:
             lines += ["", "missing static compliance at the contact nodes: "
                           f"x {error[:, 0].max():.2%}, y {error[:, 1].max():.2%} at most, "
                           f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
@@ -127,8 +130,10 @@ class BasisReport:
                         for name, axis, error in self._loaded_points()),
                       f"effective mass kept: x {mass[0].sum():.2%}, y {mass[1].sum():.2%}",
                       f"mass-orthogonality: {self.orthogonality:.1e}"]
-        lines += [f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by steps of "
-                  f"{self.time_step:.2g} s", self.recommendation]
+        if self.highest_frequency_hz > 0.0:
+            lines.append(f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by "
+                         f"steps of {self.time_step:.2g} s")
+        lines.append(self.recommendation)
         return "\n".join(lines)
 
     def _kind(self, mode: int) -> str:

@@ -138,7 +138,7 @@ def modes(
     set_: Changes = None,
     output: Folder = None,
     converge: Annotated[bool, Parameter(negative=(), help=(
-        "Refine the mesh twice, and take more modes: what changes, as a table and a plot."))]
+        "Refine the mesh, and take more modes: what changes, as a table and a plot."))]
     = False,
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""

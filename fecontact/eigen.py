@@ -171,6 +171,7 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
         # By rows, the product with M is quicker.
         squares, shapes = eigsh(
             K, k=count, M=M.T, sigma=0.0, v0=system.without_rigid(start),
+            ncv=min(size, max(20, 2 * count + 8)),
             OPinv=LinearOperator(K.shape, system.deflection, dtype=float))
     shapes = system.without_rigid(shapes)
     shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))

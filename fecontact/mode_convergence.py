@@ -46,9 +46,11 @@ class ModeConvergence:
                             *(f"{c:11.5g}" for c in compliance)])
                   for unknowns, frequencies, compliance in zip(
                       self.unknowns, self.frequencies_hz, self.compliance, strict=True)]
-        change = np.abs(self.frequencies_hz / self.frequencies_hz[-1] - 1.0).max(axis=1)
-        lines += [f"On the given mesh these frequencies are off by up to {change[0]:.1e}, against "
-                  f"the finest.", "", f"{'modes':>9s} {'missing x':>11s} {'missing y':>11s}"]
+        change = np.abs(self.frequencies_hz / self.frequencies_hz[-1] - 1.0)
+        if shown:
+            lines.append(f"On the given mesh these frequencies are off by up to "
+                         f"{change[0].max():.1e}, against the finest.")
+        lines += ["", f"{'modes':>9s} {'missing x':>11s} {'missing y':>11s}"]
         lines += [f"{modes:9d} {missing[0]:11.2%} {missing[1]:11.2%}"
                   for modes, missing in zip(self.modes, self.missing, strict=True)]
         return "\n".join(lines)

@@ -78,12 +78,12 @@ def place_rows(body: "ElasticBody", place: Place, name: str) -> Rows:
                              f"place on the outline or a larger radius.")
         return patch_rows(body, pieces)
     if isinstance(place, str):
+        if place in mesh.boundaries:
+            return patch_rows(body, whole(body.edge_nodes(mesh.boundaries[place])))
         if place in mesh.points:
             nodes = mesh.points[place]
             return node_rows(body, int(nodes[0])) if len(nodes) == 1 else _node_set_rows(
                 body, nodes)
-        if place in mesh.boundaries:
-            return patch_rows(body, whole(body.edge_nodes(mesh.boundaries[place])))
         known = {*mesh.points, *mesh.boundaries}
         raise MeshError(f"Point {name}: the mesh has no point or boundary '{place}'"
                         f"{nearest(place, known)}; it has: {choices(known)}.")

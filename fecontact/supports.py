@@ -104,13 +104,14 @@ def rigid_modes(body: "ElasticBody") -> Array:
 
 
 def _support_nodes(body: "ElasticBody", name: str) -> NDArray[np.int64]:
-    if name in body.mesh.points:
-        return np.asarray(body.mesh.points[name])
-    return np.unique(body.edge_nodes(body.mesh.boundaries[name]))
+    # Meshes may hold a group both ways; only the boundary has the nodes in the middle of edges.
+    if name in body.mesh.boundaries:
+        return np.unique(body.edge_nodes(body.mesh.boundaries[name]))
+    return np.asarray(body.mesh.points[name])
 
 
 def _centre(body: "ElasticBody", name: str, nodes: NDArray[np.int64]) -> Array:
-    if name in body.mesh.points:
+    if name not in body.mesh.boundaries:
         return np.asarray(body.nodes[nodes].mean(axis=0))
     ends = body.mesh.nodes[body.mesh.boundaries[name]]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

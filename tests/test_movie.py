@@ -1,3 +1,4 @@
+import signal
 from itertools import islice, pairwise
 
 import imageio_ffmpeg
@@ -277,3 +278,14 @@ def test_movie_that_the_encoder_cut_short_is_not_kept(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"run\.mp4 cannot be written"):
         render(run(basis(columns=4, rows=2), times=3), tmp_path / "run.mp4", size=SMALL)
     assert not list(tmp_path.iterdir())
+
+
+def test_interrupt_while_a_frame_is_drawn_ends_the_movie(tmp_path):
+    def interrupt(done, total):
+        signal.raise_signal(signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        render(run(), tmp_path / "a.mp4", frames=5, size=(320, 180), progress=interrupt)
+    assert list(tmp_path.iterdir()) == []
+    assert signal.getsignal(signal.SIGINT) is before

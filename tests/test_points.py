@@ -8,6 +8,7 @@ from fecontact.body import ElasticBody, Material
 from fecontact.contact_face import contact_nodes
 from fecontact.eigen import eigenmodes
 from fecontact.errors import InputError, MeshError
+from fecontact.mesh import Mesh
 from fecontact.points import Patch, place_rows
 
 MATERIAL = Material(2.1e11, 0.3, 7850.0)
@@ -482,3 +483,16 @@ def test_face_that_looks_up_in_part():
     body = ElasticBody(type(mesh)(mesh.nodes, mesh.cells, {"contact": both}), MATERIAL)
     with pytest.raises(InputError, match="does not face the ground"):
         body.modal_basis(4, contact_nodes=6)
+
+
+def test_a_group_held_both_as_boundary_and_as_points_is_the_boundary():
+    """Abaqus files give node sets, whose points lack the middles of the edges."""
+    mesh = rectangle(1.0, 0.1, 10, 2)
+    left = np.unique(mesh.boundaries["left"])
+    both = Mesh(mesh.nodes, mesh.cells, mesh.boundaries, {"left": left})
+    plain = ElasticBody(mesh, fixed={"left": "xy"})
+    doubled = ElasticBody(both, fixed={"left": "xy"})
+    np.testing.assert_array_equal(plain.fixed_dofs, doubled.fixed_dofs)
+    for one, other in zip(*(place_rows(body, "left", "B").matrix.toarray()
+                            for body in (plain, doubled)), strict=True):
+        np.testing.assert_array_equal(one, other)

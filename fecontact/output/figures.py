@@ -94,7 +94,8 @@ def phase_figure(trajectory: Trajectory, point: Point = "B", axis: str = "x") ->
     plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
     plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
     speed = trajectory.system.ground.speed
-    if row == 0 and speed != 0.0:
+    # A ground that is much faster would leave a line of the curve.
+    if row == 0 and 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
         plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
                       label="ground")
     plane.legend(loc="best")

@@ -3,7 +3,9 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -102,8 +104,10 @@ def render(
     lasting = float(motion.times[-1] - motion.times[0])
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
     require_rendering()
-    with _movie_file(path, size, fps) if movie else _numbered_files(path) as take:
+    with (_held_back_interrupt() as check,
+          _movie_file(path, size, fps) if movie else _numbered_files(path) as take):
         for done, image in enumerate(_images(motion, size, title, slowness), start=1):
+            check()
             take(image)
             if progress is not None:
                 progress(done, len(indices))
@@ -207,6 +211,28 @@ def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
                          f"({str(error).strip().splitlines()[0]}).") from None
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _held_back_interrupt() -> Iterator[Callable[[], None]]:
+    """A function that raises KeyboardInterrupt if Ctrl-C has come since the block began.
+
+    VTK calls back into Python, and swallows an exception that is raised there.
+    """
+    came: list[int] = []
+
+    def check() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield check
+        return
+    before = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
