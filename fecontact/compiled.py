@@ -23,6 +23,9 @@ matrix = types.Array(f8, 2, "C")
 block = types.Array(f8, 3, "C")
 
 
+_FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
+
+
 @cache
 def _package_stamp() -> str:
     """A mark that changes with any source of the package."""
@@ -44,7 +47,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
     def compile_(function: Callable[..., Any]) -> Any:
         settings: dict[str, Any] = {
             "cache": True, "error_model": "numpy",
-            "fastmath": {"reassoc", "contract", "nsz", "arcp"}, **options,
+            "fastmath": _FASTMATH, **options,
         }
         dispatcher = njit(**settings)(function)
         stored = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
@@ -55,6 +58,11 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
         return dispatcher
 
     return compile_
+
+
+def helper(function: Callable[..., Any]) -> Any:
+    """Compile a small function that kernels share, and that becomes part of each of them."""
+    return njit(error_model="numpy", fastmath=_FASTMATH)(function)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import block, f8, i8, kernel, matrix, vector
+from fecontact.compiled import block, f8, helper, i8, kernel, matrix, vector
 from fecontact.laws.contract import friction_at, ground_at, motion_at, normal_at
 
 Array = NDArray[np.float64]
@@ -54,20 +54,28 @@ NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROU
 STATE_COLUMNS = 6
 
 
+@helper
+def _motion_of(j, y, s):  # type: ignore[no-untyped-def]
+    """Displacement along and away from the ground of node j, and their rates."""
+    m = s.Tx.shape[1]
+    x, height, x_rate, height_rate = 0.0, 0.0, 0.0, 0.0
+    for i in range(m):
+        x += s.Tx[j, i] * y[i]
+        height += s.Ty[j, i] * y[i]
+        x_rate += s.Tx[j, i] * y[m + i]
+        height_rate += s.Ty[j, i] * y[m + i]
+    return x, height, x_rate, height_rate
+
+
 @kernel(types.void(f8, vector, _ARRAYS, matrix))
 def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
     """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node."""
-    n, m = s.Tx.shape
+    n = len(s.Tx)
     normal, friction = normal_at(s.normal), friction_at(s.friction)
     profile = ground_at(s.profile)
     travel, speed = motion_at(s.ground_motion)(t, s.ground_motion_parameters)
     for j in range(n):
-        x, height, x_rate, height_rate = 0.0, 0.0, 0.0, 0.0
-        for i in range(m):
-            x += s.Tx[j, i] * y[i]
-            height += s.Ty[j, i] * y[i]
-            x_rate += s.Tx[j, i] * y[m + i]
-            height_rate += s.Ty[j, i] * y[m + i]
+        x, height, x_rate, height_rate = _motion_of(j, y, s)
         ground, slope, _ = profile(s.abscissa[j] + x - travel, s.profile_parameters)
         slip = x_rate - speed
         u = ground - height - s.gap[j]
@@ -98,12 +106,7 @@ def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
             total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
         out[m + i] = total
     for j in range(n):
-        x, height, x_rate, height_rate = 0.0, 0.0, 0.0, 0.0
-        for i in range(m):
-            x += s.Tx[j, i] * y[i]
-            height += s.Ty[j, i] * y[i]
-            x_rate += s.Tx[j, i] * y[m + i]
-            height_rate += s.Ty[j, i] * y[m + i]
+        x, height, x_rate, height_rate = _motion_of(j, y, s)
         ground, slope, _ = profile(s.abscissa[j] + x - travel, s.profile_parameters)
         slip = x_rate - speed
         force = normal(ground - height - s.gap[j], slope * slip - height_rate,
@@ -128,12 +131,7 @@ def contact_gradients(t, y, s, gradients, active):  # type: ignore[no-untyped-de
     travel, speed = motion_at(s.ground_motion)(t, s.ground_motion_parameters)
     count = 0
     for j in range(n):
-        x, height, x_rate, height_rate = 0.0, 0.0, 0.0, 0.0
-        for i in range(m):
-            x += s.Tx[j, i] * y[i]
-            height += s.Ty[j, i] * y[i]
-            x_rate += s.Tx[j, i] * y[m + i]
-            height_rate += s.Ty[j, i] * y[m + i]
+        x, height, x_rate, height_rate = _motion_of(j, y, s)
         ground, slope, curvature = profile(s.abscissa[j] + x - travel, s.profile_parameters)
         slip = x_rate - speed
         force, force_u, force_v = normal(ground - height - s.gap[j], slope * slip - height_rate,
