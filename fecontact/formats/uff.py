@@ -1,11 +1,11 @@
 """Universal files (UFF, UNV) of modes, as test laboratories and preprocessors write them.
 
-Read by pyuff: data sets 55 (data at nodes), 15 and 2411 (nodes), 164 (units), 2420 (coordinate
-systems). Set 55 carries six digits.
+Read by pyuff: data sets 55 (data at nodes), 15 and 2411 (nodes), 2412 (elements), 164 (units),
+2420 (coordinate systems). Set 55 carries six digits.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +45,8 @@ class UffModes:
         None where the file does not give them for every mode.
     source : str
         The file, for messages.
+    elements : mapping of int to (k, c) integer array
+        Labels of the c nodes of the k elements that have as many; empty where the file has none.
     """
 
     frequencies_hz: Array
@@ -54,6 +56,7 @@ class UffModes:
     damping_ratios: Array
     modal_masses: Array | None
     source: str
+    elements: Mapping[int, NDArray[np.int64]] = field(default_factory=dict)
 
     def modal_basis(
         self,
@@ -183,7 +186,7 @@ def _data_sets(path: Path) -> list[dict[str, Any]]:
     try:
         file = pyuff.UFF(str(path))
         kinds = file.get_set_types()
-        wanted = [k for k, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2420)]
+        wanted = [k for k, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2412, 2420)]
         # One at a time: what pyuff returns for one set is no list, and its message for several
         # does not say which one is damaged.
         sets = []
@@ -228,7 +231,26 @@ def _modes(sets: list[dict[str, Any]], source: str) -> UffModes:
         damping_ratios=ratios,
         modal_masses=masses / (force * length) if (masses > 0.0).all() else None,
         source=source,
+        elements=_elements(sets),
     )
+
+
+def _elements(sets: list[dict[str, Any]]) -> dict[int, NDArray[np.int64]]:
+    found: dict[int, list[list[int]]] = {}
+    for one in sets:
+        if one["type"] != 2412:
+            continue
+        for kind, elements in one.items():
+            if not isinstance(kind, int):
+                continue  # pyuff repeats triangles and quadrilaterals under their names
+            for element in elements:
+                nodes = element["nodes_nums"]
+                if len(nodes) != element["num_nodes"]:
+                    raise InputError(f"Element {element['element_nums']} of data set 2412 has "
+                                     f"{len(nodes)} nodes where {element['num_nodes']} are "
+                                     f"announced.")
+                found.setdefault(len(nodes), []).append(nodes)
+    return {count: np.array(nodes, dtype=np.int64) for count, nodes in sorted(found.items())}
 
 
 def _require_displacements(mode: Mapping[str, Any], number: int) -> None:
