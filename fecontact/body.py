@@ -145,14 +145,20 @@ class ElasticBody:
         return sp.csc_array(0.5 * self.thickness * (K + K.T))
 
     @cached_property
-    def mass(self) -> Any:
-        """Mass M, sparse (2 N, 2 N), without supports [kg]."""
+    def component_mass(self) -> Any:
+        """Mass of one displacement component, sparse (N, N) by rows, without supports [kg]."""
         import scipy.sparse as sp
         from skfem import BilinearForm
 
         scalar = BilinearForm(lambda u, v, w: u * v).assemble(self.basis)
-        scalar = 0.5 * self.material.density * self.thickness * (scalar + scalar.T)
-        return sp.csc_array(sp.kron(scalar, sp.eye_array(2)))
+        return sp.csr_array(0.5 * self.material.density * self.thickness * (scalar + scalar.T))
+
+    @cached_property
+    def mass(self) -> Any:
+        """Mass M, sparse (2 N, 2 N), without supports [kg]."""
+        import scipy.sparse as sp
+
+        return sp.csc_array(sp.kron(self.component_mass, sp.eye_array(2)))
 
     @cached_property
     def gradients(self) -> tuple[Any, Any]:

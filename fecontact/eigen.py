@@ -5,8 +5,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
+from fecontact.compiled import block, kernel, matrix, vector
 from fecontact.errors import AnalysisError, InputError
 from fecontact.factorisation import Factors, factorised
 from fecontact.field import fixed_signs
@@ -31,21 +33,25 @@ class FreeSystem:
         K, symmetric and positive semi-definite, and M, positive definite.
     rigid : (f, r) array
         Mass-normalised rigid modes: ``K rigid = 0``.
+    component_mass : sparse (f / 2, f / 2) array, optional
+        Mass of one component, where x and y alternate and have the same.
     """
 
     stiffness: Any
     mass: Any
     rigid: Array
+    component_mass: Any = None
 
     @classmethod
     def of(cls, body: "ElasticBody") -> "FreeSystem":
         """The free degrees of freedom of a body."""
         E = body.expansion
         rigid = rigid_modes(body)
+        if E.shape[0] == E.shape[1]:
+            return cls(body.stiffness, body.mass, rigid, body.component_mass)
         if E.nnz == E.shape[1]:
             free = E.indices
-            K, M = (a if len(free) == a.shape[0] else a[free][:, free].tocsc()
-                    for a in (body.stiffness, body.mass))
+            K, M = (a[free][:, free].tocsc() for a in (body.stiffness, body.mass))
             return cls(K, M, rigid[free])
         # The columns of E have no row in common, so that E^T E is diagonal.
         return cls((E.T @ body.stiffness @ E).tocsc(), (E.T @ body.mass @ E).tocsc(),
@@ -74,6 +80,20 @@ class FreeSystem:
     def inertia(self) -> Array:
         """M rigid (f, r)."""
         return np.asarray(self.mass @ self.rigid)
+
+    @cached_property
+    def mass_product(self) -> Any:
+        """``M x`` of displacements x (f,), as quick as may be."""
+        from scipy.sparse.linalg import LinearOperator
+
+        if self.component_mass is None:
+            # By rows, the product is quicker.
+            return self.mass.T
+        # Both components at once, as the two parts of complex numbers.
+        both = self.component_mass.astype(complex)
+        return LinearOperator(
+            self.mass.shape, lambda x: (both @ x.reshape(-1).view(complex)).view(float),
+            dtype=float)
 
     def without_rigid(self, shapes: Array) -> Array:
         """The part of displacements (f,) or (f, k) that is mass-orthogonal to the rigid modes."""
@@ -134,19 +154,41 @@ def strain_energies(body: "ElasticBody", shapes: Array) -> Array:
     whole: all of them, for a slender body with cells strongly graded into its corners.
     """
     basis = body.basis
-    slopes = [function[0].grad for function in basis.basis]
-    direct, lateral, shear = body.elasticity
-    energies = np.zeros(shapes.shape[1])
-    for mode, shape in enumerate(shapes.T):
-        local = shape.reshape(-1, 2)[basis.element_dofs]
-        local = local - local.mean(axis=0)
-        (xx, xy), (yx, yy) = (
-            sum(slope * values[:, None] for slope, values in zip(slopes, part, strict=True))
-            for part in (local[..., 0], local[..., 1])
-        )
-        density = direct * (xx**2 + yy**2) + 2.0 * lateral * xx * yy + shear * (xy + yx) ** 2
-        energies[mode] = 0.5 * body.thickness * (density * basis.dx).sum()
-    return energies
+    slopes = np.ascontiguousarray([function[0].grad for function in basis.basis])
+    functions, _, elements, points = slopes.shape
+    energies = np.empty(shapes.shape[1])
+    _strain_energies(slopes.reshape(2 * functions, elements, points),
+                     np.ascontiguousarray(basis.dx),
+                     np.ascontiguousarray(basis.element_dofs.T, dtype=np.int64),
+                     np.ascontiguousarray(shapes), np.array(body.elasticity), energies)
+    return energies * body.thickness
+
+
+@kernel(types.void(block, matrix, types.Array(types.int64, 2, "C"), matrix, vector, vector))
+def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):  # type: ignore[no-untyped-def]
+    """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions to x and to y."""
+    elements, points = dx.shape
+    corners, modes = nodes.shape[1], len(energies)
+    direct, lateral, shear = elasticity
+    strains = np.empty((3, modes))
+    energies[:] = 0.0
+    for e in range(elements):
+        for p in range(points):
+            strains[:] = 0.0
+            for k in range(1, corners):
+                # Only differences count: rigid displacements may be much larger.
+                x, y = slopes[2 * k, e, p], slopes[2 * k + 1, e, p]
+                node, first = 2 * nodes[e, k], 2 * nodes[e, 0]
+                for i in range(modes):
+                    along = shapes[node, i] - shapes[first, i]
+                    across = shapes[node + 1, i] - shapes[first + 1, i]
+                    strains[0, i] += x * along
+                    strains[1, i] += y * across
+                    strains[2, i] += y * along + x * across
+            for i in range(modes):
+                xx, yy, xy = strains[0, i], strains[1, i], strains[2, i]
+                energies[i] += 0.5 * dx[e, p] * (
+                    direct * (xx * xx + yy * yy) + 2.0 * lateral * xx * yy + shear * xy * xy)
 
 
 def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
@@ -168,9 +210,8 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
         from scipy.sparse.linalg import LinearOperator, eigsh
 
         start = np.random.default_rng(0).standard_normal(size)
-        # By rows, the product with M is quicker.
         squares, shapes = eigsh(
-            K, k=count, M=M.T, sigma=0.0, v0=system.without_rigid(start),
+            K, k=count, M=system.mass_product, sigma=0.0, v0=system.without_rigid(start),
             ncv=min(size, max(20, 2 * count + 8)),
             OPinv=LinearOperator(K.shape, system.deflection, dtype=float))
     shapes = system.without_rigid(shapes)
