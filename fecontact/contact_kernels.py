@@ -16,7 +16,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.compiled import block, f8, helper, i8, kernel, matrix, vector
-from fecontact.laws.contract import friction_at, ground_at, motion_at, normal_at
+from fecontact.laws.contract import friction_at, ground_at, signal_at, normal_at
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
     n = len(s.Tx)
     normal, friction = normal_at(s.normal), friction_at(s.friction)
     profile = ground_at(s.profile)
-    travel, speed = motion_at(s.ground_motion)(t, s.ground_motion_parameters)
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     for j in range(n):
         x, height, x_rate, height_rate = _motion_of(j, y, s)
         ground, slope, _ = profile(s.abscissa[j] + x - travel, s.profile_parameters)
@@ -94,8 +94,8 @@ def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
     """Fill out (2 m,) with y'."""
     n, m = s.Tx.shape
     normal, friction = normal_at(s.normal), friction_at(s.friction)
-    profile, drive = ground_at(s.profile), motion_at(s.drive)
-    travel, speed = motion_at(s.ground_motion)(t, s.ground_motion_parameters)
+    profile, drive = ground_at(s.profile), signal_at(s.drive)
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     drive_x = drive(t, s.drive_parameters[0])[0]
     drive_y = drive(t, s.drive_parameters[1])[0]
     for i in range(m):
@@ -128,7 +128,7 @@ def contact_gradients(t, y, s, gradients, active):  # type: ignore[no-untyped-de
     n, m = s.Tx.shape
     normal, friction = normal_at(s.normal), friction_at(s.friction)
     profile = ground_at(s.profile)
-    travel, speed = motion_at(s.ground_motion)(t, s.ground_motion_parameters)
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     count = 0
     for j in range(n):
         x, height, x_rate, height_rate = _motion_of(j, y, s)
@@ -193,8 +193,8 @@ def powers(t, y, s, modal_damping, dashpots, out):  # type: ignore[no-untyped-de
     """
     n, m = s.Tx.shape
     normal = normal_at(s.normal)
-    drive = motion_at(s.drive)
-    speed = motion_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
+    drive = signal_at(s.drive)
+    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
     state = np.empty((n, 6))
     contact_state(t, y, s, state)
     out[:] = 0.0

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
 from fecontact.errors import AnalysisError
-from fecontact.laws.contract import friction_law, motion
+from fecontact.laws.contract import friction_law, signal
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -16,7 +16,7 @@ def _frictionless(v, F, p):  # type: ignore[no-untyped-def]
     return 0.0, 0.0, 0.0
 
 
-@motion
+@signal
 def _still(t, p):  # type: ignore[no-untyped-def]
     return p[0], 0.0
 

@@ -1,4 +1,4 @@
-"""What a law is: signatures, signs and units, and the base class of all of them.
+"""What a law is: signatures, signs and units, and the base classes of all of them.
 
 A law is a frozen dataclass of its parameters together with a scalar function, written once in
 plain Python and compiled. The functions allocate nothing and raise nothing.
@@ -6,22 +6,31 @@ plain Python and compiled. The functions allocate nothing and raise nothing.
 ===========  ==========================  =========================================================
 kind         function                    returns
 ===========  ==========================  =========================================================
-normal       ``f(u, v, p)``              F, dF/du, dF/dv: normal force on the body [N], zero or
-                                         above, from penetration u [m] and its rate v [m/s]
+normal       ``f(u, v, p)``              F, dF/du, dF/dv: normal force on the body [N] from
+                                         penetration u [m] and its rate v [m/s]; zero or above,
+                                         except that a stop above the body pushes it down, F < 0
 friction     ``f(v, F, p)``              R, dR/dv, dR/dF: friction force [N] that acts on the body
                                          against +x, with the sign of the slip velocity v of the
                                          body relative to the ground [m/s], from the normal
-                                         force F [N]
-ground       ``f(xi, p)``                y, y', y'': height [m] at the abscissa xi of the ground's
-                                         own frame [m] and its derivatives
-motion       ``f(t, p)``                 value and rate of a motion given in time: travel of the
-                                         ground [m], displacement of the drive [m]
+                                         force F >= 0 [N]
+friction     ``f(v, F, z, p, force,      nothing; fills ``force`` (3 + s,) with R, dR/dv, dR/dF and
+with memory  rates)``                    the s derivatives dR/dz, and ``rates`` (s, 3 + s) with a
+                                         row z', dz'/dv, dz'/dF, dz'/dz per internal variable z
+ground       ``f(xi, p)``                y, y', y'': height [m], or factor of the friction force,
+                                         at the abscissa xi of the ground's own frame [m] and its
+                                         derivatives
+signal       ``f(t, p)``                 value and rate of what is given in time: travel of the
+                                         ground [m], displacement of the drive [m], load [N]
 ===========  ==========================  =========================================================
 
 ``p`` holds the parameters in the order of the dataclass's fields; for normal and friction laws
 it is that of the contact node. A parameter given as one number holds for every node; an extensive
 one (stiffness, damping) is then the total of the contact face and is shared by tributary length.
 A parameter given as a sequence has one value per node and is not shared.
+
+Internal variables of friction with memory are states of the system, integrated with it. Their
+rates must be continuous where R depends on them; at F = 0, where it does not, they fall back to
+zero.
 """
 
 from collections.abc import Callable
@@ -32,18 +41,20 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import CompiledLaw, compile_law, f8, function_at, vector
+from fecontact.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
 from fecontact.errors import InputError
 
 NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
 FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)
+MEMORY = types.void(f8, f8, vector, vector, vector, matrix)
 GROUND = types.UniTuple(f8, 3)(f8, vector)
-MOTION = types.UniTuple(f8, 2)(f8, vector)
+SIGNAL = types.UniTuple(f8, 2)(f8, vector)
 
 normal_at = function_at(NORMAL)
 friction_at = function_at(FRICTION)
+memory_at = function_at(MEMORY)
 ground_at = function_at(GROUND)
-motion_at = function_at(MOTION)
+signal_at = function_at(SIGNAL)
 
 PerNode = float | tuple[float, ...]
 
@@ -63,9 +74,14 @@ def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
     return compile_law(GROUND, function)
 
 
-def motion(function: Callable[..., Any]) -> CompiledLaw:
+def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
+    """Compile ``f(v, F, z, p, force, rates)`` that fills force and rates."""
+    return compile_law(MEMORY, function)
+
+
+def signal(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(t, p) -> value, rate``."""
-    return compile_law(MOTION, function)
+    return compile_law(SIGNAL, function)
 
 
 @dataclass(frozen=True)
@@ -113,3 +129,58 @@ class NodeLaw:
 
     def _title(self, name: str) -> str:
         return f"{type(self).__name__}: {name}"
+
+
+@dataclass(frozen=True)
+class NormalLaw(NodeLaw):
+    """A normal law; ``kernel`` is a :func:`normal_law`."""
+
+    @property
+    def penetration_scale(self) -> float:
+        """Penetration [m] over which the law changes its character, the smallest of all nodes.
+
+        Tolerances of time integration and starting values of equilibria follow from it.
+        """
+        raise NotImplementedError
+
+    def stored_energy(
+        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
+        from fecontact.laws.potential import stored_energy
+
+        return stored_energy(self, penetration, share)
+
+
+@dataclass(frozen=True)
+class FrictionLaw(NodeLaw):
+    """A friction law; ``kernel`` is a :func:`friction_law` or a :func:`memory_friction_law`."""
+
+    @property
+    def memory(self) -> int:
+        """Number s of internal variables per node; zero for laws without memory."""
+        return 0
+
+    @property
+    def velocity_scale(self) -> float:
+        """Slip velocity [m/s] over which the force rises, the smallest of all nodes."""
+        raise NotImplementedError
+
+    def stick_velocity(self, nodes: int) -> NDArray[np.float64]:
+        """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
+
+        It is where the friction force is largest for a given normal force; where it has no
+        maximum, ten times :attr:`velocity_scale`.
+        """
+        from fecontact.laws.friction_curve import stick_velocity
+
+        return stick_velocity(self, nodes)
+
+    def sticks(
+        self,
+        slip_velocity: NDArray[np.float64],
+        normal_force: NDArray[np.float64],
+        friction_force: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Whether nodes in contact stick, from their slip velocities, F and R, each (N, n)."""
+        return np.abs(slip_velocity) < self.stick_velocity(slip_velocity.shape[-1])

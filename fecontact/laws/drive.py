@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import require_finite, require_not_negative
-from fecontact.laws.contract import motion
+from fecontact.laws.contract import signal
 
 
-@motion
+@signal
 def _harmonic(t, p):  # type: ignore[no-untyped-def]
     amplitude, w = p[0], p[1]
     return amplitude * math.sin(w * t), amplitude * w * math.cos(w * t)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import require_finite, require_not_negative, require_positive
-from fecontact.laws.contract import ground_profile, motion
+from fecontact.laws.contract import ground_profile, signal
 
 
 @ground_profile
@@ -19,7 +19,7 @@ def _sine(xi, p):  # type: ignore[no-untyped-def]
     return sine, wave_number * cosine, -wave_number * wave_number * sine
 
 
-@motion
+@signal
 def _constant_speed(t, p):  # type: ignore[no-untyped-def]
     return p[0] * t, p[0]
 
