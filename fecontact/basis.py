@@ -44,6 +44,9 @@ class ModalBasis:
         Modes over the whole body; None for a basis without geometry.
     quality : Quality or None
         How the basis relates to the body; None for a basis without one.
+    groups : tuple of (str, int)
+        Names of the contact groups and their numbers of nodes, in the order of the nodes; one
+        group 'contact' of all when left out.
     """
 
     angular_frequencies: Array
@@ -54,6 +57,7 @@ class ModalBasis:
     extra: tuple[str, ...] = ()
     field: Field | None = None
     quality: Quality | None = None
+    groups: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("angular_frequencies", "damping", "T", "positions", "tributary"):
@@ -65,6 +69,12 @@ class ModalBasis:
         if not (self.tributary > 0.0).all():
             raise InputError(f"Modal basis: tributary lengths must be above zero, not "
                              f"{self.tributary.min()}.")
+        groups = tuple((str(name), int(count)) for name, count in self.groups)
+        groups = groups or (("contact", len(self.tributary)),)
+        if sum(count for _, count in groups) != len(self.tributary):
+            raise InputError(f"Modal basis: the contact groups {groups} do not make up the "
+                             f"{len(self.tributary)} contact nodes.")
+        object.__setattr__(self, "groups", groups)
         m = len(self.angular_frequencies)
         points = 2 + len(self.tributary) + len(self.extra)
         for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2))):

@@ -6,6 +6,7 @@ spent in converting function objects when the kernel is called from Python.
 """
 
 import hashlib
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -14,13 +15,17 @@ from typing import Any
 
 from numba import cfunc, njit, types
 from numba.core import cgutils
+from numba.core.errors import NumbaError
 from numba.extending import intrinsic
+
+from fecontact.errors import InputError
 
 f8 = types.float64
 i8 = types.int64
 vector = types.Array(f8, 1, "C")
 matrix = types.Array(f8, 2, "C")
 block = types.Array(f8, 3, "C")
+integers = types.Array(i8, 1, "C")
 
 
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
@@ -82,10 +87,27 @@ class CompiledLaw:
     _function: Any
 
 
-def compile_law(signature: Any, function: Callable[..., Any]) -> CompiledLaw:
-    """Compile a scalar law for the given signature."""
-    compiled = cfunc(signature, cache=True, error_model="numpy")(function)
+def compile_law(signature: Any, form: str, function: Callable[..., Any]) -> CompiledLaw:
+    """Compile a scalar law for the given signature; ``form`` is that signature for people.
+
+    Raises
+    ------
+    InputError
+        If the function takes or returns something else, or uses what cannot be compiled.
+    """
+    # Functions typed into a console have no file beside which they could be stored.
+    stored = Path(inspect.getfile(function)).is_file()
+    try:
+        compiled = cfunc(signature, cache=stored, error_model="numpy")(function)
+    except (NumbaError, TypeError) as error:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        raise InputError(f"The law {function.__name__}({_arguments(function)}) is not one of the form "
+                         f"{form}: {lines[1] if len(lines) > 1 else lines[0]}") from None
     return CompiledLaw(function, int(compiled.address or 0), compiled)
+
+
+def _arguments(function: Callable[..., Any]) -> str:
+    return ", ".join(inspect.signature(function).parameters)
 
 
 def function_at(signature: Any) -> Any:

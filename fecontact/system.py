@@ -1,88 +1,171 @@
 """The contact system: a modal basis, laws at its contact nodes, drive and load."""
 
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact import contact_kernels as kernels
+from fecontact import contact_jacobian, contact_kernels
 from fecontact.basis import ModalBasis
+from fecontact.compiled import CompiledLaw
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Gap, gap_values
+from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction, FrictionLaw
+from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
-from fecontact.laws.normal import NormalLaw, RoughSurface
+from fecontact.laws.normal import RoughSurface
+from fecontact.laws.soundness import require_sound
+from fecontact.parameters import parameters_of, with_parameters
 
 Array = NDArray[np.float64]
 
 PARTS = ("normal", "friction", "ground", "drive", "load")
 
-# What each part must offer; normal and friction functions have the same signature.
-_CONTRACTS = {
-    "basis": ("T", "tributary"),
-    "normal": ("kernel", "table", "stored_energy"),
-    "friction": ("kernel", "table", "stick_velocity"),
-    "ground": ("profile_kernel", "motion_kernel"),
-    "drive": ("motion_kernel", "stiffness_x"),
-    "load": ("normal",),
-}
+_DIRECTIONS = ("x", "y", "moment")
+_KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
 
 
 @dataclass(frozen=True, eq=False)
 class ContactSystem:
     """Reduced equations of an elastic body in contact with moving ground, (4.1-1) to (4.1-23).
 
-    ``q'' + D q' + w^2 q = T^T f`` with, at B, the drive's springs and dashpots, at C the load,
-    and at contact node j ``[-R_j, F_j, 0]`` from the normal and the friction law. Immutable; see
-    :meth:`with_`.
+    ``q'' + D q' + w^2 q = T^T f`` with, at B, the drive's springs and dashpots, at C and other
+    points the loads, and at contact node j ``[-R_j, F_j, 0]`` from the normal and the friction
+    law. Immutable; see :meth:`with_`.
 
     Attributes
     ----------
     basis : ModalBasis
-    normal : normal law
-        Normal force F (zero or above, on the body, upwards) from penetration and its rate.
-    friction : friction law
+    normal : normal law, or mapping of contact group to normal law
+        Normal force F (on the body, upwards) from penetration and its rate.
+    friction : friction law, or mapping of contact group to friction law
         Friction force R (on the body, against the slip velocity).
     ground : Ground
-        Profile and speed of the ground.
+        Profile and motion of the ground.
     drive : Drive
         Base excitation of B.
     load : Load
-        Constant load at C.
+        Loads at C and other points.
     gap : float, (n,) sequence, Crown or function of x
         Initial distance g_j of the contact nodes from flat ground, zero or above [m]; kept as
         numbers.
     """
 
     basis: ModalBasis
-    normal: NormalLaw = field(default_factory=RoughSurface)
-    friction: FrictionLaw = field(default_factory=ExponentialFriction)
+    normal: NormalLaw | Mapping[str, NormalLaw] = field(default_factory=RoughSurface)
+    friction: FrictionLaw | Mapping[str, FrictionLaw] = field(default_factory=ExponentialFriction)
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
     gap: Gap = 0.0
 
     def __post_init__(self) -> None:
-        for name, needs in _CONTRACTS.items():
-            part = getattr(self, name)
-            if not all(hasattr(part, need) for need in needs):
-                raise InputError(f"ContactSystem: {name} = {part!r} cannot serve as {name}; it "
-                                 f"must have {', '.join(needs)}.")
+        for name, kind in _KINDS.items():
+            if not isinstance(getattr(self, name), kind):
+                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} must be a "
+                                 f"{kind.__name__}.")
+        for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
+            given = getattr(self, name)
+            if isinstance(given, Mapping):
+                self._require_groups(name, given)
+                object.__setattr__(self, name, MappingProxyType(dict(given)))
+            for one in getattr(self, name).values() if isinstance(given, Mapping) else (given,):
+                if not isinstance(one, law):
+                    raise InputError(f"ContactSystem: {name} = {one!r} cannot serve as {name}; it "
+                                     f"must be a {law.__name__}.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+        for kind in ("normal", "friction"):
+            for _, _, law in self.law_groups(kind):
+                require_sound(law)
         _ = self.arrays
+
+    def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
+        names = [group for group, _ in self.basis.groups]
+        for group in given:
+            if group not in names:
+                raise InputError(f"ContactSystem: {name} has a law for the contact group "
+                                 f"'{group}'{nearest(group, names)}, but the groups of the basis "
+                                 f"are: {choices(names)}.")
+        missing = [group for group in names if group not in given]
+        if missing:
+            raise InputError(f"ContactSystem: {name} lacks a law for the contact "
+                             f"group{'s' * (len(missing) > 1)} {choices(missing)}.")
+
+    def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
+        """Contact nodes that share a law: their place, each one's part of their face, the law.
+
+        The total of an extensive parameter is that of the whole face for a single law, and that
+        of the group for a law of a contact group.
+        """
+        given, tributary = getattr(self, kind), self.basis.tributary
+        if not isinstance(given, Mapping):
+            yield slice(0, len(tributary)), tributary / tributary.sum(), given
+            return
+        first = 0
+        for name, count in self.basis.groups:
+            nodes = slice(first, first + count)
+            yield nodes, tributary[nodes] / tributary[nodes].sum(), given[name]
+            first += count
 
     @property
     def share(self) -> Array:
         """Part (n,) of the contact face that belongs to each node; their sum is one."""
         return self.basis.tributary / self.basis.tributary.sum()
 
+    @property
+    def memory(self) -> int:
+        """Number s of internal variables that the state holds for each contact node."""
+        return int(self.arrays.memory.max())
+
+    @property
+    def size(self) -> int:
+        """Number of values of a state y = [q, q', z]: 2 m + n s."""
+        return 2 * self.basis.modes + self.basis.contact_nodes * self.memory
+
+    @property
+    def penetration_scale(self) -> float:
+        """Smallest penetration over which a normal law changes its character [m]."""
+        return min(law.penetration_scale for _, _, law in self.law_groups("normal"))
+
+    @property
+    def velocity_scale(self) -> float:
+        """Smallest slip velocity over which a friction force rises [m/s]."""
+        return min(law.velocity_scale for _, _, law in self.law_groups("friction"))
+
+    def stored_energy(self, penetration: Array) -> Array:
+        """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""
+        energy = np.zeros(penetration.shape[:-1])
+        for nodes, share, law in self.law_groups("normal"):
+            energy += law.stored_energy(penetration[..., nodes], share).sum(axis=-1)
+        return energy
+
+    def sticks(
+        self, slip_velocity: Array, normal_force: Array, friction_force: Array
+    ) -> NDArray[np.bool_]:
+        """Whether nodes in contact stick, from their slip velocities, F and R, each (N, n)."""
+        return np.concatenate(
+            [law.sticks(slip_velocity[..., nodes], np.abs(normal_force[..., nodes]),
+                        friction_force[..., nodes])
+             for nodes, _, law in self.law_groups("friction")], axis=-1)
+
+    def _law_table(self, kind: Literal["normal", "friction"]) -> tuple[NDArray[np.int64], Array]:
+        """Addresses (n,) and parameters (n, k) of the laws of all nodes."""
+        groups = [(law, law.table(share)) for _, share, law in self.law_groups(kind)]
+        width = max(table.shape[1] for _, table in groups)
+        return (np.concatenate([np.full(len(table), law.kernel.address, dtype=np.int64)
+                                for law, table in groups]),
+                np.vstack([np.pad(table, ((0, 0), (0, width - table.shape[1])))
+                           for _, table in groups]))
+
     @cached_property
-    def arrays(self) -> kernels.SystemArrays:
+    def arrays(self) -> contact_kernels.SystemArrays:
         """The system as the compiled kernels take it."""
-        basis, drive = self.basis, self.drive
+        basis, drive, ground = self.basis, self.drive, self.ground
         B, C = basis.T[0], basis.T[1]
         stiffness = np.diag(basis.angular_frequencies**2)
         damping = basis.damping.copy()
@@ -90,55 +173,69 @@ class ContactSystem:
                            (1, drive.stiffness_y, drive.damping_y)):
             stiffness += c * np.outer(B[axis], B[axis])
             damping += b * np.outer(B[axis], B[axis])
-        n = basis.contact_nodes
-        return kernels.SystemArrays(
+        n, m = basis.contact_nodes, basis.modes
+        normal, normal_parameters = self._law_table("normal")
+        friction, friction_parameters = self._law_table("friction")
+        memory = [np.full(nodes.stop - nodes.start, law.memory, dtype=np.int64)
+                  for nodes, _, law in self.law_groups("friction")]
+        loads = self.load.forces
+        load_shapes = [basis.T[basis.point_index(force.point), _DIRECTIONS.index(force.direction)]
+                       for force in loads]
+        scale = ground.friction_scale_kernel
+        return contact_kernels.SystemArrays(
             stiffness=stiffness,
             damping=damping,
+            modal_damping=basis.damping.copy(),
             constant_load=-self.load.normal * C[1],
             drive_shapes=np.array([drive.stiffness_x * B[0], drive.stiffness_y * B[1]]),
             drive_stiffness=np.array([drive.stiffness_x, drive.stiffness_y], dtype=float),
+            load_shapes=np.array(load_shapes, dtype=float).reshape(-1, m),
             Tx=basis.contact_T[:, 0].copy(),
             Ty=basis.contact_T[:, 1].copy(),
             abscissa=basis.contact_x.copy(),
             gap=np.array(np.broadcast_to(np.asarray(self.gap, dtype=float), n)),
-            normal_parameters=self.normal.table(self.share),
-            friction_parameters=self.friction.table(self.share),
-            profile_parameters=self.ground.profile_parameters(),
-            ground_motion_parameters=self.ground.motion_parameters(),
-            drive_parameters=drive.motion_parameters(),
-            normal=self.normal.kernel.address,
-            friction=self.friction.kernel.address,
-            profile=self.ground.profile_kernel.address,
-            ground_motion=self.ground.motion_kernel.address,
-            drive=drive.motion_kernel.address,
+            normal_parameters=normal_parameters,
+            friction_parameters=friction_parameters,
+            profile_parameters=ground.profile_parameters(),
+            friction_scale_parameters=ground.friction_scale_parameters(),
+            ground_motion_parameters=ground.motion_parameters(),
+            drive_parameters=_rows([motion.parameters() for motion in drive.motions]),
+            load_parameters=_rows([force.signal.parameters() for force in loads]),
+            normal=normal,
+            friction=friction,
+            memory=np.concatenate(memory),
+            drive=_addresses(motion.kernel for motion in drive.motions),
+            load=_addresses(force.signal.kernel for force in loads),
+            profile=ground.profile_kernel.address,
+            friction_scale=0 if scale is None else scale.address,
+            ground_motion=ground.motion_kernel.address,
         )
 
     def rhs(self, t: float, y: Array) -> Array:
-        """Rate y' (2 m,) of the state y = [q, q']."""
-        out = np.empty(2 * self.basis.modes)
-        kernels.right_hand_side(float(t), self._checked(y), self.arrays, out)
+        """Rate y' (2 m + n s,) of the state y = [q, q', z]."""
+        out = np.empty(self.size)
+        contact_kernels.right_hand_side(float(t), self._checked(y), self.arrays, out)
         return out
 
     def jacobian(self, t: float, y: Array) -> Array:
-        """Jacobian dy'/dy (2 m, 2 m)."""
-        size = 2 * self.basis.modes
-        out = np.empty((size, size))
-        kernels.jacobian(float(t), self._checked(y), self.arrays, out)
+        """Jacobian dy'/dy (2 m + n s, 2 m + n s)."""
+        out = np.empty((self.size, self.size))
+        contact_jacobian.jacobian(float(t), self._checked(y), self.arrays, out)
         return out
 
     def contact_history(self, times: Array, states: Array) -> Array:
-        """Contact quantities (N, n, 6) at N times and states (N, 2 m).
+        """Contact quantities (N, n, 6) at N times and states (N, 2 m + n s).
 
         The columns are normal force [N], friction force [N], penetration [m], its rate [m/s],
         slip velocity [m/s] and the rate of the ground's height under the node [m/s].
         """
         times = np.ascontiguousarray(times, dtype=float)
         states = np.ascontiguousarray(states, dtype=float)
-        if times.ndim != 1 or states.shape != (len(times), 2 * self.basis.modes):
+        if times.ndim != 1 or states.shape != (len(times), self.size):
             raise InputError(f"The states at {times.size} times must have shape ({times.size}, "
-                             f"{2 * self.basis.modes}), not {states.shape}.")
-        out = np.empty((len(times), self.basis.contact_nodes, kernels.STATE_COLUMNS))
-        kernels.contact_history(times, states, self.arrays, out)
+                             f"{self.size}), not {states.shape}.")
+        out = np.empty((len(times), self.basis.contact_nodes, contact_kernels.STATE_COLUMNS))
+        contact_kernels.contact_history(times, states, self.arrays, out)
         return out
 
     def with_(self, **changes: Any) -> "ContactSystem":
@@ -152,37 +249,61 @@ class ContactSystem:
         InputError
             If there is no such parameter (with those that exist), or the value is out of range.
         """
-        whole = {entry.name for entry in fields(self)}
-        parts = {name: value for name, value in changes.items() if name in whole}
-        parameters: dict[str, dict[str, Any]] = {}
-        for name, value in changes.items():
-            part, _, parameter = name.partition(".")
-            if name in whole:
-                continue
-            if part not in PARTS or parameter not in {
-                    entry.name for entry in fields(parts.get(part, getattr(self, part)))}:
-                raise self._unknown(name)
-            parameters.setdefault(part, {})[parameter] = value
-        for part, values in parameters.items():
-            parts[part] = replace(parts.get(part, getattr(self, part)), **values)
-        return replace(self, **parts)
+        try:
+            return cast("ContactSystem", with_parameters(self, {
+                _inner_name(name): value for name, value in changes.items()}))
+        except KeyError as error:
+            raise self._unknown(error.args[0]) from None
 
-    def parameters(self) -> dict[str, float | tuple[float, ...]]:
-        """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``."""
-        return {
-            f"{part}.{entry.name}": getattr(getattr(self, part), entry.name)
-            for part in PARTS
-            for entry in fields(getattr(self, part))
-        }
+    def parameters(self) -> dict[str, Any]:
+        """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
+
+        Those of a contact group's laws are called ``contact.NAME.normal.stiffness``.
+        """
+        return {_outer_name(self, f"{part}.{name}"): value
+                for part in PARTS
+                for name, value in parameters_of(getattr(self, part)).items()}
 
     def _checked(self, y: Array) -> Array:
         state = np.ascontiguousarray(y, dtype=float)
-        if state.shape != (2 * self.basis.modes,):
-            raise InputError(f"A state of this system has {2 * self.basis.modes} values [q, q'], "
+        if state.shape != (self.size,):
+            raise InputError(f"A state of this system has {self.size} values [q, q', z], "
                              f"not shape {state.shape}.")
         return state
 
     def _unknown(self, name: str) -> InputError:
         names = (*self.parameters(), "gap", *PARTS)
-        return InputError(f"The system has no parameter '{name}'{nearest(name, names)}; "
+        return InputError(f"The system has no parameter '{_outer_name(self, name)}'"
+                          f"{nearest(name, names)}; "
                           f"its parameters are: {choices(names)}.")
+
+
+def _inner_name(name: str) -> str:
+    """``normal.NAME.stiffness`` for ``contact.NAME.normal.stiffness``."""
+    first, _, rest = name.partition(".")
+    group, _, parameter = rest.partition(".")
+    kind, _, last = parameter.partition(".")
+    if first != "contact" or kind not in ("normal", "friction"):
+        return name
+    return f"{kind}.{group}.{last}" if last else f"{kind}.{group}"
+
+
+def _outer_name(system: ContactSystem, name: str) -> str:
+    """The reverse, for laws of contact groups."""
+    kind, _, rest = name.partition(".")
+    if kind not in ("normal", "friction") or not isinstance(getattr(system, kind), Mapping):
+        return name
+    group, _, last = rest.partition(".")
+    return f"contact.{group}.{kind}.{last}" if last else f"contact.{group}.{kind}"
+
+
+def _rows(parameters: list[Array]) -> Array:
+    """Parameters of several functions as one array, filled up with zeros."""
+    table = np.zeros((len(parameters), max((len(row) for row in parameters), default=1)))
+    for index, row in enumerate(parameters):
+        table[index, : len(row)] = row
+    return table
+
+
+def _addresses(kernels: Iterable[CompiledLaw]) -> NDArray[np.int64]:
+    return np.array([kernel.address for kernel in kernels], dtype=np.int64)

@@ -61,27 +61,27 @@ PerNode = float | tuple[float, ...]
 
 def normal_law(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(u, v, p) -> F, dF/du, dF/dv``."""
-    return compile_law(NORMAL, function)
+    return compile_law(NORMAL, "f(u, v, p) -> F, dF/du, dF/dv", function)
 
 
 def friction_law(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(v, F, p) -> R, dR/dv, dR/dF``."""
-    return compile_law(FRICTION, function)
+    return compile_law(FRICTION, "f(v, F, p) -> R, dR/dv, dR/dF", function)
 
 
 def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(xi, p) -> y, y', y''``."""
-    return compile_law(GROUND, function)
+    return compile_law(GROUND, "f(xi, p) -> y, y', y''", function)
 
 
 def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(v, F, z, p, force, rates)`` that fills force and rates."""
-    return compile_law(MEMORY, function)
+    return compile_law(MEMORY, "f(v, F, z, p, force, rates)", function)
 
 
 def signal(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(t, p) -> value, rate``."""
-    return compile_law(SIGNAL, function)
+    return compile_law(SIGNAL, "f(t, p) -> value, rate", function)
 
 
 @dataclass(frozen=True)

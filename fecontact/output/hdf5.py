@@ -72,6 +72,8 @@ def write_basis(group: Any, basis: ModalBasis) -> None:
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
     group.attrs["extra"] = list(basis.extra)
+    group.attrs["groups"] = [name for name, _ in basis.groups]
+    group.attrs["group_sizes"] = [count for _, count in basis.groups]
     if basis.quality is not None:
         quality = group.create_group("quality")
         for name, value in vars(basis.quality).items():
@@ -109,8 +111,10 @@ def read_basis(group: Any) -> ModalBasis:
                                       "vibration_modes": int(stored["vibration_modes"]),
                                       "orthogonality": float(stored["orthogonality"])})
     extra = tuple(str(name) for name in np.atleast_1d(group.attrs["extra"]))
+    groups = tuple((str(name), int(count)) for name, count in zip(
+        group.attrs["groups"], group.attrs["group_sizes"], strict=True))
     return ModalBasis(**{name: group[name][()] for name in _PLAIN}, extra=extra, field=field,
-                      quality=quality)
+                      quality=quality, groups=groups)
 
 
 def _reason(path: Path, error: OSError) -> str:

@@ -1,0 +1,46 @@
+"""Compiled powers of a contact system; see :mod:`fecontact.contact_kernels`."""
+
+import numpy as np
+from numba import types
+
+from fecontact.compiled import f8, kernel, matrix, vector
+from fecontact.contact_kernels import SYSTEM, contact_state
+from fecontact.laws.contract import normal_at, signal_at
+
+# Columns of `powers`: put in by the drive's springs, the ground's lifting, the belt and the loads
+# given in time; lost in the modes, in the dashpots at B, in the contact's damping, by friction.
+POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "contact_damping",
+          "friction")
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, vector))
+def powers(t, y, s, out, friction):  # type: ignore[no-untyped-def]
+    """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
+    n, m = s.Tx.shape
+    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
+    state = np.empty((n, 6))
+    contact_state(t, y, s, state)
+    out[:] = 0.0
+    for axis in range(2):
+        value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
+        pull = s.drive_stiffness[axis] * value
+        for i in range(m):
+            pull -= s.drive_shapes[axis, i] * y[i]
+        out[0] += pull * rate
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
+        for i in range(m):
+            out[3] += value * s.load_shapes[k, i] * y[m + i]
+    for i in range(m):
+        for k in range(m):
+            product = y[m + i] * y[m + k]
+            out[4] += s.modal_damping[i, k] * product
+            out[5] += (s.damping[i, k] - s.modal_damping[i, k]) * product
+    for j in range(n):
+        force, tangential, v, slip = state[j, 0], state[j, 1], state[j, 3], state[j, 4]
+        elastic = normal_at(s.normal[j])(state[j, 2], 0.0, s.normal_parameters[j])[0]
+        out[1] += force * state[j, 5]
+        out[2] -= tangential * speed
+        out[6] += (force - elastic) * v
+        friction[j] = tangential * slip
+        out[7] += friction[j]

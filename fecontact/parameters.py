@@ -1,0 +1,62 @@
+"""Parameters of nested dataclasses by dotted names: ``ground.profile.amplitude``."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+
+def parameters_of(whole: Any, prefix: str = "") -> dict[str, Any]:
+    """Every value below a dataclass, a mapping or a tuple of dataclasses, by its dotted name.
+
+    Parts that are not there (None) are left out.
+    """
+    result: dict[str, Any] = {}
+    for name, value in _members(whole).items():
+        title = f"{prefix}{name}"
+        if _members(value):
+            result |= parameters_of(value, f"{title}.")
+        elif value is not None and value != ():
+            result[title] = value
+    return result
+
+
+def with_parameters(whole: Any, changes: Mapping[str, Any]) -> Any:
+    """A copy with some values or parts replaced, by their dotted names.
+
+    Raises
+    ------
+    KeyError
+        With the dotted name that does not exist.
+    """
+    members = _members(whole)
+    direct: dict[str, Any] = {}
+    below: dict[str, dict[str, Any]] = {}
+    for name, value in changes.items():
+        first, _, rest = name.partition(".")
+        if first not in members:
+            raise KeyError(name)
+        if rest:
+            below.setdefault(first, {})[rest] = value
+        else:
+            direct[first] = value
+    for first, inner in below.items():
+        try:
+            direct[first] = with_parameters(direct.get(first, members[first]), inner)
+        except KeyError as error:
+            raise KeyError(f"{first}.{error.args[0]}") from None
+    if is_dataclass(whole) and not isinstance(whole, type):
+        return replace(whole, **direct)
+    if isinstance(whole, Mapping):
+        return MappingProxyType({**whole, **direct})
+    return tuple(direct.get(str(index), item) for index, item in enumerate(whole))
+
+
+def _members(whole: Any) -> dict[str, Any]:
+    if is_dataclass(whole) and not isinstance(whole, type):
+        return {entry.name: getattr(whole, entry.name) for entry in fields(whole) if entry.init}
+    if isinstance(whole, Mapping):
+        return dict(whole)
+    if isinstance(whole, tuple) and whole and all(is_dataclass(item) for item in whole):
+        return {str(index): item for index, item in enumerate(whole)}
+    return {}
