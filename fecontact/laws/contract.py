@@ -26,14 +26,15 @@ signal       ``f(t, p)``                 value and rate of what is given in time
 ``p`` holds the parameters in the order of the dataclass's fields; for normal and friction laws
 it is that of the contact node. A parameter given as one number holds for every node; an extensive
 one (stiffness, damping) is then the total of the contact face and is shared by tributary length.
-A parameter given as a sequence has one value per node and is not shared.
+A parameter given as a sequence has one value per node and is not shared. A parameter that is a
+name out of a few holds for every node; ``p`` has its index among :attr:`NodeLaw.choices`.
 
 Internal variables of friction with memory are states of the system, integrated with it. Their
 rates must be continuous where R depends on them; at F = 0, where it does not, they fall back to
 zero.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
@@ -42,7 +43,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
-from fecontact.errors import InputError
+from fecontact.errors import InputError, choices, nearest
 
 NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
 FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)
@@ -90,10 +91,17 @@ class NodeLaw:
 
     kernel: ClassVar[CompiledLaw]
     extensive: ClassVar[frozenset[str]] = frozenset()
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
         for entry in fields(self):
             given = getattr(self, entry.name)
+            if entry.name in self.choices:
+                names = self.choices[entry.name]
+                if not isinstance(given, str) or given not in names:
+                    raise InputError(f"{self._title(entry.name)} = {given!r} must be one of "
+                                     f"{choices(names)}{nearest(str(given), names)}.")
+                continue
             try:
                 array = np.asarray(given)
             except ValueError:
@@ -110,7 +118,10 @@ class NodeLaw:
         """Parameters (n, k) of n nodes; ``share`` (n,) is each node's part of the face."""
         columns = []
         for entry in fields(self):
-            value = np.asarray(getattr(self, entry.name), dtype=float)
+            given = getattr(self, entry.name)
+            if entry.name in self.choices:
+                given = self.choices[entry.name].index(given)
+            value = np.asarray(given, dtype=float)
             if value.ndim and value.shape != share.shape:
                 raise InputError(f"{self._title(entry.name)} has {value.size} values for "
                                  f"{share.size} contact nodes; give one number or one per node.")
@@ -160,6 +171,11 @@ class FrictionLaw(NodeLaw):
     def memory(self) -> int:
         """Number s of internal variables per node; zero for laws without memory."""
         return 0
+
+    @property
+    def state_scale(self) -> NDArray[np.float64]:
+        """Scale (s,) of each internal variable, for tolerances."""
+        return np.ones(self.memory)
 
     @property
     def velocity_scale(self) -> float:
