@@ -97,6 +97,7 @@ def assembled_basis(
         positions=positions,
         tributary=_per_node("tributary", 1.0 / n if tributary is None else tributary, n),
         extra=rows.extra,
+        groups=rows.groups,
     )
 
 

@@ -165,7 +165,8 @@ class ModalBasis:
             [N/m]. Degrees of freedom with a stiffness of 1e35 or more on the diagonal are held.
         rows : mapping
             ``contact``: displacements x, y and rotation of each of the n contact nodes from the d
-            degrees of freedom, as (n, 3, d), sparse (3 n, d) or n sparse (3, d). ``B``, ``C``
+            degrees of freedom, as (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several
+            contact groups a mapping of their names to such rows. ``B``, ``C``
             and further named points: dense or sparse (3, d); B and C are zero when left out.
             Two rows, x and y, in the place of three mean no rotation.
             :func:`fecontact.rows.rows_from_dofs` makes them from numbers.

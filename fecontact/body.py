@@ -1,6 +1,6 @@
 """The elastic body: mesh, material and supports as stiffness and mass."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -213,8 +213,8 @@ class ElasticBody:
         self,
         modes: int = 20,
         *,
-        contact: str = "contact",
-        contact_nodes: int | Literal["all"] = "all",
+        contact: str | Sequence[str] = "contact",
+        contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]] = "all",
         B: "Place | None" = None,
         C: "Place | None" = None,
         points: "Mapping[str, Place] | None" = None,
@@ -228,9 +228,10 @@ class ElasticBody:
         ----------
         modes : int
             Number of modes, the rigid ones included, lowest first.
-        contact : str
-            Boundary that touches the ground; its outward normal must point down, to -y.
-        contact_nodes : int or 'all'
+        contact : str or sequence of str
+            Boundary that touches the ground; its outward normal must point down, to -y. Several
+            boundaries are as many contact groups, which may have laws of their own.
+        contact_nodes : int or 'all', or one of them for each boundary
             Number of equal segments of the contact boundary, each with a node in its middle that
             moves with the segment's mean displacement; or every displacement node of the
             boundary.

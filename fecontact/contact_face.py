@@ -1,13 +1,14 @@
 """Contact nodes on a boundary: equal segments, or every displacement node."""
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError
+from fecontact.errors import InputError, choices
 from fecontact.points import Pieces, edge_weights, node_matrix, patch_rows
 
 if TYPE_CHECKING:
@@ -18,11 +19,52 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ContactNodes:
-    """Rows (3 n, 2 N), places (n, 2) [m] and tributary lengths (n,) [m] of the contact nodes."""
+    """Rows (3 n, 2 N), places (n, 2) [m] and tributary lengths (n,) [m] of the contact nodes.
+
+    ``groups`` holds the name of each boundary and its number of nodes.
+    """
 
     matrix: Any
     positions: Array
     tributary: Array
+    groups: tuple[tuple[str, int], ...]
+
+
+def contact_groups(
+    body: "ElasticBody", boundaries: str | Sequence[str],
+    counts: Literal["all"] | int | Sequence[int | Literal["all"]],
+) -> ContactNodes:
+    """Contact nodes on one or several boundaries, one boundary after the other.
+
+    ``counts`` holds for each boundary, or has one entry for each; see :func:`contact_nodes`.
+
+    Raises
+    ------
+    InputError
+        Also if a boundary stands twice, two of them share an edge, or there are more counts than
+        boundaries.
+    """
+    import scipy.sparse as sp
+
+    names = (boundaries,) if isinstance(boundaries, str) else tuple(boundaries)
+    each = (counts,) * len(names) if isinstance(counts, str | int) else tuple(counts)
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"contact = {boundaries!r} must name boundaries, each once.")
+    if len(each) != len(names):
+        raise InputError(f"contact_nodes = {counts!r} must be one for all boundaries, or one for "
+                         f"each of the {len(names)}.")
+    edges = np.concatenate([np.sort(body.mesh.boundary(name), axis=1) for name in names])
+    if len(np.unique(edges, axis=0)) < len(edges):
+        raise InputError(f"The contact boundaries {choices(names)} share edges; a place of the "
+                         f"body's outline can belong to one contact group alone.")
+    faces = [contact_nodes(body, name, count)
+             for name, count in zip(names, each, strict=True)]
+    return ContactNodes(
+        sp.csr_array(sp.vstack([face.matrix for face in faces])),
+        np.concatenate([face.positions for face in faces]),
+        np.concatenate([face.tributary for face in faces]),
+        tuple(group for face in faces for group in face.groups),
+    )
 
 
 def contact_nodes(
@@ -56,7 +98,8 @@ def contact_nodes(
         tributary = np.zeros(len(body.nodes))
         for e in edges:
             np.add.at(tributary, e, edge_weights(body, e))
-        return ContactNodes(node_matrix(body, ordered), body.nodes[ordered], tributary[ordered])
+        return ContactNodes(node_matrix(body, ordered), body.nodes[ordered], tributary[ordered],
+                            ((boundary, len(ordered)),))
     if isinstance(count, bool) or not isinstance(count, int) or not (
             len(chains) <= count <= len(nodes)):
         raise InputError(f"contact_nodes = {count!r} must be 'all' or a whole number from "
@@ -72,6 +115,7 @@ def contact_nodes(
         sp.csr_array(sp.vstack([row.matrix for row in rows])),
         np.array([row.position for row in rows]),
         np.array(each),
+        ((boundary, len(rows)),),
     )
 
 

@@ -1,13 +1,13 @@
 """From the finite-element body to its modal basis."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.basis import ModalBasis
-from fecontact.contact_face import contact_nodes as nodes_of_face
+from fecontact.contact_face import contact_groups
 from fecontact.craig_bampton import craig_bampton
 from fecontact.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.eigen import FreeSystem, backward_error, free_modes, strain_energies
@@ -29,8 +29,8 @@ def reduce_body(
     body: "ElasticBody",
     modes: int,
     *,
-    contact: str,
-    contact_nodes: int | Literal["all"],
+    contact: str | Sequence[str],
+    contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]],
     B: Place | None,
     C: Place | None,
     points: Mapping[str, Place],
@@ -49,7 +49,7 @@ def reduce_body(
                          f"{nearest(str(reduction), get_args(Reduction))}.")
     if not 0.0 <= tolerance < 1.0:
         raise InputError(f"tolerance = {tolerance!r} must be zero or above, and below one.")
-    face = nodes_of_face(body, contact, contact_nodes)
+    face = contact_groups(body, contact, contact_nodes)
     named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
     further = [place_rows(body, place, name) for name, place in points.items()]
     restriction = sp.csr_array(sp.vstack(
@@ -84,6 +84,7 @@ def reduce_body(
             restriction=restriction,
         ),
         quality=_quality(body, system, flexibility, w, free_shapes, vibration),
+        groups=face.groups,
     )
 
 

@@ -24,11 +24,14 @@ class GivenRows:
     contact_nodes : int
     extra : tuple of str
         Names of the further points.
+    groups : tuple of (str, int)
+        Names of the contact groups and their numbers of nodes.
     """
 
     restriction: Any
     contact_nodes: int
     extra: tuple[str, ...]
+    groups: tuple[tuple[str, int], ...]
 
 
 def rows_from_dofs(
@@ -86,13 +89,17 @@ def gathered_rows(rows: Mapping[str, Any], d: int) -> GivenRows:
 
     if "contact" not in rows:
         raise InputError("rows must have an entry 'contact', of shape (n, 3, d) or (n, 2, d).")
-    contact = _contact_block(rows["contact"], d)
+    given = rows["contact"]
+    named = given if isinstance(given, Mapping) and given else {"contact": given}
+    blocks = {name: _contact_block(block, d) for name, block in named.items()}
+    contact = sp.csr_array(sp.vstack(list(blocks.values())))
     extra = tuple(name for name in rows if name not in ("B", "C", "contact"))
     ends = [_point_block(name, rows[name], d) if name in rows else sp.csr_array((3, d))
             for name in ("B", "C")]
     restriction = sp.csr_array(sp.vstack(
         [*ends, contact, *(_point_block(name, rows[name], d) for name in extra)]))
-    return GivenRows(restriction, contact.shape[0] // 3, extra)
+    return GivenRows(restriction, contact.shape[0] // 3, extra,
+                     tuple((name, block.shape[0] // 3) for name, block in blocks.items()))
 
 
 def _unit_rows(d: int, places: Sequence[tuple[str, Place]]) -> Any:

@@ -4,8 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
+from fecontact.contact_jacobian import jacobian
 from fecontact.errors import AnalysisError
 from fecontact.laws.contract import friction_law, signal
+from fecontact.laws.signals import Constant
+from fecontact.memory_states import settled
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -26,7 +29,7 @@ def static_equilibrium(
 ) -> Array:
     """Modal coordinates q (m,) of an equilibrium under the constant load.
 
-    Solves ``w^2 q = T^T f`` with the drive at its mean, by Newton's method, with continuation in
+    Solves ``w^2 q = T^T f`` with the drive and the loads at their means, by Newton's method, with continuation in
     the load where Newton's method alone does not get there.
 
     Parameters
@@ -37,7 +40,7 @@ def static_equilibrium(
         With friction, steady sliding: x' = 0 and slip velocity -V at every node; needs flat
         ground. Without, the body at rest on the ground as it stands at ``time``.
     time : float
-        Moment at which the profile of the ground is taken when there is no friction [s].
+        Moment at which the ground is taken as it stands and moves [s].
 
     Raises
     ------
@@ -45,19 +48,20 @@ def static_equilibrium(
         If there is no equilibrium: it names the direction in which nothing holds the body, or
         says that the load lifts or tips it; and for steady sliding on wavy ground.
     """
-    if friction and system.ground.amplitude > 0.0:
+    ground = system.ground
+    if friction and (ground.wavy or ground.friction_scale_kernel is not None):
         raise AnalysisError(
-            f"There is no steady sliding on wavy ground (ground.amplitude = "
-            f"{system.ground.amplitude:g} m); start from rest or flatten the ground.")
-    arrays = system.arrays._replace(drive_shapes=np.zeros_like(system.arrays.drive_shapes))
+            "There is no steady sliding on ground whose height or friction varies along it; start "
+            "from rest or flatten the ground.")
+    arrays = _at_mean(system)
     if not friction:
-        travel = system.ground.motion_kernel.python(time, system.ground.motion_parameters())[0]
         arrays = arrays._replace(
-            friction=_frictionless.address,
+            friction=np.full_like(arrays.friction, _frictionless.address),
+            memory=np.zeros_like(arrays.memory),
             ground_motion=_still.address,
-            ground_motion_parameters=np.array([travel], dtype=float),
+            ground_motion_parameters=np.array([ground.travel(time)], dtype=float),
         )
-    problem = _Balance(arrays)
+    problem = _Balance(arrays, time, system.penetration_scale)
     origin = np.zeros(len(arrays.constant_load))
     if not problem.force(origin, 1.0).any():
         return origin
@@ -74,39 +78,68 @@ def static_equilibrium(
 class _Balance:
     """Out-of-balance modal forces of a resting or steadily sliding body."""
 
-    def __init__(self, arrays: kernels.SystemArrays) -> None:
+    def __init__(self, arrays: kernels.SystemArrays, time: float, scale: float) -> None:
         self.arrays = arrays
         self.load = arrays.constant_load
-        m = len(self.load)
-        self._rate, self._matrix = np.empty(2 * m), np.empty((2 * m, 2 * m))
-        self._state = np.zeros(2 * m)
-        # Stiffness of a face with every asperity in contact, and its force on undisplaced nodes.
-        far = 1e3 * np.max(np.abs(arrays.normal_parameters[:, 1]))
-        values = np.array([_normal(arrays, far, j) for j in range(len(arrays.gap))])
-        self.face_stiffness = values[:, 1]
-        undisplaced = np.empty((len(arrays.gap), kernels.STATE_COLUMNS))
-        kernels.contact_state(0.0, self._state, arrays, undisplaced)
-        self.face_force = values[:, 0] + values[:, 1] * (undisplaced[:, kernels.PENETRATION] - far)
+        self._time = time
+        n, m = arrays.Tx.shape
+        states = int(arrays.memory.max())
+        size = 2 * m + n * states
+        self._rate, self._matrix = np.empty(size), np.empty((size, size))
+        self._state = np.zeros(size)
+        # Stiffness of a face that is pressed well in, and its force on undisplaced nodes.
+        far = np.full(n, max(10.0 * scale, 2.0 * self._penetration(scale)))
+        values, self.face_stiffness = self.normal(far)
+        undisplaced = np.empty((n, kernels.STATE_COLUMNS))
+        kernels.contact_state(time, self._state, arrays, undisplaced)
+        self.face_force = values + self.face_stiffness * (
+            undisplaced[:, kernels.PENETRATION] - far)
         tangential = (arrays.Tx**2).T @ self.face_stiffness
         normal = (arrays.Ty**2).T @ self.face_stiffness
         diagonal = np.diag(arrays.stiffness)
         self.scale = diagonal + tangential + normal
         self.scale[self.scale == 0.0] = 1.0
 
+    def _penetration(self, scale: float) -> float:
+        """Penetration of the whole face at which it carries the load, at most 1e6 scales."""
+        # In the direction of the contact nodes' mean rise, the load does this work.
+        rise = self.arrays.Ty.mean(axis=0)
+        wanted = abs(float(self.load @ rise)) / max(float(rise @ rise), 1e-300)
+        depth = scale
+        while depth < 1e6 * scale and self.normal(np.full(len(self.arrays.gap), depth))[0].sum() < (
+                wanted):
+            depth *= 2.0
+        return depth
+
+    def normal(self, penetration: Array) -> tuple[Array, Array]:
+        """Normal forces (n,) and their slopes at rest."""
+        force, slope = np.empty(len(penetration)), np.empty(len(penetration))
+        kernels.normal_values(self.arrays.normal, penetration, np.zeros(len(penetration)),
+                              self.arrays.normal_parameters, force, slope)
+        return force, slope
+
     def force(self, q: Array, load: float) -> Array:
         """Out-of-balance force (m,) under a part of the load."""
         m = len(q)
-        self._state[:m] = q
         part = self.arrays._replace(constant_load=load * self.load)
-        kernels.right_hand_side(0.0, self._state, part, self._rate)
-        return self._rate[m:].copy()
+        kernels.right_hand_side(self._time, self._settled(q), part, self._rate)
+        return self._rate[m : 2 * m].copy()
 
     def gradient(self, q: Array) -> Array:
         """Derivative (m, m) of the force."""
         m = len(q)
-        self._state[:m] = q
-        kernels.jacobian(0.0, self._state, self.arrays, self._matrix)
-        return self._matrix[m:, :m].copy()
+        jacobian(self._time, self._settled(q), self.arrays, self._matrix)
+        gradient = self._matrix[m : 2 * m, :m].copy()
+        if len(self._matrix) > 2 * m:
+            # The internal variables follow the displacements: z' = 0.
+            follow = np.linalg.pinv(self._matrix[2 * m :, 2 * m :]) @ self._matrix[2 * m :, :m]
+            gradient -= self._matrix[m : 2 * m, 2 * m :] @ follow
+        return gradient
+
+    def _settled(self, q: Array) -> Array:
+        self._state[: len(q)] = q
+        self._state = settled(self._time, self._state, self.arrays)
+        return self._state
 
     def guess(self, load: float) -> Array:
         """Equilibrium of a face that is all in contact, and that could also pull."""
@@ -172,12 +205,10 @@ class _Balance:
     def _upright(self, q: Array) -> Array:
         """Stiffness (m, m) at q, symmetric: of ground that is level under each node."""
         arrays = self.arrays
-        n = len(arrays.gap)
         self._state[: len(q)] = q
-        state, force, slope = np.empty((n, kernels.STATE_COLUMNS)), np.empty(n), np.empty(n)
-        kernels.contact_state(0.0, self._state, arrays, state)
-        kernels.normal_values(arrays.normal, state[:, kernels.PENETRATION].copy(), np.zeros(n),
-                              arrays.normal_parameters, force, slope)
+        state = np.empty((len(arrays.gap), kernels.STATE_COLUMNS))
+        kernels.contact_state(self._time, self._state, arrays, state)
+        slope = self.normal(state[:, kernels.PENETRATION].copy())[1]
         return np.asarray(arrays.stiffness + (arrays.Ty.T * slope) @ arrays.Ty)
 
     def loose(self, q: Array) -> Array | None:
@@ -205,11 +236,21 @@ class _Balance:
         return 1e-11 * self._size(terms + np.abs(contact))
 
 
-def _normal(arrays: kernels.SystemArrays, penetration: float, node: int) -> tuple[float, float]:
-    force, slope = np.empty(1), np.empty(1)
-    kernels.normal_values(arrays.normal, np.array([penetration]), np.zeros(1),
-                          arrays.normal_parameters[node : node + 1], force, slope)
-    return float(force[0]), float(slope[0])
+def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
+    """The system's arrays with the means of drive and loads as constant loads.
+
+    Of what is given in time only what is constant has a mean to speak of.
+    """
+    arrays = system.arrays
+    load = arrays.constant_load.copy()
+    given = [*zip(arrays.drive_shapes, system.drive.motions, strict=True),
+             *zip(arrays.load_shapes, (force.signal for force in system.load.forces), strict=True)]
+    for shape, source in given:
+        if isinstance(source, Constant):
+            load += source.value * shape
+    return arrays._replace(
+        constant_load=load, drive_shapes=np.zeros_like(arrays.drive_shapes),
+        load_shapes=np.zeros_like(arrays.load_shapes))
 
 
 def _continued(problem: _Balance) -> Array | None:

@@ -127,9 +127,9 @@ class BasisSettings:
     ----------
     modes : int
         Number of modes, the rigid ones included.
-    contact : str
-        Boundary that touches the ground.
-    contact_nodes : int or 'all'
+    contact : str or list of str
+        Boundary that touches the ground, or several, each a contact group of that name.
+    contact_nodes : int or 'all', or a list with one of them for each boundary
     B, C : place, optional
         Excitation and load point: name of a point or boundary, [x, y], or a patch
         ``{at = name or [x, y], radius = r}``.
@@ -149,8 +149,8 @@ class BasisSettings:
     """
 
     modes: int = 20
-    contact: str = "contact"
-    contact_nodes: int | Literal["all"] = "all"
+    contact: str | tuple[str, ...] = "contact"
+    contact_nodes: int | Literal["all"] | tuple[int | Literal["all"], ...] = "all"
     B: Place | None = None
     C: Place | None = None
     points: Mapping[str, Place] = field(default_factory=dict)
@@ -163,7 +163,9 @@ class BasisSettings:
     def __post_init__(self) -> None:
         if self.modes < 1:
             raise InputError(f"BasisSettings: modes = {self.modes} must be at least 1.")
-        if self.contact_nodes != "all" and self.contact_nodes < 1:
+        given = self.contact_nodes
+        counts = given if isinstance(given, tuple) else (given,)
+        if any(count != "all" and count < 1 for count in counts):
             raise InputError(f"BasisSettings: contact_nodes = {self.contact_nodes} must be at "
                              f"least 1, or \"all\".")
 

@@ -137,6 +137,14 @@ class ContactSystem:
         """Smallest slip velocity over which a friction force rises [m/s]."""
         return min(law.velocity_scale for _, _, law in self.law_groups("friction"))
 
+    @property
+    def memory_scales(self) -> Array:
+        """Scale (n s,) of each internal variable of the state."""
+        scales = np.ones((self.basis.contact_nodes, self.memory))
+        for nodes, _, law in self.law_groups("friction"):
+            scales[nodes, : law.memory] = law.state_scale
+        return scales.reshape(-1)
+
     def stored_energy(self, penetration: Array) -> Array:
         """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""
         energy = np.zeros(penetration.shape[:-1])

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.memory_states import settled
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -35,15 +36,16 @@ Initial = Literal["rest", "sliding"] | RigidStart | Trajectory | NDArray[np.floa
 
 
 def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array:
-    """State y = [q, q'] (2 m,) for the start of a run.
+    """State y = [q, q', z] (2 m + n s,) for the start of a run.
 
     Parameters
     ----------
     system : ContactSystem
         The system that will run.
-    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m,) array
+    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
         At rest on the ground, with the normal forces in equilibrium and no friction; steady
-        sliding; a rigid displacement and velocity; the end of another run; a state.
+        sliding; a rigid displacement and velocity; the end of another run; a state. The internal
+        variables of friction with memory are zero, and in steady sliding those that belong to it.
     time : float
         Start of the run [s].
 
@@ -62,18 +64,20 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
             raise InputError(f"initial = '{initial}' must be one of {choices(names)}"
                              f"{nearest(initial, names)}, or a rigid displacement and velocity.")
         q = static_equilibrium(system, friction=initial == "sliding", time=time)
-        return np.concatenate([q, np.zeros(m)])
+        state = np.concatenate([q, np.zeros(system.size - m)])
+        return settled(time, state, system.arrays) if initial == "sliding" else state
     if isinstance(initial, RigidStart):
         return np.concatenate([_rigid(system.basis, initial.displacement, "displacement"),
-                               _rigid(system.basis, initial.velocity, "velocity")])
+                               _rigid(system.basis, initial.velocity, "velocity"),
+                               np.zeros(system.size - 2 * m)])
     given = initial.states[-1] if isinstance(initial, Trajectory) else initial
     try:
         state = np.array(given, dtype=float)
     except (TypeError, ValueError):
         raise InputError(f"initial = {initial!r} must be 'rest', 'sliding', a RigidStart, a "
                          f"Trajectory or an array of numbers.") from None
-    if state.shape != (2 * m,):
-        raise InputError(f"The initial state must have {2 * m} values [q, q'], not shape "
+    if state.shape != (system.size,):
+        raise InputError(f"The initial state must have {system.size} values [q, q', z], not shape "
                          f"{state.shape}.")
     if not np.isfinite(state).all():
         raise InputError("The initial state holds values that are not finite.")

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact import contact_kernels as kernels
+from fecontact.contact_energy import POWERS, powers
+from fecontact.contact_kernels import right_hand_side
 from fecontact.integrate.trajectory import Status
 from fecontact.system import ContactSystem
 
@@ -32,23 +33,22 @@ def integrate(
 
     Returns
     -------
-    times (k,), states (k, 2 m), work (k, 7), status, statistics
+    times (k,), states (k, 2 m + n s), work (k, 8), status, statistics
         If the run ended early, those until then, and the last state that was reached.
     """
     import scipy.integrate
 
-    size, extra = len(state), len(kernels.POWERS)
+    size, extra = len(state), len(POWERS)
     arrays = system.arrays
-    modal = np.array(system.basis.damping)
-    dashpots = arrays.damping - modal
+    friction = np.empty(system.basis.contact_nodes)
     counts: dict[str, Any] = {"right_hand_sides": 0, "jacobians": 0}
 
     def rhs(t: float, y: Array) -> Array:
         counts["right_hand_sides"] += 1
         out = np.empty(size + extra)
         state = np.ascontiguousarray(y[:size])
-        kernels.right_hand_side(t, state, arrays, out[:size])
-        kernels.powers(t, state, arrays, modal, dashpots, out[size:])
+        right_hand_side(t, state, arrays, out[:size])
+        powers(t, state, arrays, out[size:], friction)
         return out
 
     def jacobian(t: float, y: Array) -> Array:
@@ -112,39 +112,44 @@ def _step(solver: Any) -> str | None:
 
 
 def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
-    """Absolute tolerances (2 m,) of the modal state.
+    """Absolute tolerances (2 m + n s,) of the state.
 
-    ``rtol`` times the smallest roughness height for displacements; for velocities a tenth of the
-    width 1/k_s of the friction smoothing, or less for a finer ``rtol``: steps that do not resolve
+    ``rtol`` times the smallest penetration scale for displacements; for velocities a tenth of the
+    smallest velocity scale of friction, or less for a finer ``rtol``: steps that do not resolve
     it lose the contact's stick. Both are divided by the mode's largest motion at any point.
+    Internal variables: ``rtol`` times their scales.
     """
     T = system.basis.T[:, :2]
     largest = np.abs(T).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
-    height = float(np.min(system.normal.roughness_height))
-    velocity = min(0.1, 1e5 * rtol) * system.friction.velocity_scale
-    return np.concatenate([rtol * height / largest, velocity / largest])
+    velocity = min(0.1, 1e5 * rtol) * system.velocity_scale
+    return np.concatenate([rtol * system.penetration_scale / largest, velocity / largest,
+                           rtol * system.memory_scales])
 
 
 def _energy_scale(system: ContactSystem, state: Array) -> float:
     """Energy at the start, of the drive's springs and of the load over the roughness [J]."""
     m, drive = system.basis.modes, system.drive
-    start = 0.5 * (state[m:] ** 2).sum() + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
-    springs = 0.5 * (drive.stiffness_x * drive.amplitude_x**2
-                     + drive.stiffness_y * drive.amplitude_y**2)
-    pressed = abs(system.load.normal) * float(np.max(system.normal.roughness_height))
+    start = 0.5 * (state[m : 2 * m] ** 2).sum() + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
+    springs = 0.5 * sum(
+        c * motion.largest**2
+        for c, motion in zip((drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
+    pressed = abs(system.load.normal) * system.penetration_scale
     return float(start + springs + pressed) or np.inf
 
 
 def longest_step(system: ContactSystem, times: Array) -> float:
-    """A fiftieth of the run, a twentieth of the drive's period and of the wave's passing [s].
+    """A fiftieth of the run, a twentieth of the shortest period of drive, loads and waves [s].
 
     Longer steps could jump over an excitation that starts from rest.
     """
     limits = [(times[-1] - times[0]) / 50.0]
-    drive, ground = system.drive, system.ground
-    if drive.angular_frequency > 0.0 and (drive.amplitude_x or drive.amplitude_y):
-        limits.append(2.0 * np.pi / drive.angular_frequency / 20.0)
-    if ground.amplitude > 0.0 and ground.speed != 0.0:
-        limits.append(ground.wavelength / abs(ground.speed) / 20.0)
+    given = [motion for motion in system.drive.motions if motion.largest > 0.0]
+    given += [force.signal for force in system.load.forces]
+    limits += [source.shortest_period / 20.0 for source in given
+               if source.shortest_period is not None]
+    wavelength = system.ground.shortest_wavelength
+    speed = system.ground.largest_speed(float(times[0]), float(times[-1]))
+    if wavelength is not None and speed > 0.0:
+        limits.append(wavelength / speed / 20.0)
     return float(min(limits))

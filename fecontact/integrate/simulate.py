@@ -35,7 +35,7 @@ def simulate(
         End of the run [s].
     t_start : float, optional
         Its start [s]; default the end of the run that it continues, else zero.
-    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m,) array
+    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
         Where it starts; see :func:`fecontact.integrate.initial.initial_state`.
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or the times themselves,
@@ -73,7 +73,8 @@ def simulate(
     reached, states, work, status, statistics = integrate(
         system, state, times, method=method, rtol=rtol, progress=progress)
     m = system.basis.modes
-    return Trajectory(system, reached, states[:, :m], states[:, m:], work, status, statistics)
+    return Trajectory(system, reached, states[:, :m], states[:, m : 2 * m], work, status,
+                      statistics, memory=states[:, 2 * m :] if system.memory else None)
 
 
 def _output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
+from fecontact.contact_energy import POWERS
 from fecontact.errors import InputError
 from fecontact.system import ContactSystem
 
@@ -97,12 +98,17 @@ class Trajectory:
         [s].
     modal_coordinates, modal_velocities : (N, m) arrays
         q and q'.
-    work : (N, 7) array
-        Integrals of the powers :data:`fecontact.contact_kernels.POWERS` from the first time [J].
+    work : (N, 8) array
+        Integrals of the powers :data:`fecontact.contact_energy.POWERS` from the first time [J].
     status : Status
         How the run ended.
     statistics : mapping
         Counts of the integrator: steps, right-hand sides, Jacobians, factorisations, seconds.
+    memory : (N, n s) array or None
+        Internal variables z of friction with memory, node by node; None without memory.
+    node_friction_work : (N, n) array or None
+        Energy lost by friction at each node [J], where the integrator has kept it; see
+        :attr:`friction_work`.
     """
 
     system: ContactSystem
@@ -112,11 +118,14 @@ class Trajectory:
     work: Array
     status: Status = Status.FINISHED
     statistics: dict[str, Any] = field(default_factory=dict)
+    memory: Array | None = None
+    node_friction_work: Array | None = None
 
     @property
     def states(self) -> Array:
-        """States y = [q, q'] (N, 2 m)."""
-        return np.hstack([self.modal_coordinates, self.modal_velocities])
+        """States y = [q, q', z] (N, 2 m + n s)."""
+        return np.hstack([self.modal_coordinates, self.modal_velocities,
+                          *(() if self.memory is None else (self.memory,))])
 
     def displacement(self, point: str | int | tuple[float, float]) -> Array:
         """Displacement x, y [m] and rotation phi [rad] (N, 3) of a point.
@@ -173,6 +182,19 @@ class Trajectory:
         return self._contact[:, :, kernels.SLIP_VELOCITY]
 
     @property
+    def friction_work(self) -> Array:
+        """Energy (N, n) that friction at each node has taken since the first time [J].
+
+        That of friction with memory comes back in part. From the integrator where it has kept it,
+        else by the trapezoidal rule over the output times.
+        """
+        if self.node_friction_work is not None:
+            return self.node_friction_work
+        power = self.friction_force * self.slip_velocity
+        steps = 0.5 * np.diff(self.time)[:, None] * (power[1:] + power[:-1])
+        return np.vstack([np.zeros(power.shape[1]), np.cumsum(steps, axis=0)])
+
+    @property
     def pressure(self) -> Array:
         """Normal force per length of the contact face (N, n) [N/m]."""
         return self.normal_force / self.system.basis.tributary
@@ -183,9 +205,9 @@ class Trajectory:
 
         Open without normal force; stick below the slip velocity at which friction is largest.
         """
-        stick = self.system.friction.stick_velocity(self.system.basis.contact_nodes)
-        state = np.where(np.abs(self.slip_velocity) < stick, ContactState.STICK, ContactState.SLIP)
-        return np.where(self.normal_force > 0.0, state, ContactState.OPEN).astype(np.int8)
+        stick = self.system.sticks(self.slip_velocity, self.normal_force, self.friction_force)
+        state = np.where(stick, ContactState.STICK, ContactState.SLIP)
+        return np.where(self.normal_force != 0.0, state, ContactState.OPEN).astype(np.int8)
 
     @cached_property
     def energies(self) -> Energies:
@@ -195,11 +217,11 @@ class Trajectory:
         q, rate = self.modal_coordinates, self.modal_velocities
         spring = np.zeros(len(t))
         for axis, c in ((0, drive.stiffness_x), (1, drive.stiffness_y)):
-            ends = np.array([drive.motion_kernel.python(time, drive.motion_parameters()[axis])[0]
-                             for time in t])
+            motion = drive.motions[axis]
+            ends = np.array([motion.kernel.python(time, motion.parameters())[0] for time in t])
             spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
-        contact = system.normal.stored_energy(self.penetration, system.share).sum(axis=1)
-        put = dict(zip(kernels.POWERS, self.work.T, strict=True))
+        contact = system.stored_energy(self.penetration)
+        put = dict(zip(POWERS, self.work.T, strict=True))
         height = q @ basis.T[1, 1]
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
@@ -209,7 +231,7 @@ class Trajectory:
             drive_work=put["drive"],
             ground_work=put["ground"],
             belt_work=put["belt"],
-            load_work=-system.load.normal * (height - height[0]),
+            load_work=put["load"] - system.load.normal * (height - height[0]),
             modal_damping=put["modal_damping"],
             dashpots=put["dashpots"],
             contact_damping=put["contact_damping"],

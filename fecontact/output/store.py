@@ -16,6 +16,7 @@ from fecontact.tables import system_from_tables, system_tables
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
 _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
           "work": "J"}
+_OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J"}
 _CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
             "slip_velocity": "m/s", "contact_state": "0 open, 1 stick, 2 slip"}
 
@@ -102,6 +103,7 @@ def read_case(path: str | Path) -> Case:
             tables = json.loads(file["system"].attrs["json"])
             stored = file["trajectory"]
             state = {name: stored[name][()] for name in _STATE}
+            state |= {name: stored[name][()] for name in _OPTIONAL if name in stored}
             status = Status[stored.attrs["status"]]
             statistics = json.loads(stored.attrs["statistics"])
             study = str(file["study"].attrs["toml"]) if "study" in file else None
@@ -115,7 +117,9 @@ def read_case(path: str | Path) -> Case:
 
 
 def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
-    for name, unit in (_STATE | _CONTACT).items():
+    kept = {name: unit for name, unit in _OPTIONAL.items()
+            if getattr(trajectory, name) is not None}
+    for name, unit in (_STATE | kept | _CONTACT).items():
         data = group.create_dataset(name, data=getattr(trajectory, name))
         data.attrs["unit"] = unit
     group.attrs["status"] = trajectory.status.name
