@@ -1,39 +1,28 @@
-"""Friction laws."""
+"""Friction laws without memory."""
 
-import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecontact.laws.contract import NodeLaw, PerNode, friction_law
+from fecontact.laws import friction_kernels
+from fecontact.laws.contract import PerNode
+from fecontact.laws.friction_base import MemorylessFriction, SmoothedFriction, require_at_least
 
-
-@friction_law
-def _exponential(v, F, p):  # type: ignore[no-untyped-def]
-    static, kinetic, decay, slope = p[0], p[1], p[2], p[3]
-    fall = (static - kinetic) * math.exp(-decay * abs(v))
-    coefficient = fall + kinetic
-    x = slope * v
-    smooth = 2.0 / math.pi * math.atan(x)
-    rate = 2.0 / math.pi * slope / (1.0 + x * x)
-    sign = 1.0 if v >= 0.0 else -1.0
-    ratio = coefficient * smooth
-    return ratio * F, (coefficient * rate - decay * sign * fall * smooth) * F, ratio
+Smoothing = Literal["arctan", "tanh", "square-root"]
 
 
 @dataclass(frozen=True)
-class ExponentialFriction(NodeLaw):
-    r"""Dry friction that falls exponentially with slip velocity, smoothed by arctan (4.1-21..23).
+class ExponentialFriction(SmoothedFriction):
+    r"""Dry friction that falls exponentially with slip velocity (4.1-21..23).
 
     .. math::
 
-        R = \mu(v)\, F\, \tfrac{2}{\pi} \arctan(k_s v), \qquad
+        R = F\, [\mu(v)\, s(v) + c_v v], \qquad
         \mu(v) = (\mu_0 - \mu_\infty)\, e^{-\lambda |v|} + \mu_\infty
 
     v is the slip velocity of the body relative to the ground [m/s], F the normal force [N]; the
-    friction force R [N] acts on the body in -x for v > 0.
+    friction force R [N] acts on the body in -x for v > 0. s(v) is the smoothed sign of v.
 
     Parameters
     ----------
@@ -46,6 +35,10 @@ class ExponentialFriction(NodeLaw):
     smoothing_slope : float or (n,) sequence
         k_s, positive [s/m]. Below slip velocities of some 1/k_s the contact creeps instead of
         sticking.
+    viscous_coefficient : float or (n,) sequence
+        c_v, zero or above [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
 
     Raises
     ------
@@ -57,47 +50,307 @@ class ExponentialFriction(NodeLaw):
     W. Sextro, Dynamical Contact Problems with Friction, section 4.1.
     """
 
-    kernel: ClassVar = _exponential
+    kernel: ClassVar = friction_kernels.exponential
 
     static_coefficient: PerNode = 0.8
     kinetic_coefficient: PerNode = 0.55
     decay: PerNode = 1000.0
     smoothing_slope: PerNode = 1e6
+    viscous_coefficient: PerNode = 0.0
+    smoothing: Smoothing = "arctan"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
+                     "kinetic_coefficient", "decay", "viscous_coefficient")
+
+
+@dataclass(frozen=True)
+class GaussianFriction(SmoothedFriction):
+    r"""Dry friction that falls with slip velocity like a Gaussian bell (Stribeck curve).
+
+    .. math::
+
+        R = F\, [\mu(v)\, s(v) + c_v v], \qquad
+        \mu(v) = (\mu_0 - \mu_\infty)\, e^{-(v/v_s)^2} + \mu_\infty
+
+    R [N] has the sign of the slip velocity v [m/s]. Friction is flat near rest, steepest at
+    ``v_s / sqrt(2)`` and has fallen by 63 % of the whole at v_s.
+
+    Parameters
+    ----------
+    static_coefficient, kinetic_coefficient : float or (n,) sequence
+        mu_0 and mu_inf, zero or above.
+    stribeck_velocity : float or (n,) sequence
+        v_s, positive [m/s].
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m].
+    viscous_coefficient : float or (n,) sequence
+        c_v, zero or above [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and
+    compensation methods for the control of machines with friction, Automatica 30 (1994).
+    """
+
+    kernel: ClassVar = friction_kernels.gaussian
+
+    static_coefficient: PerNode = 0.8
+    kinetic_coefficient: PerNode = 0.55
+    stribeck_velocity: PerNode = 1e-3
+    smoothing_slope: PerNode = 1e6
+    viscous_coefficient: PerNode = 0.0
+    smoothing: Smoothing = "arctan"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
+                     "kinetic_coefficient", "viscous_coefficient")
+        self.require("above zero", lambda x: x > 0, "stribeck_velocity")
+
+
+@dataclass(frozen=True)
+class HyperbolicFriction(SmoothedFriction):
+    r"""Dry friction that falls with slip velocity like a hyperbola.
+
+    .. math::
+
+        R = F\, [\mu(v)\, s(v) + c_v v], \qquad
+        \mu(v) = \mu_\infty + \frac{\mu_0 - \mu_\infty}{1 + |v| / v_s}
+
+    R [N] has the sign of the slip velocity v [m/s]. With ``mu_inf = 0`` and ``v_s = 1 / delta``
+    it is Leine's law ``F_s / (1 + delta |v|)``.
+
+    Parameters
+    ----------
+    static_coefficient, kinetic_coefficient : float or (n,) sequence
+        mu_0 and mu_inf, zero or above.
+    stribeck_velocity : float or (n,) sequence
+        v_s, positive: half of the fall is behind it [m/s].
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m].
+    viscous_coefficient : float or (n,) sequence
+        c_v, zero or above [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    R. I. Leine, D. H. van Campen, A. de Kraker, L. van den Steen, Stick-slip vibrations induced
+    by alternate friction models, Nonlinear Dynamics 16 (1998).
+    """
+
+    kernel: ClassVar = friction_kernels.hyperbolic
+
+    static_coefficient: PerNode = 0.8
+    kinetic_coefficient: PerNode = 0.55
+    stribeck_velocity: PerNode = 1e-3
+    smoothing_slope: PerNode = 1e6
+    viscous_coefficient: PerNode = 0.0
+    smoothing: Smoothing = "arctan"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
+                     "kinetic_coefficient", "viscous_coefficient")
+        self.require("above zero", lambda x: x > 0, "stribeck_velocity")
+
+
+@dataclass(frozen=True)
+class ConstantFriction(SmoothedFriction):
+    r"""Coulomb's law with one coefficient, smoothed: ``R = F [mu s(v) + c_v v]``.
+
+    R [N] has the sign of the slip velocity v [m/s], F is the normal force [N].
+
+    Parameters
+    ----------
+    friction_coefficient : float or (n,) sequence
+        mu, zero or above.
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m].
+    viscous_coefficient : float or (n,) sequence
+        c_v, zero or above [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = friction_kernels.constant
+
+    friction_coefficient: PerNode = 0.55
+    smoothing_slope: PerNode = 1e6
+    viscous_coefficient: PerNode = 0.0
+    smoothing: Smoothing = "arctan"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require("zero or above", lambda x: x >= 0,
-                     "static_coefficient", "kinetic_coefficient", "decay")
+                     "friction_coefficient", "viscous_coefficient")
+
+
+@dataclass(frozen=True)
+class GalvanettoFriction(SmoothedFriction):
+    r"""Dry friction that falls like a hyperbola and rises again with the square of velocity.
+
+    .. math::
+
+        R = F\, \mu(v)\, s(v), \qquad
+        \mu(v) = \mu_k + \frac{\mu_s - \mu_k}{1 + \gamma |v|} + \eta v^2
+
+    R [N] has the sign of the slip velocity v [m/s]. Friction is least where
+    ``gamma (mu_s - mu_k) = 2 eta |v| (1 + gamma |v|)^2``.
+
+    Parameters
+    ----------
+    static_coefficient, kinetic_coefficient : float or (n,) sequence
+        mu_s and mu_k, zero or above.
+    decay : float or (n,) sequence
+        gamma, zero or above [s/m].
+    growth : float or (n,) sequence
+        eta, zero or above [s^2/m^2].
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    U. Galvanetto, S. R. Bishop, Dynamics of a simple damped oscillator undergoing stick-slip
+    vibrations, Meccanica 34 (1999), for two blocks on a belt.
+    """
+
+    kernel: ClassVar = friction_kernels.galvanetto
+
+    static_coefficient: PerNode = 0.8
+    kinetic_coefficient: PerNode = 0.55
+    decay: PerNode = 1000.0
+    growth: PerNode = 0.0
+    smoothing_slope: PerNode = 1e6
+    smoothing: Smoothing = "arctan"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
+                     "kinetic_coefficient", "decay", "growth")
+
+
+@dataclass(frozen=True)
+class CubicFriction(SmoothedFriction):
+    r"""Dry friction that is a cubic parabola of slip velocity with one minimum.
+
+    .. math::
+
+        R = F\, \mu(v)\, s(v), \qquad
+        \mu(v) = \mu_s - \tfrac{3}{2} (\mu_s - \mu_m)
+        \left[\frac{|v|}{v_m} - \frac{1}{3} \left(\frac{|v|}{v_m}\right)^3\right]
+
+    R [N] has the sign of the slip velocity v [m/s]. mu falls from mu_s at rest to mu_m at v_m, is
+    back at mu_s at ``sqrt(3) v_m`` and grows without bound.
+
+    Parameters
+    ----------
+    static_coefficient : float or (n,) sequence
+        mu_s, at least mu_m.
+    minimum_coefficient : float or (n,) sequence
+        mu_m, zero or above.
+    minimum_velocity : float or (n,) sequence
+        v_m, positive [m/s].
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    J. J. Thomsen, A. Fidlin, Analytical approximations for stick-slip vibration amplitudes,
+    International Journal of Non-Linear Mechanics 38 (2003), unsmoothed.
+    """
+
+    kernel: ClassVar = friction_kernels.cubic
+
+    static_coefficient: PerNode = 0.8
+    minimum_coefficient: PerNode = 0.55
+    minimum_velocity: PerNode = 1e-2
+    smoothing_slope: PerNode = 1e6
+    smoothing: Smoothing = "arctan"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("zero or above", lambda x: x >= 0, "minimum_coefficient")
+        self.require("above zero", lambda x: x > 0, "minimum_velocity")
+        require_at_least(self, "static_coefficient", "minimum_coefficient")
+
+
+@dataclass(frozen=True)
+class ProductFriction(MemorylessFriction):
+    r"""Friction as a product of an exponential fall and an arctan (4.4-9).
+
+    .. math:: R = F\, a_1 (1 + a_2 e^{-b_1 |v|}) \arctan(b_2 v)
+
+    R [N] has the sign of the slip velocity v [m/s]. At high velocities ``R / F = pi a_1 / 2``.
+    The default values are those of section 4.4.
+
+    Parameters
+    ----------
+    factor : float or (n,) sequence
+        a_1, zero or above.
+    excess : float or (n,) sequence
+        a_2, zero or above: friction near rest over that at high velocities, less one.
+    decay : float or (n,) sequence
+        b_1, zero or above [s/m].
+    smoothing_slope : float or (n,) sequence
+        b_2, positive [s/m].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    W. Sextro, Dynamical Contact Problems with Friction, section 4.4.
+    """
+
+    kernel: ClassVar = friction_kernels.product
+
+    factor: PerNode = 0.14
+    excess: PerNode = 1.14
+    decay: PerNode = 2.0
+    smoothing_slope: PerNode = 100.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("zero or above", lambda x: x >= 0, "factor", "excess", "decay")
         self.require("above zero", lambda x: x > 0, "smoothing_slope")
-
-    def stick_velocity(self, nodes: int) -> NDArray[np.float64]:
-        """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
-
-        It is where the friction force is largest for a given normal force; where it has no
-        maximum, 10 / k_s.
-        """
-        table = self.table(np.full(nodes, 1.0 / nodes))
-        rows, inverse = np.unique(table, axis=0, return_inverse=True)
-        return np.array([_largest_at(row) for row in rows])[inverse.reshape(-1)]
 
     @property
     def velocity_scale(self) -> float:
-        """Width 1/k_s of the smoothing [m/s], the smallest of all nodes."""
+        """Width 1/b_2 of the arctan [m/s], the smallest of all nodes."""
         return 1.0 / float(np.max(self.smoothing_slope))
-
-
-FrictionLaw = ExponentialFriction
-
-
-def _largest_at(p: NDArray[np.float64]) -> float:
-    from scipy.optimize import brentq
-
-    law = _exponential.python
-    speeds = np.geomspace(1e-3, 1e9, 2000) / max(p[2], p[3])
-    force, slope = np.array([law(v, 1.0, p)[:2] for v in speeds]).T
-    largest = int(np.argmax(force))
-    if largest + 1 == len(speeds) or not (slope[: largest + 2] < 0.0).any():
-        return 10.0 / float(p[3])
-    low, high = speeds[max(largest - 1, 0)], speeds[largest + 1]
-    return float(brentq(lambda v: law(v, 1.0, p)[1], low, high, xtol=1e-16, rtol=1e-12))
-

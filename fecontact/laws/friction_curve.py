@@ -1,0 +1,160 @@
+"""Questions to a friction law without memory: the curve R/F over slip velocity and its extremes.
+
+They are answered by sampling the compiled law, so they hold for every law, also for users' own.
+"""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from fecontact.compiled import f8, i8, kernel, matrix, vector
+from fecontact.laws.contract import FrictionLaw, friction_at
+
+Array = NDArray[np.float64]
+
+# Speeds searched for extremes, in units of the law's velocity scale.
+_SEARCHED = np.geomspace(1e-6, 1e12, 4001)
+
+
+@kernel(types.void(i8, vector, f8, vector, matrix))
+def _sample(address, v, F, p, out):  # type: ignore[no-untyped-def]
+    """Fill out (len(v), 2) with R/F and d(R/F)/dv."""
+    for i in range(len(v)):
+        R, slope, _ = friction_at(address)(v[i], F, p)
+        out[i, 0], out[i, 1] = R / F, slope / F
+
+
+def coefficient(law: FrictionLaw, velocity: Array | float, normal_force: float = 1.0) -> Array:
+    """R/F at slip velocities [m/s]; it has the sign of the velocity.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        A law without memory.
+    velocity : (...) array or float
+        With parameters per node, (n,) of them, velocities broadcast against (n,).
+    normal_force : float
+        F [N]; the result depends on it only in laws whose force is not proportional to F.
+
+    Returns
+    -------
+    (...) array
+    """
+    return _curve(law, velocity, normal_force, 0)
+
+
+def slope(law: FrictionLaw, velocity: Array | float, normal_force: float = 1.0) -> Array:
+    """d(R/F)/dv [s/m] at slip velocities [m/s]; arguments as for :func:`coefficient`."""
+    return _curve(law, velocity, normal_force, 1)
+
+
+def largest_coefficient(law: FrictionLaw, normal_force: float = 1.0) -> tuple[Array, Array]:
+    """Largest maximum of R/F over slip velocity, and the velocity where it lies [m/s].
+
+    Where R/F has no maximum the velocity is infinite, and the coefficient is the value that R/F
+    tends to, infinite with a viscous term.
+
+    Returns
+    -------
+    (n,) array, (n,) array
+        One value per contact node if a parameter is given per node, else one.
+    """
+    return _largest(law, _nodes(law), normal_force)
+
+
+def velocity_of_minimum(law: FrictionLaw, normal_force: float = 1.0) -> Array:
+    """Smallest slip velocity (n,) at which R/F has a minimum [m/s], infinite without one.
+
+    Between the maximum and it friction falls with slip velocity, and steady sliding may be
+    unstable.
+    """
+    def smallest(single: FrictionLaw, row: Array) -> list[float]:
+        minima = _turning_points(single, row, normal_force, falling_before=True)
+        return [min(minima, default=np.inf)]
+
+    return _per_node(law, _nodes(law), smallest)[:, 0]
+
+
+def stick_velocity(law: FrictionLaw, nodes: int) -> Array:
+    """Slip velocity (n,) of the largest maximum of R/F, else ten times the velocity scale."""
+    velocity = _largest(law, nodes, 1.0)[1]
+    width = _per_node(law, nodes, lambda single, _: [10.0 * single.velocity_scale])[:, 0]
+    return np.where(np.isfinite(velocity), velocity, width)
+
+
+def _largest(law: FrictionLaw, nodes: int, F: float) -> tuple[Array, Array]:
+    def largest(single: FrictionLaw, row: Array) -> list[float]:
+        maxima = _turning_points(single, row, F, falling_before=False)
+        if maxima:
+            values = _sampled(single, np.array(maxima), F, row)[:, 0]
+            best = int(np.argmax(values))
+            return [values[best], maxima[best]]
+        far = single.velocity_scale * np.array([1e20, 1e30])
+        below, limit = _sampled(single, far, F, row)[:, 0]
+        return [limit if limit < 2.0 * below else np.inf, np.inf]
+
+    value, velocity = _per_node(law, nodes, largest).T
+    return value, velocity
+
+
+def _turning_points(
+    law: FrictionLaw, row: Array, F: float, *, falling_before: bool
+) -> list[float]:
+    """Speeds at which the slope of the curve changes its sign."""
+    speeds = law.velocity_scale * _SEARCHED
+    slopes = _sampled(law, speeds, F, row)[:, 1] * (-1.0 if falling_before else 1.0)
+    tilted = np.flatnonzero(slopes)
+    before, after = tilted[:-1], tilted[1:]
+    turns = np.flatnonzero((slopes[before] > 0.0) & (slopes[after] < 0.0))
+    return [
+        brentq(lambda v: _sampled(law, np.array([v]), F, row)[0, 1], speeds[before[i]],
+               speeds[after[i]], xtol=1e-300, rtol=1e-12)
+        for i in turns
+    ]
+
+
+def _curve(law: FrictionLaw, velocity: Array | float, F: float, column: int) -> Array:
+    nodes = _nodes(law)
+    v = np.asarray(velocity, dtype=float)
+    if nodes == 1:
+        return _sampled(law, v.reshape(-1), F, _table(law, 1)[0])[:, column].reshape(v.shape)
+    v = np.broadcast_to(v, np.broadcast_shapes(v.shape, (nodes,)))
+    values = np.empty(v.shape)
+    for j, row in enumerate(_table(law, nodes)):
+        part = v[..., j]
+        values[..., j] = _sampled(law, part.reshape(-1), F, row)[:, column].reshape(part.shape)
+    return values
+
+
+def _sampled(law: FrictionLaw, v: Array, F: float, row: Array) -> Array:
+    out = np.empty((v.size, 2))
+    _sample(law.kernel.address, np.ascontiguousarray(v), F, row, out)
+    return out
+
+
+def _nodes(law: FrictionLaw) -> int:
+    """Number of nodes for which parameters are given one by one, else 1."""
+    given = (getattr(law, entry.name) for entry in fields(law))
+    return max((len(value) for value in given if isinstance(value, tuple)), default=1)
+
+
+def _table(law: FrictionLaw, nodes: int) -> Array:
+    return law.table(np.full(nodes, 1.0 / nodes))
+
+
+def _per_node(
+    law: FrictionLaw, nodes: int, answer: Callable[[FrictionLaw, Array], list[float]]
+) -> Array:
+    """Answers (n, ...) from the law of one node and its parameters, once for equal nodes."""
+    rows, first, inverse = np.unique(_table(law, nodes), axis=0, return_index=True,
+                                     return_inverse=True)
+    answers = []
+    for row, node in zip(rows, first, strict=True):
+        own = {entry.name: value[node] for entry in fields(law)
+               if isinstance(value := getattr(law, entry.name), tuple)}
+        answers.append(answer(replace(law, **own), np.ascontiguousarray(row)))
+    return np.array(answers)[inverse.reshape(-1)]
