@@ -9,12 +9,13 @@ import hashlib
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from numba import cfunc, njit, types
-from numba.core import cgutils
+from numba import njit, types
+from numba.core import cgutils, sigutils
+from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
 from numba.extending import intrinsic
 
@@ -41,6 +42,12 @@ def _package_stamp() -> str:
     return stamp.hexdigest()
 
 
+def _stamp(compiled: Any) -> None:
+    stored = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if stored is not None and hasattr(stored, "_source_stamp"):
+        stored._source_stamp = (stored._source_stamp, _package_stamp())
+
+
 def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function for one signature and keep the result on disk.
 
@@ -55,9 +62,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
             "fastmath": _FASTMATH, **options,
         }
         dispatcher = njit(**settings)(function)
-        stored = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
-        if stored is not None and hasattr(stored, "_source_stamp"):
-            stored._source_stamp = _package_stamp()
+        _stamp(dispatcher)
         dispatcher.compile(signature)
         dispatcher.disable_compile()
         return dispatcher
@@ -72,38 +77,54 @@ def helper(function: Callable[..., Any]) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class CompiledLaw:
-    """A scalar function that kernels call by its address.
+    """A scalar function that kernels call by its address; compiled when that is asked for.
 
     Attributes
     ----------
     python : callable
         The function as written, for other compilers and for tests.
-    address : int
-        Address of the compiled function; valid as long as this object lives.
+    form : str
+        Its arguments and results, for people.
     """
 
     python: Callable[..., Any]
-    address: int
-    _function: Any
+    form: str
+    _signature: Any
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled function; valid as long as this object lives.
+
+        Raises
+        ------
+        InputError
+            If the function takes or returns something else than its form says, or uses what
+            cannot be compiled.
+        """
+        return int(self._compiled.address)
+
+    @cached_property
+    def _compiled(self) -> Any:
+        function = self.python
+        law = CFunc(function, sigutils.normalize_signature(self._signature), {},
+                    {"error_model": "numpy"})
+        # Functions typed into a console have no file beside which they could be stored.
+        if Path(inspect.getfile(function)).is_file():
+            law.enable_caching()
+            _stamp(law)
+        try:
+            law.compile()
+        except (NumbaError, TypeError) as error:
+            lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+            raise InputError(f"The law {function.__name__}({_arguments(function)}) is not one of "
+                             f"the form {self.form}: "
+                             f"{lines[1] if len(lines) > 1 else lines[0]}") from None
+        return law
 
 
 def compile_law(signature: Any, form: str, function: Callable[..., Any]) -> CompiledLaw:
-    """Compile a scalar law for the given signature; ``form`` is that signature for people.
-
-    Raises
-    ------
-    InputError
-        If the function takes or returns something else, or uses what cannot be compiled.
-    """
-    # Functions typed into a console have no file beside which they could be stored.
-    stored = Path(inspect.getfile(function)).is_file()
-    try:
-        compiled = cfunc(signature, cache=stored, error_model="numpy")(function)
-    except (NumbaError, TypeError) as error:
-        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-        raise InputError(f"The law {function.__name__}({_arguments(function)}) is not one of the form "
-                         f"{form}: {lines[1] if len(lines) > 1 else lines[0]}") from None
-    return CompiledLaw(function, int(compiled.address or 0), compiled)
+    """A scalar law for the given signature; ``form`` is that signature for people."""
+    return CompiledLaw(function, form, signature)
 
 
 def _arguments(function: Callable[..., Any]) -> str:

@@ -13,15 +13,18 @@ from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Crown
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
+from fecontact.laws.names import with_folder
 from fecontact.laws.normal import RoughSurface
 from fecontact.mesh import Mesh
 from fecontact.shapes import Beam, Block, Pendulum
 from fecontact.study_sections import (
     BasisSettings,
     BodySettings,
+    ContactLaws,
     MeshFile,
     OutputSettings,
     RenderSettings,
@@ -68,6 +71,9 @@ class Study:
     normal, friction, ground, drive, load
         ``[normal]``, ... : laws, ground, drive and load; see
         :class:`~fecontact.system.ContactSystem`.
+    contact : mapping of contact group to ContactLaws
+        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``: laws of single contact groups; the
+        others have those of ``[normal]`` and ``[friction]``.
     gap : float, (n,) tuple or Crown
         Initial distance of the contact nodes from flat ground [m], ``{radius, centre}`` for a
         face that is an arc; stands above all sections.
@@ -84,8 +90,9 @@ class Study:
     geometry: Beam | Pendulum | Block | MeshFile
     body_settings: BodySettings = field(default_factory=BodySettings)
     basis_settings: BasisSettings = field(default_factory=BasisSettings)
-    normal: RoughSurface = field(default_factory=RoughSurface)
-    friction: ExponentialFriction = field(default_factory=ExponentialFriction)
+    normal: NormalLaw = field(default_factory=RoughSurface)
+    friction: FrictionLaw = field(default_factory=ExponentialFriction)
+    contact: Mapping[str, ContactLaws] = field(default_factory=dict)
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
@@ -132,8 +139,11 @@ class Study:
     def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
         """A study from the tables of a TOML file; see :meth:`read`."""
         title = _title(path)
+        folder = Path() if path is None else path.parent
+        tables = {name: table if name == "geometry" else with_folder(table, folder)
+                  for name, table in tables.items()}
         for name in tables:
-            if name not in (valid := ("gap", "geometry", *_SECTIONS)):
+            if name not in (valid := ("gap", "geometry", "contact", *_SECTIONS)):
                 raise InputError(f"{title} has an unknown section or key '{name}'"
                                  f"{nearest(name, valid)}; there are: {choices(valid)}.")
         if "geometry" not in tables:
@@ -142,6 +152,8 @@ class Study:
         return cls(
             _geometry(tables["geometry"], f"{title}: [geometry]"),
             gap=_gap(tables.get("gap", 0.0), title),
+            contact=convert(tables.get("contact", {}), Mapping[str, ContactLaws], title,
+                            "contact"),
             path=path,
             **{_ATTRIBUTES[name]: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items()},
@@ -176,8 +188,10 @@ class Study:
         shape = {kind: name for name, kind in SHAPES.items()}.get(type(self.geometry))
         sections = {name: to_table(getattr(self, attribute), defaults=defaults)
                     for name, attribute in _ATTRIBUTES.items()}
+        contact = {"contact": plain(self.contact)} if self.contact else {}
         return {"gap": plain(self.gap),
                 "geometry": geometry if shape is None else {"shape": shape, **geometry},
+                **contact,
                 **{name: table for name, table in sections.items() if table or defaults}}
 
     def to_toml(self) -> str:
@@ -234,13 +248,18 @@ class Study:
             With the file and the section before the message, like all of these methods.
         """
         title, basis = _title(self.path), self.basis()
+        parts = {part: getattr(self, part) for part in PART_CLASSES}
+        for part in ("normal", "friction"):
+            own = {group: law for group, laws in self.contact.items()
+                   if (law := getattr(laws, part)) is not None}
+            if own:
+                parts[part] = {name: parts[part] for name, _ in basis.groups} | own
         try:
-            return ContactSystem(basis, gap=self.gap,
-                                 **{part: getattr(self, part) for part in PART_CLASSES})
+            return ContactSystem(basis, gap=self.gap, **parts)
         except InputError as error:
             owner, _, message = str(error).partition(": ")
-            for part, kind in PART_CLASSES.items():
-                if owner == kind.__name__:
+            for part in PART_CLASSES:
+                if owner == type(getattr(self, part)).__name__:
                     raise InputError(f"{title}: [{part}]: {message}") from None
             raise InputError(f"{title}: {error}") from None
 

@@ -11,6 +11,7 @@ from fecontact.body import ElasticBody, Material
 from fecontact.damping import Damping, LossFactor, Rayleigh
 from fecontact.errors import InputError, choices, require_not_negative, require_positive
 from fecontact.integrate.initial import RigidStart
+from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.mesh import Mesh
 from fecontact.points import Patch
 from fecontact.tables import located
@@ -117,6 +118,21 @@ class Loss:
 
     def __post_init__(self) -> None:
         require_not_negative("Loss", loss_factor=self.loss_factor)
+
+
+@dataclass(frozen=True)
+class ContactLaws:
+    """``[contact.NAME]``: laws of the contact group NAME.
+
+    Parameters
+    ----------
+    normal, friction : law, optional
+        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``; totals in them are those of the
+        group.
+    """
+
+    normal: NormalLaw | None = None
+    friction: FrictionLaw | None = None
 
 
 @dataclass(frozen=True)

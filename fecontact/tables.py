@@ -7,23 +7,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
 from numbers import Integral, Real
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import FecontactError, InputError, choices, nearest
+from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
+from fecontact.laws.names import is_kind, law_class, name_of
 from fecontact.system import ContactSystem
 
 T = TypeVar("T")
 
 PART_CLASSES: Mapping[str, type] = {
-    "normal": RoughSurface, "friction": ExponentialFriction, "ground": Ground, "drive": Drive,
-    "load": Load,
+    "normal": NormalLaw, "friction": FrictionLaw, "ground": Ground, "drive": Drive, "load": Load,
 }
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
@@ -35,7 +34,8 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
     Parameters
     ----------
     cls : type
-        A dataclass; fields that are dataclasses take sub-tables.
+        A dataclass; fields that are dataclasses take sub-tables. A kind of law: the key ``law``
+        names the law.
     table : mapping
         Keys and values; keys with defaults may be missing. Whole numbers serve as floats, lists
         as tuples.
@@ -50,6 +50,10 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
     """
     if not isinstance(table, Mapping):
         raise InputError(f"{where} must be a table of keys and values, not {shown(table)}.")
+    if is_kind(cls):
+        chosen = law_class(cls, table.get("law"), where)
+        parameters = {key: value for key, value in table.items() if key != "law"}
+        return cast(T, from_table(chosen, parameters, where))
     hints = get_type_hints(cls)
     entries = {entry.name: entry for entry in fields(cls)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
@@ -76,7 +80,8 @@ def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
         Whether fields that have their default value are in the table; those that are None never
         are.
     """
-    table = {}
+    name = name_of(instance)
+    table: dict[str, Any] = {} if name is None else {"law": name}
     for entry in fields(instance):
         value = getattr(instance, entry.name)
         default = entry.default_factory() if callable(entry.default_factory) else entry.default
@@ -87,7 +92,14 @@ def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
 
 def system_tables(system: ContactSystem) -> dict[str, Any]:
     """Laws, ground, drive, load and gap of a contact system as tables."""
-    tables: dict[str, Any] = {part: to_table(getattr(system, part)) for part in PART_CLASSES}
+    tables: dict[str, Any] = {}
+    for part in PART_CLASSES:
+        given = getattr(system, part)
+        if isinstance(given, Mapping):
+            for group, law in given.items():
+                tables.setdefault("contact", {}).setdefault(group, {})[part] = to_table(law)
+        else:
+            tables[part] = to_table(given)
     tables["gap"] = plain(system.gap)
     return tables
 
@@ -100,6 +112,12 @@ def system_from_tables(
         part: from_table(cls, tables.get(part, {}), f"{where}: [{part}]")
         for part, cls in PART_CLASSES.items()
     }
+    for group, laws in tables.get("contact", {}).items():
+        for part, table in laws.items():
+            if not isinstance(parts[part], dict):
+                parts[part] = {}
+            parts[part][group] = from_table(PART_CLASSES[part], table,
+                                            f"{where}: [contact.{group}.{part}]")
     gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
     return ContactSystem(basis, gap=gap, **parts)
 
@@ -223,7 +241,8 @@ def _words(hint: Any, plural: bool) -> list[str]:
     if origin is tuple:
         number = "" if args[-1] is Ellipsis else f"{_COUNTS.get(len(args), len(args))} "
         return [f"{'lists' if plural else 'a list'} of {number}{described(args[0], plural=True)}"]
-    content = (", ".join(entry.name for entry in fields(hint)) if is_dataclass(hint)
+    content = ("a law and its parameters" if is_kind(hint) else
+               ", ".join(entry.name for entry in fields(hint)) if is_dataclass(hint)
                else f"names and {described(args[1], plural=True)}")
     return [f"{'tables' if plural else 'a table'} of {content}"]
 

@@ -21,6 +21,7 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
     if not hasattr(type(law), "kernel"):
         raise InputError(f"{type(law).__name__} has no 'kernel'; give it one, kernel: ClassVar = "
                          f"a function compiled by normal_law or friction_law.")
+    _ = law.kernel.address
     values = [np.atleast_1d(value) for value in vars(law).values() if not isinstance(value, str)]
     nodes = max((len(value) for value in values), default=1)
     row = law.table(np.full(nodes, 1.0 / nodes))[0]

@@ -1,0 +1,129 @@
+"""Names of the laws in study files: ``law = "lugre"``, or a law of the user's own file."""
+
+import importlib.util
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fecontact.errors import InputError, choices, nearest
+from fecontact.laws.contract import FrictionLaw, NormalLaw
+
+
+@cache
+def law_names() -> Mapping[type, Mapping[str, type]]:
+    """Classes by name, for each kind of law (the base class); the first is the default."""
+    from fecontact.laws import friction, normal
+
+    return {
+        NormalLaw: _named(normal.RoughSurface),
+        FrictionLaw: _named(friction.ExponentialFriction),
+    }
+
+
+def _named(*classes: type) -> dict[str, type]:
+    return {_name(cls): cls for cls in classes}
+
+
+def _name(cls: type) -> str:
+    """``power_law`` for PowerLawContact."""
+    stem = re.sub(r"(?<=.)(Friction|Contact)$", "", cls.__name__)
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", stem).lower()
+
+
+def is_kind(hint: Any) -> bool:
+    """Whether a type is a kind of law, whose laws are told apart by name."""
+    return isinstance(hint, type) and hint in law_names()
+
+
+def law_class(kind: type, name: Any, where: str) -> type:
+    """The class of a law by its name, or by ``FILE.py:CLASS``; the default for None.
+
+    Raises
+    ------
+    InputError
+        If there is no such law (with those that there are), file or class.
+    """
+    names = law_names()[kind]
+    if name is None:
+        return next(iter(names.values()))
+    if not isinstance(name, str) or (name not in names and ".py:" not in name):
+        raise InputError(f"{where}: law = {name!r} must be one of {choices(names)}"
+                         f"{nearest(str(name), names)}, or a law of your own, "
+                         f"\"FILE.py:CLASS\".")
+    if name in names:
+        return names[name]
+    path, _, title = name.rpartition(":")
+    try:
+        found = getattr(_module(str(Path(path).resolve())), title, None)
+    except FileNotFoundError:
+        raise InputError(f"{where}: law = {name!r}: there is no file {path}.") from None
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{where}: law = {name!r}: {path} cannot be loaded "
+                         f"({type(error).__name__}: {error}).") from None
+    if not (isinstance(found, type) and issubclass(found, kind)):
+        laws = [one.__name__ for one in _subclasses(kind)
+                if one.__module__ == _module_name(str(Path(path).resolve()))]
+        raise InputError(f"{where}: law = {name!r}: {path} has no {kind.__name__} of that name"
+                         f"{nearest(title, laws)}; it has {choices(laws)}.")
+    return found
+
+
+def name_of(law: Any) -> str | None:
+    """The name of a law's class: None for what is no law of a kind, and for a default."""
+    cls = type(law)
+    for kind, names in law_names().items():
+        if isinstance(law, kind):
+            for index, (name, known) in enumerate(names.items()):
+                if known is cls:
+                    return name if index else None
+            file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+            if file is None or "." in cls.__qualname__:
+                raise InputError(f"The law {cls.__name__} cannot be written down: define it in a "
+                                 f"Python file, outside of functions.")
+            return f"{file}:{cls.__name__}"
+    return None
+
+
+def with_folder(table: Any, folder: Path) -> Any:
+    """A table in which files of laws and their data are named from the current folder."""
+    if isinstance(table, list):
+        return [with_folder(item, folder) for item in table]
+    if not isinstance(table, Mapping):
+        return table
+    return {key: _located(key, with_folder(value, folder), folder) for key, value in table.items()}
+
+
+def _located(key: str, value: Any, folder: Path) -> Any:
+    named = isinstance(value, str) and (key == "file" or (key == "law" and ".py:" in value))
+    return str(folder.resolve() / value) if named else value
+
+
+def _subclasses(kind: type) -> Iterator[type]:
+    for cls in kind.__subclasses__():
+        yield cls
+        yield from _subclasses(cls)
+
+
+def _module_name(path: str) -> str:
+    return f"fecontact_user_{re.sub(r'[^0-9a-zA-Z]', '_', path)}"
+
+
+@cache
+def _module(path: str) -> Any:
+    name = _module_name(path)
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise FileNotFoundError(path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
