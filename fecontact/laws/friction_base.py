@@ -89,12 +89,12 @@ class MemoryFriction(contract.FrictionLaw):
 
     @property
     def velocity_scale(self) -> float:
-        """Slip velocity [m/s] that matters to the contact: some state_scale per millisecond.
+        """Slip velocity [m/s] that moves the first internal variable by its scale in 0.1 s.
 
-        Friction with memory rises with displacement, not with velocity, so that a velocity
-        matters when it moves z within the shortest time of interest, taken as 1 ms.
+        Friction with memory rises with displacement, not with velocity: velocities well below
+        this one do not change it over the time of some oscillations.
         """
-        return 1e3 * float(np.min(self.state_scale))
+        return 10.0 * float(self.state_scale[0])
 
     def steady_coefficient(self, velocity: Array | float) -> Array:
         """R/F of sliding at constant slip velocity [m/s], with its sign; for v = 0 that of v > 0.
