@@ -132,7 +132,7 @@ def _curve(law: FrictionLaw, velocity: Array | float, F: float, column: int) -> 
 
 def _sampled(law: FrictionLaw, v: Array, F: float, row: Array) -> Array:
     out = np.empty((v.size, 2))
-    _sample(law.kernel.address, np.ascontiguousarray(v), F, row, out)
+    _sample(law.kernel.address, np.array(v), F, row, out)
     return out
 
 

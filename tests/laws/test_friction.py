@@ -12,7 +12,7 @@ BOOK = (0.8, 0.55, 1000.0, 1e6)
 
 
 def kernel(v, F, p=BOOK):
-    return ExponentialFriction.kernel.python(v, F, np.array(p, dtype=float))
+    return ExponentialFriction.kernel.python(v, F, np.array([*p, 0.0, 0.0]))
 
 
 def formula(v, F, p=BOOK):
@@ -137,7 +137,7 @@ def test_velocity_scale_is_the_narrowest():
 
 def test_no_parameter_is_shared():
     share = np.array([0.25, 0.75])
-    assert ExponentialFriction(*BOOK).table(share).tolist() == [list(BOOK)] * 2
+    assert ExponentialFriction(*BOOK).table(share).tolist() == [[*BOOK, 0.0, 0.0]] * 2
     assert ExponentialFriction((0.8, 0.6)).table(share)[:, 0].tolist() == [0.8, 0.6]
 
 

@@ -1,0 +1,204 @@
+"""What every friction law must do, whoever wrote it: checks that raise AssertionError."""
+
+import numpy as np
+from numba import types
+from scipy.integrate import solve_ivp
+
+from fecontact.compiled import f8, i8, kernel, matrix, vector
+from fecontact.laws.contract import friction_at, memory_at
+
+SPEEDS = np.geomspace(1e-4, 1e5, 55)
+
+
+@kernel(types.void(i8, f8, f8, vector, vector))
+def _compiled_friction(address, v, F, p, out):
+    out[0], out[1], out[2] = friction_at(address)(v, F, p)
+
+
+@kernel(types.void(i8, f8, f8, vector, vector, vector, matrix))
+def _compiled_memory(address, v, F, z, p, force, rates):
+    memory_at(address)(v, F, z, p, force, rates)
+
+
+def parameters(law, nodes=None):
+    """Parameter rows of the law, one per node."""
+    given = [len(value) for value in vars(law).values() if isinstance(value, tuple)]
+    nodes = nodes or max(given, default=1)
+    return np.ascontiguousarray(law.table(np.full(nodes, 1.0 / nodes)))
+
+
+def check_friction_law(law):
+    """A law without memory: compiled as written, odd, dissipative, with right derivatives."""
+    assert law.memory == 0
+    scale = law.velocity_scale
+    assert scale > 0.0
+    for p in parameters(law):
+        def evaluated(v, F, p=p):
+            return np.array(law.kernel.python(v, F, p))
+
+        compiled = np.empty(3)
+        for v in np.concatenate([-scale * SPEEDS, [0.0], scale * SPEEDS]):
+            for F in (0.0, 0.3, 14.0):
+                values = evaluated(v, F)
+                assert np.isfinite(values).all(), (v, F, values)
+                _compiled_friction(law.kernel.address, v, F, p, compiled)
+                np.testing.assert_allclose(compiled, values, rtol=1e-9, atol=1e-12)
+                np.testing.assert_allclose(evaluated(-v, F) * [-1, 1, -1], values,
+                                           rtol=1e-9, atol=1e-12)
+                assert values[0] * v >= 0.0, (v, F, values)
+                if F == 0.0:
+                    assert values[0] == 0.0
+                    continue
+                size = abs(values[0]) / max(abs(v), scale)
+                check_derivative(lambda x, F=F: evaluated(x, F)[0], v, values[1],
+                                 1e-3 * max(abs(v), scale), 1e-6 * size)
+                check_derivative(lambda x, v=v: evaluated(v, x)[0], F, values[2], 1e-3 * F,
+                                 1e-8 * abs(values[0]) / F)
+    stick = law.stick_velocity(3 if len(parameters(law)) == 1 else len(parameters(law)))
+    assert (stick > 0.0).all()
+    assert np.isfinite(stick).all()
+
+
+def check_derivative(function, x, slope, step, tolerance):
+    """The slope is that of differences; at a corner, between those of its two sides."""
+    left2, left, right, right2 = (function(x + k * step) for k in (-2, -1, 1, 2))
+    central = (8.0 * (right - left) - (right2 - left2)) / (12.0 * step)
+    tolerance += 1e-6 * abs(slope)
+    if abs(central - slope) <= tolerance:
+        return
+    small = 1e-3 * step
+    sides = [(function(x + s * small) - function(x)) / (s * small) for s in (-1, 1)]
+    slack = 1e-3 * max(map(abs, sides)) + tolerance
+    assert min(sides) - slack <= slope <= max(sides) + slack, (x, slope, central, sides)
+
+
+def memory_outputs(law, v, F, z, p):
+    """Force (3 + s,) and rates (s, 3 + s) of the law as written."""
+    s = len(z)
+    force, rates = np.full(3 + s, np.nan), np.full((s, 3 + s), np.nan)
+    law.kernel.python(v, F, z, p, force, rates)
+    return force, rates
+
+
+def check_memory_law(law, sliding_velocity=None):
+    """A law with memory: derivatives, symmetry, steady sliding, fading, energy of cycles.
+
+    ``sliding_velocity`` [m/s] is the largest one tried, by default 100 velocity scales.
+    """
+    s = law.memory
+    assert s >= 1
+    assert law.state_scale.shape == (s,)
+    assert (law.state_scale > 0.0).all()
+    fastest = sliding_velocity or 100.0 * law.velocity_scale
+    rng = np.random.default_rng(1)
+    rows = parameters(law)
+    share = np.full(len(rows), 1.0 / len(rows))
+    for node, p in enumerate(rows):
+        for trial in range(40):
+            F = float(rng.choice([0.0, 0.2, 1.0, 14.0])) * share[node]
+            # Sizes below, about and beyond those of sliding.
+            reach = _sliding_memory(law, F or 1.0, fastest, share, node)
+            z = reach * rng.uniform(-1.3, 1.3, s)
+            v = fastest * float(rng.choice([-1.0, 1.0])) * 10.0 ** rng.uniform(-4.0, 0.0)
+            if trial % 10 == 0:
+                v = 0.0
+            _check_memory_point(law, v, F, z, p)
+        _check_steady(law, share, node, p, fastest)
+        _check_fading(law, p, fastest)
+        for loop in range(3):
+            assert cycle_loss(law, p, share[node] * 2.0, fastest, loop) >= 0.0
+
+
+def _sliding_memory(law, F, v, share, node):
+    n = len(share)
+    z = law.initial_memory(np.full(n, F), np.full(n, v), share)[node]
+    return np.where(z == 0.0, law.state_scale, np.abs(z))
+
+
+def _check_memory_point(law, v, F, z, p):
+    s = len(z)
+    force, rates = memory_outputs(law, v, F, z, p)
+    assert np.isfinite(force).all()
+    assert np.isfinite(rates).all()
+    # Rooms larger than its own, as in systems of several laws: the rest stays untouched.
+    wide_force, wide_rates = np.full(5 + s, 7.0), np.full((s + 2, 5 + s), 7.0)
+    _compiled_memory(law.kernel.address, v, F, z, p, wide_force, wide_rates)
+    np.testing.assert_allclose(wide_force[: 3 + s], force, rtol=1e-8, atol=1e-9 * abs(force[0]))
+    np.testing.assert_allclose(wide_rates[:s, : 3 + s], rates, rtol=1e-8, atol=1e-300)
+    assert (wide_force[3 + s:] == 7.0).all()
+    assert (wide_rates[s:] == 7.0).all()
+    assert (wide_rates[:, 3 + s:] == 7.0).all()
+    if v:
+        mirrored, mirrored_rates = memory_outputs(law, -v, F, -z, p)
+        np.testing.assert_allclose(mirrored[0], -force[0], rtol=1e-12)
+        np.testing.assert_allclose(mirrored_rates[:, 0], -rates[:, 0], rtol=1e-12)
+    if F == 0.0:
+        assert force[0] == 0.0
+        return
+    steps = [1e-3 * max(abs(v), law.velocity_scale), 1e-3 * F, *(1e-3 * np.abs(z))]
+    point = np.array([v, F, *z])
+    for k, step in enumerate(steps):
+        def at(x, k=k):
+            moved = point.copy()
+            moved[k] = x
+            return memory_outputs(law, moved[0], moved[1], moved[2:], p)
+
+        biggest = np.abs(rates[:, 0]).max()
+        check_derivative(lambda x, at=at: at(x)[0][0], point[k], force[1 + k], step,
+                         1e-8 * abs(force[0]) / step)
+        for i in range(s):
+            check_derivative(lambda x, at=at, i=i: at(x)[1][i, 0], point[k], rates[i, 1 + k], step,
+                             1e-9 * biggest / step)
+
+
+def _check_steady(law, share, node, p, fastest):
+    n = len(share)
+    for v in (-fastest, -0.01 * fastest, 0.1 * fastest):
+        F = 3.0 * share[node]
+        z = law.initial_memory(np.full(n, F), np.full(n, v), share)[node]
+        force, rates = memory_outputs(law, v, F, z, p)
+        assert np.abs(rates[:, 0]).max() <= 1e-9 * np.abs(rates[:, 3:] * z).max() + 1e-12
+        steady = np.broadcast_to(law.steady_coefficient(v), (n,))[node]
+        assert abs(force[0] - steady * F) <= 1e-12 * abs(steady * F)
+        speeds, forces = np.full((2, n), v), np.full((2, n), F)
+        assert not law.sticks(speeds, forces, np.full((2, n), force[0]))[:, node].any()
+        assert steady == 0.0 or law.sticks(speeds, forces, 0.5 * speeds * 0.0)[:, node].all()
+
+
+def _check_fading(law, p, fastest):
+    """Without normal force z falls back to zero, up to what the velocity moves meanwhile."""
+    z = 3.0 * law.state_scale
+    for v in (0.0, fastest):
+        _, rates = memory_outputs(law, v, 0.0, z, p)
+        assert (rates[:, 0] <= 0.0).all()
+        matrix = rates[:, 3:]
+        assert np.linalg.eigvals(matrix).real.max() <= -1e3
+        rest = np.linalg.solve(matrix, matrix @ z - rates[:, 0])
+        assert (np.abs(rest) <= 1e-3 * law.state_scale + 1e-6 * fastest).all()
+
+
+def cycle_loss(law, p, F, fastest, loop=0, cycles=4):
+    """Energy [J] taken in the last of some cycles of a periodic slip velocity."""
+    rng = np.random.default_rng(loop)
+    harmonics = np.arange(1, 4)
+    weights = rng.normal(size=3) * (1.0 if loop else np.array([1.0, 0.0, 0.0]))
+    phases = rng.uniform(0.0, 2.0 * np.pi, 3)
+    weights *= fastest * 10.0 ** (-loop) / np.abs(weights).sum()
+    # A cycle moves z to and fro by about five times its scale.
+    period = 30.0 * law.state_scale[0] * max(F, 1.0) / np.abs(weights).max()
+
+    def velocity(t):
+        return float((weights * np.sin(2.0 * np.pi * harmonics * t / period + phases)).sum())
+
+    def rate(t, y):
+        force, rates = memory_outputs(law, velocity(t), F, y[:-1], p)
+        return np.append(rates[:, 0], force[0] * velocity(t))
+
+    start = np.append(np.zeros(law.memory), 0.0)
+    scale = np.append(law.state_scale * F, F * fastest * period)
+    solution = solve_ivp(rate, (0.0, cycles * period), start, method="LSODA", rtol=1e-7,
+                         atol=1e-9 * scale, t_eval=period * np.arange(cycles + 1))
+    assert solution.success
+    before, after = solution.y[:, -2], solution.y[:, -1]
+    assert (np.abs(after - before)[:-1] <= 1e-3 * law.state_scale * max(F, 1.0)).all()
+    return after[-1] - before[-1]
