@@ -1,16 +1,21 @@
-"""Normal contact laws."""
+"""Rough surfaces: beds of asperities whose heights follow a given density."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NodeLaw, PerNode, normal_law
+from fecontact.laws.contract import NormalLaw, PerNode, normal_law
+
+_TAU = 2.0 * math.pi
+_ROOT_HALF = math.sqrt(0.5)
+_DENSITY = 1.0 / math.sqrt(_TAU)
 
 
 @normal_law
-def _rough_surface(u, v, p):  # type: ignore[no-untyped-def]
+def _uniform(u, v, p):  # type: ignore[no-untyped-def]
     stiffness, height, damping = p[0], p[1], p[2]
     s = u / height
     if s <= 0.0:
@@ -27,8 +32,88 @@ def _rough_surface(u, v, p):  # type: ignore[no-untyped-def]
     return force, stiffness * bearing + damping * slope * v, damping * bearing
 
 
+@normal_law
+def _parabolic(u, v, p):  # type: ignore[no-untyped-def]
+    stiffness, height, damping = p[0], p[1], p[2]
+    s = u / height
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0
+    compression, bearing, density = s - 0.5, 1.0, 0.0
+    if s < 1.0:
+        compression = s * s * s * (1.0 - 0.5 * s)
+        bearing = s * s * (3.0 - 2.0 * s)
+        density = 6.0 * s * (1.0 - s)
+    force = stiffness * height * compression + damping * bearing * v
+    if force <= 0.0:
+        return 0.0, 0.0, 0.0
+    return force, stiffness * bearing + damping * density / height * v, damping * bearing
+
+
+@normal_law
+def _cosine(u, v, p):  # type: ignore[no-untyped-def]
+    stiffness, height, damping = p[0], p[1], p[2]
+    s = u / height
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0
+    compression, bearing, density = s - 0.5, 1.0, 0.0
+    if s < 1.0:
+        x = _TAU * s
+        cosine = math.cos(x)
+        density = 1.0 - cosine
+        if x > 0.5:
+            bearing = s - math.sin(x) / _TAU
+            compression = 0.5 * s * s - density / (_TAU * _TAU)
+        else:
+            # The differences above would lose their digits.
+            y = x * x
+            density = 2.0 * math.sin(0.5 * x) ** 2
+            bearing = x * y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (
+                1.0 - y / 110.0)))) / _TAU
+            compression = y * y / 24.0 * (1.0 - y / 30.0 * (1.0 - y / 56.0 * (1.0 - y / 90.0 * (
+                1.0 - y / 132.0)))) / (_TAU * _TAU)
+    force = stiffness * height * compression + damping * bearing * v
+    if force <= 0.0:
+        return 0.0, 0.0, 0.0
+    return force, stiffness * bearing + damping * density / height * v, damping * bearing
+
+
+@normal_law
+def _gaussian(u, v, p):  # type: ignore[no-untyped-def]
+    stiffness, height, damping, deviation = p[0], p[1], p[2], p[3]
+    highest, first_moment, norm = p[4], p[5], p[6]
+    s = u / height
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0
+    compression, bearing, density = s - 0.5, 1.0, 0.0
+    if s < 1.0:
+        t = (s - 0.5) / deviation
+        y, b = s / deviation, 0.5 / deviation
+        normal = _DENSITY * math.exp(-0.5 * t * t)
+        density = norm * normal / deviation
+        if y * (b + 1.0) > 0.1:
+            part = 0.5 * math.erfc(-_ROOT_HALF * t)
+            bearing = norm * (part - highest)
+            compression = norm * (deviation * (t * part + normal - first_moment) - s * highest)
+        else:
+            # The differences above would lose their digits: series in Hermite polynomials.
+            scale = norm * _DENSITY * math.exp(-0.5 * b * b)
+            before, hermite, term = 0.0, 1.0, y
+            bearing, compression = 0.0, 0.0
+            for n in range(10):
+                bearing += hermite * term
+                compression += hermite * term * y / (n + 2.0)
+                before, hermite = hermite, b * hermite - n * before
+                term *= y / (n + 2.0)
+            bearing *= scale
+            compression *= scale * deviation
+    force = stiffness * height * compression + damping * bearing * v
+    if force <= 0.0:
+        return 0.0, 0.0, 0.0
+    return force, stiffness * bearing + damping * density / height * v, damping * bearing
+
+
 @dataclass(frozen=True)
-class RoughSurface(NodeLaw):
+class RoughSurface(NormalLaw):
     r"""Rough surface with uniformly distributed asperity heights (4.1-16).
 
     .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
@@ -36,6 +121,9 @@ class RoughSurface(NodeLaw):
     with f = 0, s^2/2, s - 1/2 and h = f' = 0, s, 1 for s < 0, 0 <= s <= 1, s > 1: each asperity
     in contact is a spring with a parallel dashpot, and once all are in contact the law is linear.
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
+
+    Surfaces with another density p(z) of the relative depth z of their peaks below the highest
+    one have f(s), the integral of (s - z) p(z) from 0 to s, and h = f', the bearing-area curve.
 
     Parameters
     ----------
@@ -58,7 +146,7 @@ class RoughSurface(NodeLaw):
     uniform heights.
     """
 
-    kernel: ClassVar = _rough_surface
+    kernel: ClassVar = _uniform
     extensive: ClassVar = frozenset({"stiffness", "damping"})
 
     stiffness: PerNode = 0.3e6
@@ -70,15 +158,144 @@ class RoughSurface(NodeLaw):
         self.require("above zero", lambda x: x > 0, "stiffness", "roughness_height")
         self.require("zero or above", lambda x: x >= 0, "damping")
 
+    @property
+    def penetration_scale(self) -> float:
+        """Roughness height R_Z [m], the smallest of all nodes."""
+        return float(np.min(self.roughness_height))
+
     def stored_energy(
         self, penetration: NDArray[np.float64], share: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Energy (..., n) stored in the asperities [J]: the integral of F(u, 0) from 0 to u."""
-        stiffness, height, _ = self.table(share).T
+        table = self.table(share)
+        stiffness, height = table[:, 0], table[:, 1]
         s = np.maximum(penetration / height, 0.0)
-        below = np.minimum(s, 1.0)
         above = np.maximum(s - 1.0, 0.0)
-        return stiffness * height**2 * (below**3 / 6.0 + above * (1.0 + above) / 2.0)
+        partly = self._energy(np.minimum(s, 1.0), table)
+        complete = above * (self._complete + above / 2.0)
+        return np.asarray(stiffness * height**2 * (partly + complete))
+
+    @property
+    def _complete(self) -> float:
+        """f(1): one minus the mean of the density."""
+        return 0.5
+
+    def _energy(
+        self, s: NDArray[np.float64], table: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Integral of f from 0 to s, for s within 0 ... 1."""
+        return s**3 / 6.0
 
 
-NormalLaw = RoughSurface
+@dataclass(frozen=True)
+class ParabolicSurface(RoughSurface):
+    r"""Rough surface with few high peaks and few deep valleys: p = 6 z (1 - z).
+
+    .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
+
+    with f = s^3 - s^4/2, h = 3 s^2 - 2 s^3 for 0 <= s <= 1 and f = s - 1/2, h = 1 above; signs,
+    units and parameters are those of :class:`RoughSurface`.
+
+    Parameters
+    ----------
+    stiffness, roughness_height, damping : float or (n,) sequence
+        c [N/m], R_Z [m], beta c [N s/m].
+
+    Raises
+    ------
+    InputError
+        For a stiffness or roughness height that is not positive, or a negative damping.
+    """
+
+    kernel: ClassVar = _parabolic
+
+    def _energy(
+        self, s: NDArray[np.float64], table: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return s**4 * (0.25 - 0.1 * s)
+
+
+@dataclass(frozen=True)
+class CosineSurface(RoughSurface):
+    r"""Rough surface with few high peaks and few deep valleys: p = 1 - cos(2 pi z).
+
+    .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
+
+    with f = s^2/2 - (1 - cos(2 pi s)) / (4 pi^2), h = s - sin(2 pi s) / (2 pi) for 0 <= s <= 1
+    and f = s - 1/2, h = 1 above; signs, units and parameters are those of :class:`RoughSurface`.
+
+    Parameters
+    ----------
+    stiffness, roughness_height, damping : float or (n,) sequence
+        c [N/m], R_Z [m], beta c [N s/m].
+
+    Raises
+    ------
+    InputError
+        For a stiffness or roughness height that is not positive, or a negative damping.
+    """
+
+    kernel: ClassVar = _cosine
+
+    def _energy(
+        self, s: NDArray[np.float64], table: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        x = _TAU * s
+        series = x**5 / 120.0 * (1.0 - x**2 / 42.0 * (1.0 - x**2 / 72.0 * (1.0 - x**2 / 110.0)))
+        return np.where(x < 0.2, series, x**3 / 6.0 - x + np.sin(x)) / _TAU**3
+
+
+@dataclass(frozen=True)
+class GaussianSurface(RoughSurface):
+    r"""Rough surface with normally distributed heights, cut off at R_Z.
+
+    .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
+
+    with the density :math:`p(z) \propto \exp(-(z - 1/2)^2 / (2 \sigma^2))` within 0 <= z <= 1,
+    of unit area, f(s) the integral of (s - z) p(z) from 0 to s and h = f'; signs and units are
+    those of :class:`RoughSurface`.
+
+    Parameters
+    ----------
+    stiffness, roughness_height, damping : float or (n,) sequence
+        c [N/m], R_Z [m], beta c [N s/m].
+    deviation : float or (n,) sequence
+        sigma: standard deviation of the heights before they are cut off, divided by R_Z; 0.02 to
+        1 (where the density is nearly uniform).
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _gaussian
+
+    deviation: PerNode = 1.0 / 6.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("at least 0.02 and at most 1", lambda x: (x >= 0.02) & (x <= 1), "deviation")
+
+    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters (n, 7): the fields, and three integrals of the density at the highest peak."""
+        from scipy.special import erf, ndtr
+
+        table = super().table(share)
+        b = 0.5 / table[:, 3]
+        first_moment = _DENSITY * np.exp(-0.5 * b**2) - b * ndtr(-b)
+        return np.column_stack([table, ndtr(-b), first_moment, 1.0 / erf(b * _ROOT_HALF)])
+
+    def _energy(
+        self, s: NDArray[np.float64], table: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        from scipy.special import ndtr
+
+        deviation, highest, first_moment, norm = table[:, 3:7].T
+
+        def second(t: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray((t**2 + 1.0) * ndtr(t) + t * _DENSITY * np.exp(-0.5 * t**2)) / 2.0
+
+        moments = second((s - 0.5) / deviation) - second(-0.5 / deviation)
+        return np.asarray(norm * (deviation**2 * moments - deviation * first_moment * s
+                                  - highest * s**2 / 2.0))

@@ -96,18 +96,6 @@ def test_damping_takes_energy():
             assert (kernel(u, v)[0] - kernel(u, 0.0)[0]) * v > 0.0
 
 
-def test_compiled_and_plain_functions_agree():
-    from fecontact import contact_kernels as kernels
-
-    u, v = np.array(STATES).T
-    force, slope = np.empty(len(u)), np.empty(len(u))
-    table = np.tile([C, R, D], (len(u), 1))
-    kernels.normal_values(RoughSurface.kernel.address, u.copy(), v.copy(), table, force, slope)
-    expected = np.array([kernel(*state) for state in STATES])
-    assert force == pytest.approx(expected[:, 0], rel=1e-13, abs=1e-300)
-    assert slope == pytest.approx(expected[:, 1], rel=1e-13, abs=1e-300)
-
-
 # Energy ------------------------------------------------------------------------------------------
 
 def test_stored_energy_is_the_integral_of_the_elastic_force():

@@ -1,0 +1,249 @@
+"""Rough surface with the bearing-area curve of a measured profile."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import InputError, require_positive
+from fecontact.laws.contract import PerNode, normal_law
+from fecontact.laws.normal import RoughSurface
+
+_INTERVALS = 64
+_UNIFORM = (0.0, 0.5, 1.0)
+_HEAD, _KNOT = 4, 3
+
+
+@normal_law
+def _measured(u, v, p):  # type: ignore[no-untyped-def]
+    stiffness, height, damping, intervals = p[0], p[1], p[2], p[3]
+    s = u / height
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0
+    if s < 1.0:
+        k = int(s * intervals)
+        x = s * intervals - k
+        i = _HEAD + _KNOT * k
+        h, m = p[i + 1], p[i + 2] / intervals
+        rise, m_next = p[i + 4] - h, p[i + 5] / intervals
+        b, c = 3.0 * rise - 2.0 * m - m_next, m + m_next - 2.0 * rise
+        compression = p[i] + x / intervals * (h + x * (m / 2.0 + x * (b / 3.0 + x * c / 4.0)))
+        bearing = h + x * (m + x * (b + x * c))
+        density = intervals * (m + x * (2.0 * b + x * 3.0 * c))
+    else:
+        compression, bearing, density = p[_HEAD + _KNOT * int(intervals)] + s - 1.0, 1.0, 0.0
+    force = stiffness * height * compression + damping * bearing * v
+    if force <= 0.0:
+        return 0.0, 0.0, 0.0
+    return force, stiffness * bearing + damping * density / height * v, damping * bearing
+
+
+@dataclass(frozen=True)
+class MeasuredSurface(RoughSurface):
+    r"""Rough surface with a measured bearing-area (Abbott-Firestone) curve.
+
+    .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
+
+    h(s) is the part of the surface that lies above the depth s R_Z below the highest peak, by
+    monotone cubic interpolation between the given values, and 1 for s > 1; f is its exact
+    integral. u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never
+    tensile. See :meth:`from_heights` and :meth:`from_file` for profiles.
+
+    Parameters
+    ----------
+    stiffness, roughness_height, damping : float or (n,) sequence
+        c [N/m], R_Z [m], beta c [N s/m], as for :class:`RoughSurface`.
+    bearing : sequence
+        h at equal steps of depth from the highest peak, 0, to the deepest valley, 1, growing; the
+        same at all nodes. By default uniform heights.
+    file : str, optional
+        A file of heights in m, see :meth:`from_file`, which gives ``bearing`` and
+        ``roughness_height``. It is read once; afterwards ``file`` is None.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, or a file that cannot be used.
+    """
+
+    kernel: ClassVar = _measured
+
+    bearing: tuple[float, ...] = _UNIFORM
+    file: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.file is not None:
+            if self.bearing != _UNIFORM:
+                raise InputError(f"MeasuredSurface: file = {self.file!r} cannot stand beside "
+                                 f"bearing; give one of them.")
+            measured = type(self).from_file(self.file)
+            object.__setattr__(self, "bearing", measured.bearing)
+            object.__setattr__(self, "roughness_height", measured.roughness_height)
+            object.__setattr__(self, "file", None)
+        for name, value in vars(self._bed).items():
+            object.__setattr__(self, name, value)
+        h = _numbers(self.bearing, "bearing")
+        if len(h) < 3 or h[0] != 0.0 or h[-1] != 1.0 or (np.diff(h) < 0.0).any():
+            shown = list(h) if len(h) <= 8 else f"[{h[0]}, ..., {h[-1]}]"
+            raise InputError(f"MeasuredSurface: bearing = {shown} must be at least three numbers "
+                             f"that start with 0, never fall and end with 1.")
+        object.__setattr__(self, "bearing", tuple(h.tolist()))
+
+    @property
+    def _bed(self) -> "_Bed":
+        """The parameters that may differ from node to node."""
+        return _Bed(self.stiffness, self.roughness_height, self.damping)
+
+    @classmethod
+    def from_heights(
+        cls,
+        heights: Sequence[float] | NDArray[np.float64],
+        abscissa: Sequence[float] | NDArray[np.float64] | None = None,
+        *,
+        stiffness: PerNode = RoughSurface.stiffness,
+        damping: PerNode = RoughSurface.damping,
+        intervals: int = _INTERVALS,
+    ) -> Self:
+        """The surface of a profile trace, taken as straight between its points.
+
+        Parameters
+        ----------
+        heights : (N,) sequence
+            Heights along the trace, positive out of the material [m]; R_Z is their range.
+        abscissa : (N,) sequence, optional
+            Places of the heights, growing [m]; equally spaced by default.
+        stiffness, damping : float or (n,) sequence
+            c [N/m] and beta c [N s/m].
+        intervals : int
+            Number of steps of depth to which the bearing curve is reduced, at least 2.
+
+        Raises
+        ------
+        InputError
+            For fewer than three heights, heights all equal or not finite, or an abscissa that
+            does not grow.
+        """
+        z = _numbers(heights, "heights")
+        x = np.arange(len(z), dtype=float) if abscissa is None else _numbers(abscissa, "abscissa")
+        if len(z) < 3:
+            raise InputError(f"MeasuredSurface: heights has {len(z)} values; a profile needs at "
+                             f"least three.")
+        if len(x) != len(z):
+            raise InputError(f"MeasuredSurface: abscissa has {len(x)} values for {len(z)} heights.")
+        if (np.diff(x) <= 0.0).any():
+            place = int(np.argmax(np.diff(x) <= 0.0)) + 1
+            raise InputError(f"MeasuredSurface: abscissa[{place}] = {x[place]:g} must be "
+                             f"larger than the value before it, {x[place - 1]:g}.")
+        if np.ptp(z) == 0.0:
+            raise InputError(f"MeasuredSurface: all heights are {z[0]:g}; a rough surface has at "
+                             f"least two different ones.")
+        if intervals < 2:
+            raise InputError(f"MeasuredSurface: intervals = {intervals!r} must be at least 2.")
+        low, high = np.minimum(z[1:], z[:-1]), np.maximum(z[1:], z[:-1])
+        width = np.diff(x) / (x[-1] - x[0])
+        bearing = np.zeros(intervals + 1)
+        for k, level in enumerate(np.linspace(z.max(), z.min(), intervals + 1)):
+            above = np.where(high > low, high - level, np.where(low >= level, 1.0, 0.0))
+            bearing[k] = width @ np.clip(above / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+        bearing[0], bearing[-1] = 0.0, 1.0
+        return cls(stiffness, float(np.ptp(z)), damping,
+                   tuple(np.maximum.accumulate(np.minimum(bearing, 1.0)).tolist()))
+
+    @classmethod
+    def from_file(cls, file: str | Path, *, scale: float = 1.0, **options: Any) -> Self:
+        """The surface of a trace in a text file.
+
+        Parameters
+        ----------
+        file : path
+            One column of heights, or two columns of abscissae and heights, separated by blanks,
+            commas or semicolons; ``#`` starts a comment.
+        scale : float
+            Factor from the file's unit of length to m.
+        **options
+            See :meth:`from_heights`.
+
+        Raises
+        ------
+        InputError
+            For a file that cannot be read, with the line that is wrong.
+        """
+        require_positive("MeasuredSurface", scale=scale)
+        columns = scale * _columns(Path(file)).T
+        try:
+            return cls.from_heights(columns[-1], None if len(columns) == 1 else columns[0],
+                                    **options)
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from None
+
+    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters (n, 4 + 3 k): c, R_Z, beta c, intervals, and f, h, h' at the k depths."""
+        curve = self._curve()
+        depths = curve.x
+        knots = np.column_stack([curve.antiderivative()(depths), self.bearing,
+                                 curve.derivative()(depths)]).reshape(-1)
+        intervals = np.full(len(share), len(depths) - 1.0)
+        return np.column_stack([self._bed.table(share), intervals,
+                                np.tile(knots, (len(share), 1))])
+
+    def _curve(self) -> Any:
+        from scipy.interpolate import PchipInterpolator
+
+        return PchipInterpolator(np.linspace(0.0, 1.0, len(self.bearing)), self.bearing)
+
+    @property
+    def _complete(self) -> float:
+        return float(self._curve().antiderivative()(1.0))
+
+    def _energy(
+        self, s: NDArray[np.float64], table: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return np.asarray(self._curve().antiderivative(2)(s))
+
+
+@dataclass(frozen=True)
+class _Bed(RoughSurface):
+    def _title(self, name: str) -> str:
+        return f"{MeasuredSurface.__name__}: {name}"
+
+
+def _numbers(given: Any, name: str) -> NDArray[np.float64]:
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty((0, 0))
+    if values.ndim != 1:
+        raise InputError(f"MeasuredSurface: {name} must be a list of numbers.")
+    if not np.isfinite(values).all():
+        place = int(np.argmin(np.isfinite(values)))
+        raise InputError(f"MeasuredSurface: {name}[{place}] = {values[place]} must be finite.")
+    return values
+
+
+def _columns(file: Path) -> NDArray[np.float64]:
+    """Rows of one or two numbers."""
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise InputError(f"{file}: the profile cannot be read: {reason}.") from None
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        words = [word for word in re.split(r"[\s,;]+", line.partition("#")[0]) if word]
+        if not words:
+            continue
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            row = []
+        if len(row) not in (1, 2) or (rows and len(row) != len(rows[0])):
+            raise InputError(f"{file}: line {number}, {line.strip()!r}, must be a height, or an "
+                             f"abscissa and a height, like the lines before it.")
+        rows.append(row)
+    if not rows:
+        raise InputError(f"{file}: there are no heights in the file.")
+    return np.array(rows)
