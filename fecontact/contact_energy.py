@@ -7,8 +7,8 @@ from fecontact.compiled import f8, kernel, matrix, vector
 from fecontact.contact_kernels import SYSTEM, contact_state
 from fecontact.laws.contract import normal_at, signal_at
 
-# Columns of `powers`: put in by the drive's springs, the ground's lifting, the belt and the loads
-# given in time; lost in the modes, in the dashpots at B, in the contact's damping, by friction.
+# Columns of `powers`: put in by the drive's springs, the ground's lifting, the belt and the loads;
+# lost in the modes, in the dashpots at B, in the contact's damping, by friction.
 POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "contact_damping",
           "friction")
 
@@ -32,6 +32,7 @@ def powers(t, y, s, out, friction):  # type: ignore[no-untyped-def]
         for i in range(m):
             out[3] += value * s.load_shapes[k, i] * y[m + i]
     for i in range(m):
+        out[3] += s.constant_load[i] * y[m + i]
         for k in range(m):
             product = y[m + i] * y[m + k]
             out[4] += s.modal_damping[i, k] * product

@@ -33,10 +33,10 @@ def with_parameters(whole: Any, changes: Mapping[str, Any]) -> Any:
     direct: dict[str, Any] = {}
     below: dict[str, dict[str, Any]] = {}
     for name, value in changes.items():
-        first, _, rest = name.partition(".")
+        first, dot, rest = name.partition(".")
         if first not in members:
             raise KeyError(name)
-        if rest:
+        if dot:
             below.setdefault(first, {})[rest] = value
         else:
             direct[first] = value

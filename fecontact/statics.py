@@ -49,10 +49,12 @@ def static_equilibrium(
         says that the load lifts or tips it; and for steady sliding on wavy ground.
     """
     ground = system.ground
-    if friction and (ground.wavy or ground.friction_scale_kernel is not None):
-        raise AnalysisError(
-            "There is no steady sliding on ground whose height or friction varies along it; start "
-            "from rest or flatten the ground.")
+    if friction and ground.wavy:
+        raise AnalysisError("There is no steady sliding on wavy ground; start from rest or "
+                            "flatten the ground.")
+    if friction and ground.friction_scale_kernel is not None:
+        raise AnalysisError("There is no steady sliding on ground whose friction varies along it "
+                            "(ground.friction_variation); start from rest.")
     arrays = _at_mean(system)
     if not friction:
         arrays = arrays._replace(

@@ -67,8 +67,8 @@ class ContactSystem:
     def __post_init__(self) -> None:
         for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} must be a "
-                                 f"{kind.__name__}.")
+                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} cannot serve as "
+                                 f"{name}; it must be a {kind.__name__}.")
         for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
             given = getattr(self, name)
             if isinstance(given, Mapping):
@@ -257,6 +257,9 @@ class ContactSystem:
         InputError
             If there is no such parameter (with those that exist), or the value is out of range.
         """
+        for name in changes:
+            if "." in name and _inner_name(name).partition(".")[0] not in PARTS:
+                raise self._unknown(name)
         try:
             return cast("ContactSystem", with_parameters(self, {
                 _inner_name(name): value for name, value in changes.items()}))

@@ -99,7 +99,7 @@ def test_contact_map_of_one_node_and_few_times(times):
 
 def test_energies_leave_out_what_is_zero():
     trajectory = run(times=101)
-    work = np.zeros((101, 7))
+    work = np.zeros((101, 8))
     work[:, 6] = 1e-3 * np.linspace(0.0, 1.0, 101)
     figure = energies_figure(replace(trajectory, work=work))
     assert labels(figure) == ["stored energy [mJ]", "work put in [J]", "energy lost [mJ]"]

@@ -412,7 +412,7 @@ def test_states_of_nodes():
     y = root * np.array([-1e-6, -1e-6, -1e-6, -1e-6, -1e-6, -1e-6, 1e-6])
     n = len(y)
     run = Trajectory(system, np.arange(float(n)), np.column_stack([np.zeros(n), y]),
-                     np.column_stack([root * (1e-3 + slip), np.zeros(n)]), np.zeros((n, 7)))
+                     np.column_stack([root * (1e-3 + slip), np.zeros(n)]), np.zeros((n, 8)))
     S, G, O = ContactState.STICK, ContactState.SLIP, ContactState.OPEN
     assert run.contact_state[:, 0].tolist() == [S, S, S, G, G, G, O]
 
@@ -469,7 +469,7 @@ def test_outputs():
     run = simulate(system, 0.5, t_start=0.25, outputs=6)
     assert run.time == pytest.approx(np.linspace(0.25, 0.5, 6), rel=1e-15)
     assert run.states.shape == (6, 4)
-    assert run.work.shape == (6, 7)
+    assert run.work.shape == (6, 8)
     assert (run.work[0] == 0.0).all()
     times = np.array([0.0, 0.01, 0.3, 0.5])
     assert simulate(system, 0.5, outputs=times).time.tolist() == times.tolist()

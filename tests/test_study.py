@@ -222,7 +222,7 @@ MISTAKES = [
     ({"basis.modes": 0}, r"\[basis\]: modes = 0 must be at least 1"),
     ({"basis.modes": 9999}, r"s.toml: \[basis\]: modes = 9999 must be .*number of unknowns"),
     ({"basis.contact_nodes": 999}, r"\[basis\]: contact_nodes = 999 must be 'all' or a whole"),
-    ({"basis.contact_nodes": "some"}, r'contact_nodes = "some" must be a whole number or "all"'),
+    ({"basis.contact_nodes": "some"}, r'contact_nodes = "some" must be a whole number, "all" or'),
     ({"basis.contact_nodes": 0}, r'contact_nodes = 0 must be at least 1, or "all"'),
     ({"basis.contact": "contct"}, r"\[basis\]: The mesh has no boundary named 'contct' \(did"),
     ({"basis.B": {"at": "B"}}, r"\[basis\.B\] lacks the key 'radius'"),

@@ -222,7 +222,6 @@ class Trajectory:
             spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
         contact = system.stored_energy(self.penetration)
         put = dict(zip(POWERS, self.work.T, strict=True))
-        height = q @ basis.T[1, 1]
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
             elastic=0.5 * ((basis.angular_frequencies * q) ** 2).sum(axis=1),
@@ -231,7 +230,7 @@ class Trajectory:
             drive_work=put["drive"],
             ground_work=put["ground"],
             belt_work=put["belt"],
-            load_work=put["load"] - system.load.normal * (height - height[0]),
+            load_work=put["load"],
             modal_damping=put["modal_damping"],
             dashpots=put["dashpots"],
             contact_damping=put["contact_damping"],
