@@ -50,7 +50,7 @@ class _MaxwellSlip(MemoryFriction):
 
     stiffness: PerNode = 1e7
     friction_coefficient: PerNode = 0.55
-    relaxation_time: PerNode = 1e-8
+    relaxation_time: PerNode = 1e-7
 
     def __post_init__(self) -> None:
         super().__post_init__()

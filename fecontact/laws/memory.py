@@ -17,7 +17,7 @@ __all__ = ["BoucWenFriction", "DahlFriction", "IwanFriction", "JenkinsFriction",
 Array = NDArray[np.float64]
 
 # Time constant [s] with which internal variables vanish without normal force.
-_FADING = 1e-8
+_FADING = 1e-7
 
 
 @helper

@@ -194,10 +194,16 @@ def cycle_loss(law, p, F, fastest, loop=0, cycles=4):
         force, rates = memory_outputs(law, velocity(t), F, y[:-1], p)
         return np.append(rates[:, 0], force[0] * velocity(t))
 
-    start = np.append(np.zeros(law.memory), 0.0)
+    def jacobian(t, y):
+        force, rates = memory_outputs(law, velocity(t), F, y[:-1], p)
+        matrix = np.zeros((s + 1, s + 1))
+        matrix[:s, :s], matrix[s, :s] = rates[:, 3:], force[3:] * velocity(t)
+        return matrix
+
+    s = law.memory
     scale = np.append(law.state_scale * F, F * fastest * period)
-    solution = solve_ivp(rate, (0.0, cycles * period), start, method="LSODA", rtol=1e-7,
-                         atol=1e-9 * scale, t_eval=period * np.arange(cycles + 1))
+    solution = solve_ivp(rate, (0.0, cycles * period), np.zeros(s + 1), method="BDF", jac=jacobian,
+                         rtol=1e-7, atol=1e-8 * scale, t_eval=period * np.arange(cycles + 1))
     assert solution.success
     before, after = solution.y[:, -2], solution.y[:, -1]
     assert (np.abs(after - before)[:-1] <= 1e-3 * law.state_scale * max(F, 1.0)).all()

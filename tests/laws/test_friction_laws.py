@@ -34,7 +34,8 @@ CURVES = {
     GalvanettoFriction: ({"static_coefficient": 0.7, "kinetic_coefficient": 0.4, "decay": 300.0,
                               "growth": 50.0},
                          lambda a: 0.4 + 0.3 / (1.0 + 300.0 * a) + 50.0 * a * a),
-    CubicFriction: ({"static_coefficient": 0.7, "minimum_coefficient": 0.4, "minimum_velocity": 5e-3},
+    CubicFriction: ({"static_coefficient": 0.7, "minimum_coefficient": 0.4,
+                     "minimum_velocity": 5e-3},
                     lambda a: 0.7 - 0.45 * (a / 5e-3) + 0.15 * (a / 5e-3) ** 3),
 }
 VISCOUS = (ExponentialFriction, GaussianFriction, HyperbolicFriction, ConstantFriction)
