@@ -87,19 +87,20 @@ def test_relaxation_time_hardly_matters(tau):
 def test_jenkins_element_below_its_limit_is_a_spring():
     k, mu, F = 2e6, 0.4, 25.0
     X = 0.45 * mu * F / k
-    x, R, _ = to_and_fro(JenkinsFriction(k, mu), X, F)
-    assert R == pytest.approx(k * (x + X), abs=1e-6 * mu * F)
-    assert abs(loss(x, R)) < 1e-6 * mu * F * X
+    x, force, _ = to_and_fro(JenkinsFriction(k, mu), X, F)
+    assert force == pytest.approx(k * (x + X), abs=1e-6 * mu * F)
+    assert abs(loss(x, force)) < 1e-6 * mu * F * X
 
 
 def test_jenkins_element_follows_a_falling_limit():
     """Held at its limit, the spring gives way as the normal force falls, and vanishes with it."""
     k, mu = 2e6, 0.4
     times = np.linspace(0.0, 1.5, 301)
-    R, z = driven(JenkinsFriction(k, mu), lambda t: 0.0, times,
-                  lambda t: max(0.0, 25.0 * (1.0 - t)), start=np.array([mu * 25.0 / k]), max_step=0.01)
+    force, z = driven(JenkinsFriction(k, mu), lambda t: 0.0, times,
+                      lambda t: max(0.0, 25.0 * (1.0 - t)), start=np.array([mu * 25.0 / k]),
+                      max_step=0.01)
     limit = mu * 25.0 * np.maximum(0.0, 1.0 - times)
-    assert R == pytest.approx(limit, rel=1e-9, abs=1e-9)
+    assert force == pytest.approx(limit, rel=1e-9, abs=1e-9)
     # It lags by the relaxation time: 25 mu tau / k.
     assert k * z[:, 0] == pytest.approx(limit, abs=1e-5)
 
@@ -156,14 +157,15 @@ def test_dahls_curve():
     law = DahlFriction(mu, sigma)
     times = np.linspace(0.0, 1.0, 201)
     x = 1e-5 * times
-    R, _ = driven(law, lambda t: 1e-5, times, lambda t: F)
-    assert R == pytest.approx(mu * F * -np.expm1(-sigma * x / mu), rel=1e-6, abs=1e-9)
-    R, _ = driven(law, lambda t: -1e-5, times, lambda t: F, start=np.array([mu / sigma]))
-    assert R == pytest.approx(mu * F * (2.0 * np.exp(-sigma * x / mu) - 1.0), rel=1e-6, abs=1e-6)
+    force, _ = driven(law, lambda t: 1e-5, times, lambda t: F)
+    assert force == pytest.approx(mu * F * -np.expm1(-sigma * x / mu), rel=1e-6, abs=1e-9)
+    force, _ = driven(law, lambda t: -1e-5, times, lambda t: F, start=np.array([mu / sigma]))
+    mirrored = mu * F * (2.0 * np.exp(-sigma * x / mu) - 1.0)
+    assert force == pytest.approx(mirrored, rel=1e-6, abs=1e-6)
     # Exponent 2: u' = (1 - u)^2 with u = R / (mu F), so u = s / (1 + s).
-    R, _ = driven(DahlFriction(mu, sigma, 2.0), lambda t: 1e-5, times, lambda t: F)
+    force, _ = driven(DahlFriction(mu, sigma, 2.0), lambda t: 1e-5, times, lambda t: F)
     s = sigma * x / mu
-    assert R == pytest.approx(mu * F * s / (1.0 + s), rel=1e-6, abs=1e-9)
+    assert force == pytest.approx(mu * F * s / (1.0 + s), rel=1e-6, abs=1e-9)
 
 
 # LuGre -------------------------------------------------------------------------------------------
@@ -176,19 +178,19 @@ def test_lugre_before_sliding():
     assert rates.tolist() == [[0.0, 1.0, 0.0, 0.0]]
     # A slow pull by 2 % of the sliding deflection: R = F sigma_0 x but for 1 % of curvature.
     times = np.linspace(0.0, 1.0, 11)
-    R, _ = driven(law, lambda t: 1.6e-7, times, lambda t: 25.0)
+    force, _ = driven(law, lambda t: 1.6e-7, times, lambda t: 25.0)
     x = 1.6e-7 * times
     exact = 0.8 * -np.expm1(-1e5 * x / 0.8) + 30.0 * 1.6e-7 * np.exp(-1e5 * x / 0.8) + 5.0 * 1.6e-7
-    assert R == pytest.approx(25.0 * exact, rel=1e-6)
+    assert force == pytest.approx(25.0 * exact, rel=1e-6)
 
 
 @pytest.mark.parametrize("v", [-5e-3, -1e-4, 1e-6, 1e-3, 2e-3, 0.1])
 def test_lugre_slides_along_its_stribeck_curve(v):
     law = LuGreFriction(0.8, 0.5, 2e-3, 2.0, 1e5, 30.0, 5.0)
     times = np.linspace(0.0, 3e-4 / abs(v), 3)
-    R, _ = driven(law, lambda t: v, times, lambda t: 25.0)
+    force, _ = driven(law, lambda t: v, times, lambda t: 25.0)
     curve = (0.5 + 0.3 * math.exp(-((v / 2e-3) ** 2))) * math.copysign(1.0, v) + 5.0 * v
-    assert R[-1] == pytest.approx(25.0 * curve, rel=1e-6)
+    assert force[-1] == pytest.approx(25.0 * curve, rel=1e-6)
     assert law.steady_coefficient(v) == pytest.approx(curve, rel=1e-12)
 
 
@@ -223,17 +225,17 @@ def test_bouc_wen_curve_of_first_loading(exponent):
     law = BoucWenFriction(0.4, 5e-6, 0.7, exponent)
     times = np.linspace(0.0, 1.0, 101)
     s = 20.0 * times
-    R, z = driven(law, lambda t: 1e-4, times, lambda t: 25.0)
+    force, z = driven(law, lambda t: 1e-4, times, lambda t: 25.0)
     expected = -np.expm1(-s) if exponent == 1.0 else np.tanh(s)
-    assert R == pytest.approx(10.0 * expected, rel=1e-6, abs=1e-8)
+    assert force == pytest.approx(10.0 * expected, rel=1e-6, abs=1e-8)
     assert np.abs(z).max() <= 1.0 + 1e-9
 
 
 def test_bouc_wen_unloads_along_the_initial_stiffness():
     law = BoucWenFriction(0.4, 5e-6)
     times = np.linspace(0.0, 1.0, 11)
-    R, _ = driven(law, lambda t: -5e-6, times, lambda t: 25.0, start=np.ones(1))
-    assert R == pytest.approx(10.0 * (1.0 - times), abs=1e-6)
+    force, _ = driven(law, lambda t: -5e-6, times, lambda t: 25.0, start=np.ones(1))
+    assert force == pytest.approx(10.0 * (1.0 - times), abs=1e-6)
 
 
 def test_bouc_wen_of_beta_one_is_dahl():
