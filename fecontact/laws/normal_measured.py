@@ -1,5 +1,6 @@
 """Rough surface with the bearing-area curve of a measured profile."""
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,29 +14,42 @@ from fecontact.errors import InputError, require_positive
 from fecontact.laws.contract import PerNode, normal_law
 from fecontact.laws.normal import RoughSurface
 
-_INTERVALS = 64
+_INTERVALS, _HEAD, _KNOT = 64, 3, 3
+_HALF = np.linspace(0.0, 1.0, _INTERVALS // 2 + 1) ** 2 / 2.0
+# Close at both ends, where the curve of a profile with round peaks and valleys is a square root.
+_DEPTHS = np.concatenate([_HALF, 1.0 - _HALF[-2::-1]])
 _UNIFORM = (0.0, 0.5, 1.0)
-_HEAD, _KNOT = 4, 3
 
 
 @normal_law
 def _measured(u, v, p):  # type: ignore[no-untyped-def]
-    stiffness, height, damping, intervals = p[0], p[1], p[2], p[3]
+    stiffness, height, damping = p[0], p[1], p[2]
     s = u / height
     if s <= 0.0:
         return 0.0, 0.0, 0.0
     if s < 1.0:
-        k = int(s * intervals)
-        x = s * intervals - k
+        # The interval of `_DEPTHS`, its start and its width.
+        if s < 0.5:
+            k = min(int(_INTERVALS * math.sqrt(0.5 * s)), _INTERVALS // 2 - 1)
+            start = k * k
+            width = 2 * k + 1
+        else:
+            left = min(int(_INTERVALS * math.sqrt(0.5 * (1.0 - s))), _INTERVALS // 2 - 1)
+            k = _INTERVALS - 1 - left
+            start = _INTERVALS * _INTERVALS // 2 - (left + 1) * (left + 1)
+            width = 2 * left + 1
+        unit = 2.0 / (_INTERVALS * _INTERVALS)
+        length = width * unit
+        x = (s - start * unit) / length
         i = _HEAD + _KNOT * k
-        h, m = p[i + 1], p[i + 2] / intervals
-        rise, m_next = p[i + 4] - h, p[i + 5] / intervals
+        h, m = p[i + 1], p[i + 2] * length
+        rise, m_next = p[i + 4] - h, p[i + 5] * length
         b, c = 3.0 * rise - 2.0 * m - m_next, m + m_next - 2.0 * rise
-        compression = p[i] + x / intervals * (h + x * (m / 2.0 + x * (b / 3.0 + x * c / 4.0)))
+        compression = p[i] + x * length * (h + x * (m / 2.0 + x * (b / 3.0 + x * c / 4.0)))
         bearing = h + x * (m + x * (b + x * c))
-        density = intervals * (m + x * (2.0 * b + x * 3.0 * c))
+        density = (m + x * (2.0 * b + x * 3.0 * c)) / length
     else:
-        compression, bearing, density = p[_HEAD + _KNOT * int(intervals)] + s - 1.0, 1.0, 0.0
+        compression, bearing, density = p[_HEAD + _KNOT * _INTERVALS] + s - 1.0, 1.0, 0.0
     force = stiffness * height * compression + damping * bearing * v
     if force <= 0.0:
         return 0.0, 0.0, 0.0
@@ -49,20 +63,22 @@ class MeasuredSurface(RoughSurface):
     .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
 
     h(s) is the part of the surface that lies above the depth s R_Z below the highest peak, by
-    monotone cubic interpolation between the given values, and 1 for s > 1; f is its exact
-    integral. u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never
-    tensile. See :meth:`from_heights` and :meth:`from_file` for profiles.
+    monotone cubic interpolation over 64 intervals, and 1 for s > 1; f is the exact integral of
+    that curve. u is the penetration [m], v its rate [m/s], F the normal force on the body [N],
+    never tensile. See :meth:`from_heights` and :meth:`from_file` for profiles.
 
     Parameters
     ----------
     stiffness, roughness_height, damping : float or (n,) sequence
         c [N/m], R_Z [m], beta c [N s/m], as for :class:`RoughSurface`.
     bearing : sequence
-        h at equal steps of depth from the highest peak, 0, to the deepest valley, 1, growing; the
-        same at all nodes. By default uniform heights.
+        h from the highest peak, 0, to the deepest valley, 1, never falling; the same at all nodes.
+        By default uniform heights.
+    depths : sequence
+        s of these values, growing from 0 to 1; at equal steps by default.
     file : str, optional
-        A file of heights in m, see :meth:`from_file`, which gives ``bearing`` and
-        ``roughness_height``. It is read once; afterwards ``file`` is None.
+        A file of heights in m, see :meth:`from_file`, which gives ``bearing``, ``depths``
+        and ``roughness_height``. It is read once; afterwards ``file`` is None.
 
     Raises
     ------
@@ -73,6 +89,7 @@ class MeasuredSurface(RoughSurface):
     kernel: ClassVar = _measured
 
     bearing: tuple[float, ...] = _UNIFORM
+    depths: tuple[float, ...] = ()
     file: str | None = None
 
     def __post_init__(self) -> None:
@@ -81,17 +98,22 @@ class MeasuredSurface(RoughSurface):
                 raise InputError(f"MeasuredSurface: file = {self.file!r} cannot stand beside "
                                  f"bearing; give one of them.")
             measured = type(self).from_file(self.file)
-            object.__setattr__(self, "bearing", measured.bearing)
-            object.__setattr__(self, "roughness_height", measured.roughness_height)
+            for name in ("bearing", "depths", "roughness_height"):
+                object.__setattr__(self, name, getattr(measured, name))
             object.__setattr__(self, "file", None)
         for name, value in vars(self._bed).items():
             object.__setattr__(self, name, value)
         h = _numbers(self.bearing, "bearing")
         if len(h) < 3 or h[0] != 0.0 or h[-1] != 1.0 or (np.diff(h) < 0.0).any():
-            shown = list(h) if len(h) <= 8 else f"[{h[0]}, ..., {h[-1]}]"
-            raise InputError(f"MeasuredSurface: bearing = {shown} must be at least three numbers "
-                             f"that start with 0, never fall and end with 1.")
+            raise InputError(f"MeasuredSurface: bearing = {_shown(h)} must be at least three "
+                             f"numbers that start with 0, never fall and end with 1.")
+        s = _numbers(self.depths, "depths")
+        if len(s) and (len(s) != len(h) or s[0] != 0.0 or s[-1] != 1.0
+                       or (np.diff(s) <= 0.0).any()):
+            raise InputError(f"MeasuredSurface: depths = {_shown(s)} must be as many numbers as "
+                             f"bearing has, growing from 0 to 1.")
         object.__setattr__(self, "bearing", tuple(h.tolist()))
+        object.__setattr__(self, "depths", tuple(s.tolist()))
 
     @property
     def _bed(self) -> "_Bed":
@@ -106,7 +128,6 @@ class MeasuredSurface(RoughSurface):
         *,
         stiffness: PerNode = RoughSurface.stiffness,
         damping: PerNode = RoughSurface.damping,
-        intervals: int = _INTERVALS,
     ) -> Self:
         """The surface of a profile trace, taken as straight between its points.
 
@@ -118,8 +139,6 @@ class MeasuredSurface(RoughSurface):
             Places of the heights, growing [m]; equally spaced by default.
         stiffness, damping : float or (n,) sequence
             c [N/m] and beta c [N s/m].
-        intervals : int
-            Number of steps of depth to which the bearing curve is reduced, at least 2.
 
         Raises
         ------
@@ -141,17 +160,16 @@ class MeasuredSurface(RoughSurface):
         if np.ptp(z) == 0.0:
             raise InputError(f"MeasuredSurface: all heights are {z[0]:g}; a rough surface has at "
                              f"least two different ones.")
-        if intervals < 2:
-            raise InputError(f"MeasuredSurface: intervals = {intervals!r} must be at least 2.")
         low, high = np.minimum(z[1:], z[:-1]), np.maximum(z[1:], z[:-1])
         width = np.diff(x) / (x[-1] - x[0])
-        bearing = np.zeros(intervals + 1)
-        for k, level in enumerate(np.linspace(z.max(), z.min(), intervals + 1)):
-            above = np.where(high > low, high - level, np.where(low >= level, 1.0, 0.0))
-            bearing[k] = width @ np.clip(above / np.where(high > low, high - low, 1.0), 0.0, 1.0)
-        bearing[0], bearing[-1] = 0.0, 1.0
+        flat = high == low
+        bearing = np.zeros(_INTERVALS + 1)
+        bearing[-1] = 1.0
+        for k, level in enumerate(z.max() - np.ptp(z) * _DEPTHS[1:-1], start=1):
+            above = np.where(flat, low >= level, (high - level) / np.where(flat, 1.0, high - low))
+            bearing[k] = min(1.0, width @ np.clip(above, 0.0, 1.0))
         return cls(stiffness, float(np.ptp(z)), damping,
-                   tuple(np.maximum.accumulate(np.minimum(bearing, 1.0)).tolist()))
+                   tuple(np.maximum.accumulate(bearing).tolist()), tuple(_DEPTHS.tolist()))
 
     @classmethod
     def from_file(cls, file: str | Path, *, scale: float = 1.0, **options: Any) -> Self:
@@ -178,22 +196,21 @@ class MeasuredSurface(RoughSurface):
             return cls.from_heights(columns[-1], None if len(columns) == 1 else columns[0],
                                     **options)
         except InputError as error:
-            raise InputError(f"{file}: {error}") from None
+            raise InputError(f"{file}: {str(error).removeprefix('MeasuredSurface: ')}") from None
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Parameters (n, 4 + 3 k): c, R_Z, beta c, intervals, and f, h, h' at the k depths."""
+        """Parameters (n, 3 + 3 k): c, R_Z, beta c, and f, h, h' at k depths."""
         curve = self._curve()
-        depths = curve.x
-        knots = np.column_stack([curve.antiderivative()(depths), self.bearing,
-                                 curve.derivative()(depths)]).reshape(-1)
-        intervals = np.full(len(share), len(depths) - 1.0)
-        return np.column_stack([self._bed.table(share), intervals,
-                                np.tile(knots, (len(share), 1))])
+        knots = np.column_stack([curve.antiderivative()(_DEPTHS), curve(_DEPTHS),
+                                 curve.derivative()(_DEPTHS)]).reshape(-1)
+        return np.column_stack([self._bed.table(share), np.tile(knots, (len(share), 1))])
 
     def _curve(self) -> Any:
         from scipy.interpolate import PchipInterpolator
 
-        return PchipInterpolator(np.linspace(0.0, 1.0, len(self.bearing)), self.bearing)
+        depths = self.depths or np.linspace(0.0, 1.0, len(self.bearing))
+        given = PchipInterpolator(depths, self.bearing)
+        return PchipInterpolator(_DEPTHS, np.clip(given(_DEPTHS), 0.0, 1.0))
 
     @property
     def _complete(self) -> float:
@@ -222,6 +239,10 @@ def _numbers(given: Any, name: str) -> NDArray[np.float64]:
         place = int(np.argmin(np.isfinite(values)))
         raise InputError(f"MeasuredSurface: {name}[{place}] = {values[place]} must be finite.")
     return values
+
+
+def _shown(values: NDArray[np.float64]) -> str:
+    return str(values.tolist()) if len(values) <= 8 else f"[{values[0]}, ..., {values[-1]}]"
 
 
 def _columns(file: Path) -> NDArray[np.float64]:

@@ -2,8 +2,10 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
+import normal_conformance as conformance
 import numpy as np
 import pytest
 from normal_conformance import check_normal_law
@@ -16,6 +18,8 @@ from fecontact.laws.normal_measured import MeasuredSurface
 from fecontact.laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from fecontact.laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from fecontact.laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
+from fecontact.laws.potential import stored_energy
+from fecontact.laws.soundness import require_sound
 
 R = 5e-6
 TRACE = np.random.default_rng(5).normal(size=400).cumsum() * 1e-7
@@ -55,6 +59,8 @@ LAWS = {
     "gaussian, wide": (GaussianSurface(1e6, R, 40.0, 1.0), MICRO),
     "measured": (MeasuredSurface.from_heights(TRACE, stiffness=1e6, damping=40.0), MICRO),
     "bearing": (MeasuredSurface(1e6, R, 40.0, (0.0, 0.1, 0.1, 0.7, 1.0)), MICRO),
+    "bearing at depths": (MeasuredSurface(1e6, R, 40.0, (0.0, 0.1, 0.7, 1.0), (0.0, 0.3, 0.4, 1.0)),
+                          MICRO),
     "linear": (LinearContact(1e6, 40.0), IMPACT),
     "hertz": (PowerContact(1e9, 1.5, 0.7), IMPACT),
     "power 1": (PowerContact(1e6, 1.0, 0.7), IMPACT),
@@ -90,6 +96,62 @@ def test_contract_with_parameters_per_node(law):
         law.table(np.full(2, 0.5))
 
 
+def _wrong_law(change):
+    def function(u, v, p):
+        if u <= 0.0:
+            return 0.0, 0.0, 0.0
+        return change(u, v, p)
+
+    return normal_law(function)
+
+
+@pytest.mark.parametrize(("function", "message"), [
+    (lambda u, v, p: (p[0] * u * u, 2.02 * p[0] * u, 0.0), "derivative"),
+    (lambda u, v, p: (p[0] * u + 1e-3 * v, p[0], 1e-3), None),
+    (lambda u, v, p: (p[0] * u, p[0], -1e-9), None),
+    (lambda u, v, p: (p[0] * u * (1.0 + 0.1 * v), p[0] * (1.0 + 0.1 * v), 0.101 * p[0] * u),
+     "derivative"),
+    (lambda u, v, p: (p[0] * u if u < 2e-6 else 1.02 * p[0] * u,
+                      p[0] if u < 2e-6 else 1.02 * p[0], 0.0), None),
+    (lambda u, v, p: (p[0] / (1e-6 - u), 0.0, 0.0), None),
+])
+def test_wrong_laws_are_found(function, message):
+    """Wrong slopes, tension, a dashpot that drives, a jump, a pole."""
+    from numba import njit
+
+    @dataclass(frozen=True)
+    class Wrong(TwoSlopes):
+        kernel: ClassVar = _wrong_law(njit(function))
+
+    with pytest.raises(AssertionError, match=message):
+        conformance.check_forces(Wrong(), np.array([1e6, 1e-6]), MICRO, (-1.0, 1.0))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_pass_the_check_of_every_system(name):
+    require_sound(LAWS[name][0])
+
+
+@pytest.mark.parametrize("name", ["uniform", "gaussian", "measured", "linear", "hertz",
+                                  "back-burdekin", "exponential", "prescribed"])
+def test_energy_by_quadrature_agrees_with_the_closed_form(name):
+    law, (low, high) = LAWS[name]
+    u = np.linspace(max(low, -10.0 * law.penetration_scale),
+                    min(high, 4.0 * law.penetration_scale), 42).reshape(7, 3, 2)
+    share = np.array([0.3, 0.7])
+    np.testing.assert_allclose(stored_energy(law, u, share), law.stored_energy(u, share),
+                               rtol=3e-4 if name == "measured" else 1e-9, atol=1e-18)
+
+
+def test_penetration_scales():
+    assert LinearContact((1e6, 4e6)).penetration_scale == 2.5e-7
+    assert PowerContact(1e9, 1.5).penetration_scale == pytest.approx(1e-6, rel=1e-12)
+    assert PowerContact((1e9, 8e9), 1.5).penetration_scale == pytest.approx(2.5e-7, rel=1e-12)
+    assert TwoSidedStop(1e9, 1.0, 1.5).penetration_scale == pytest.approx(1e-6, rel=1e-12)
+    assert ExponentialContact(1.0, (3e-6, 2e-6)).penetration_scale == 2e-6
+    assert GreenwoodWilliamson(1.0, 1.0, 1.0, 3e-6).penetration_scale == 3e-6
+
+
 def force(law, u, v=0.0):
     return law.kernel.python(u, v, law.table(np.ones(1))[0])
 
@@ -107,7 +169,7 @@ def _gaussian(deviation):
 DENSITIES = [
     (RoughSurface(1e6, R, 40.0), lambda z: 1.0),
     (ParabolicSurface(1e6, R, 40.0), lambda z: 6.0 * z * (1.0 - z)),
-    (CosineSurface(1e6, R, 40.0), lambda z: 1.0 - math.cos(2.0 * math.pi * z)),
+    (CosineSurface(1e6, R, 40.0), lambda z: 2.0 * math.sin(math.pi * z) ** 2),
     *((GaussianSurface(1e6, R, 40.0, s), _gaussian(s)) for s in (0.05, 1.0 / 6.0, 0.4, 1.0)),
 ]
 
@@ -153,24 +215,26 @@ def test_straight_flank_is_uniform():
 
 
 def test_measured_sine():
-    """A sine has the bearing curve 1 - arccos(1 - 2 s) / pi turned about: arccos(1 - 2 s) / pi."""
+    """A sine has the bearing curve arccos(1 - 2 s) / pi."""
     x = np.linspace(0.0, 3.0, 6001)
     law = MeasuredSurface.from_heights(R / 2.0 * np.cos(2.0 * np.pi * x), x, stiffness=1e6)
-    for s in (0.02, 0.1, 0.33, 0.5, 0.8, 0.97):
+    for s in (0.005, 0.02, 0.1, 0.33, 0.5, 0.8, 0.97, 1.0):
         h = math.acos(1.0 - 2.0 * s) / math.pi
         f = quad(lambda z: math.acos(1.0 - 2.0 * z) / math.pi, 0.0, s, epsrel=1e-12)[0]
-        F, slope, _ = force(law, s * R)
-        assert slope == pytest.approx(1e6 * h, rel=5e-3 if s < 0.05 else 1e-4)
-        assert F == pytest.approx(1e6 * R * f, rel=1e-2 if s < 0.05 else 1.5e-3)
+        load, slope, _ = force(law, s * R)
+        assert slope == pytest.approx(1e6 * h, rel=1e-4 if s > 0.01 else 1e-3)
+        assert load == pytest.approx(1e6 * R * f, rel=1e-3 if s > 0.01 else 5e-3)
 
 
 @pytest.mark.parametrize("abscissa", [False, True])
 def test_measured_trace_against_its_own_points(abscissa):
-    """The bed of asperities at the points of the trace, each with its part of the length."""
+    """The bed of asperities at many points of the trace, each with its part of the length."""
     rng = np.random.default_rng(3)
     fine = np.convolve(rng.normal(size=4200), np.hanning(200), "valid") * 1e-7
     x = np.cumsum(rng.uniform(0.5, 1.5, len(fine))) if abscissa else np.arange(len(fine)) * 1.0
     law = MeasuredSurface.from_heights(fine, x if abscissa else None, stiffness=1e6, damping=40.0)
+    between = np.interp(np.arange(0.0, len(x) - 1.0, 0.01), np.arange(len(x)), x)
+    x, fine = between, np.interp(between, x, fine)
     weight = np.gradient(x)
     weight[[0, -1]] /= 2.0
     weight /= weight.sum()
@@ -178,11 +242,15 @@ def test_measured_trace_against_its_own_points(abscissa):
     height = np.ptp(fine)
     assert law.roughness_height == pytest.approx(height, rel=1e-12)
     for s in (0.1, 0.25, 0.5, 0.75, 1.0, 1.5):
-        F, slope, damping = force(law, s * height)
+        load, slope, damping = force(law, s * height)
         touching = weight * (depth < s * height)
-        assert F == pytest.approx(1e6 * (touching @ (s * height - depth)), rel=3e-3)
-        assert slope == pytest.approx(1e6 * touching.sum(), rel=5e-3)
-        assert damping == pytest.approx(40.0 * touching.sum(), rel=5e-3)
+        assert load == pytest.approx(1e6 * (touching @ (s * height - depth)), rel=3e-3)
+        assert slope == pytest.approx(1e6 * touching.sum(), abs=4e-3 * 1e6)
+        assert damping == pytest.approx(40.0 * touching.sum(), abs=4e-3 * 40.0)
+    # At the depths that the curve is given for it is that of the trace.
+    for k in (8, 20, 40):
+        touching = weight @ (depth < law.depths[k] * height)
+        assert law.bearing[k] == pytest.approx(touching, abs=5e-5)
     # All asperities in contact: the mean of the trace.
     expected = 1e6 * (1.5 * height - weight @ depth)
     assert force(law, 1.5 * height)[0] == pytest.approx(expected, rel=5e-4)
@@ -198,7 +266,8 @@ def test_files(tmp_path):
     x = np.linspace(0.0, 1.0, len(TRACE))
     one, two = tmp_path / "one.txt", tmp_path / "two.csv"
     one.write_text("# heights\n\n" + "\n".join(f"{z:.17g}" for z in TRACE))
-    two.write_text("\n".join(f"{a:.17g}; {z * 1e6:.17g} # um" for a, z in zip(x, TRACE, strict=True)))
+    two.write_text("\n".join(f"{a:.17g}; {z * 1e6:.17g} # um"
+                             for a, z in zip(x, TRACE, strict=True)))
     expected = MeasuredSurface.from_heights(TRACE)
     assert MeasuredSurface.from_file(one) == expected
     assert MeasuredSurface(file=str(one)) == expected
@@ -218,12 +287,12 @@ def test_files(tmp_path):
 def test_files_that_are_no_profile(tmp_path, text, message):
     file = tmp_path / "trace.txt"
     file.write_text(text)
-    with pytest.raises(InputError, match=f"trace.txt: .*{message}"):
+    with pytest.raises(InputError, match=rf"trace\.txt: .*{message}"):
         MeasuredSurface(file=str(file))
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match="none.txt: the profile cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"none\.txt: the profile cannot be read: No such file"):
         MeasuredSurface.from_file(tmp_path / "none.txt")
 
 
@@ -264,15 +333,15 @@ def _asperity_integral(n, h):
     centre = math.sqrt(max(-h, 0.0))
     ends = [0.0, *(e for e in (centre - 0.5, centre, centre + 0.5) if e > 0.0), centre + 6.0]
     return sum(quad(integrand, a, b, epsabs=0.0, epsrel=1e-13, limit=200)[0]
-               for a, b in zip(ends[:-1], ends[1:], strict=True))
+               for a, b in pairwise(ends))
 
 
-@pytest.mark.parametrize("h", [-40.0, -12.0, -10.001, -9.999, -7.3, -3.01, -1.0, -0.2, 0.0, 0.26, 1.0,
-                               2.5, 4.4, 6.0, 7.49, 8.99])
+@pytest.mark.parametrize("h", [-40.0, -12.0, -10.001, -9.999, -7.3, -3.01, -1.0, -0.2, 0.0, 0.26,
+                               1.0, 2.5, 4.4, 6.0, 7.49, 8.99])
 def test_greenwood_williamson_integrals(h):
     law = GreenwoodWilliamson(1.0, 1.0, 0.75, 1.0, separation=0.0)
-    F, slope, _ = force(law, -h)
-    assert F == pytest.approx(_asperity_integral(1.5, h), rel=1e-9)
+    load, slope, _ = force(law, -h)
+    assert load == pytest.approx(_asperity_integral(1.5, h), rel=1e-9)
     assert slope == pytest.approx(1.5 * _asperity_integral(0.5, h), rel=1e-8)
 
 
@@ -416,12 +485,15 @@ def test_models_agree_for_hard_impacts():
     (lambda: GaussianSurface(deviation=0.0),
      r"GaussianSurface: deviation = 0\.0 must be at least 0\.02 and at most 1"),
     (lambda: CosineSurface(stiffness=-1.0), r"CosineSurface: stiffness = -1\.0 must be above zero"),
-    (lambda: MeasuredSurface(bearing=(0.0, 0.6, 0.5, 1.0)), "MeasuredSurface: bearing = .*never fal"),
+    (lambda: MeasuredSurface(bearing=(0.0, 0.6, 0.5, 1.0)),
+     r"MeasuredSurface: bearing = \[0\.0, 0\.6, 0\.5, 1\.0\] must be .*never fall"),
     (lambda: MeasuredSurface(bearing=(0.1, 1.0, 1.0)), "start with 0"),
     (lambda: MeasuredSurface(bearing=(0.0, 1.0)), "at least three"),
-    (lambda: MeasuredSurface(damping=-1.0), "MeasuredSurface: damping = -1.0 must be zero or above"),
+    (lambda: MeasuredSurface(damping=-1.0), r"MeasuredSurface: damping = -1\.0 must be zero or"),
     (lambda: MeasuredSurface(bearing=(0.0, 0.2, 1.0), file="x.txt"), "cannot stand beside"),
-    (lambda: MeasuredSurface.from_heights([0.0, 1e-6, 0.0], intervals=1), "intervals = 1"),
+    (lambda: MeasuredSurface(bearing=(0.0, 0.2, 1.0), depths=(0.0, 1.0)),
+     r"depths = \[0\.0, 1\.0\] must be as many numbers as bearing"),
+    (lambda: MeasuredSurface(depths=(0.0, 1.5, 1.0)), "growing from 0 to 1"),
     (lambda: MeasuredSurface.from_heights([0.0, 1e-6, 0.0], [0.0, 1.0]), "2 values for 3 heights"),
     (lambda: MeasuredSurface.from_heights("abc"), "heights must be a list of numbers"),
     (lambda: LinearContact(0.0), r"LinearContact: stiffness = 0\.0 must be above zero"),
