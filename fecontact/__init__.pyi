@@ -11,9 +11,29 @@ from .integrate.initial import RigidStart
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.drive import Drive, Load
-from .laws.friction import ExponentialFriction
+from .laws.contract import FrictionLaw, NormalLaw, friction_law, memory_friction_law, normal_law
+from .laws.friction import (
+    ConstantFriction,
+    CubicFriction,
+    ExponentialFriction,
+    GalvanettoFriction,
+    GaussianFriction,
+    HyperbolicFriction,
+    ProductFriction,
+)
 from .laws.ground import Ground
-from .laws.normal import RoughSurface
+from .laws.memory import (
+    BoucWenFriction,
+    DahlFriction,
+    IwanFriction,
+    JenkinsFriction,
+    LuGreFriction,
+)
+from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
+from .laws.normal_measured import MeasuredSurface
+from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
+from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
+from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
@@ -33,31 +53,59 @@ __all__ = [
     "BasisReport",
     "Beam",
     "Block",
+    "BoucWenFriction",
+    "ConstantFriction",
     "ContactState",
     "ContactSystem",
+    "CosineSurface",
     "Crown",
+    "CubicFriction",
+    "DahlFriction",
     "Drive",
     "ElasticBody",
     "Energies",
+    "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
+    "FrictionLaw",
+    "GalvanettoFriction",
+    "GaussianFriction",
+    "GaussianSurface",
+    "GreenwoodWilliamson",
     "Ground",
+    "HyperbolicFriction",
+    "IwanFriction",
+    "JenkinsFriction",
+    "LinearContact",
     "Load",
     "LossFactor",
+    "LuGreFriction",
     "Material",
+    "MeasuredSurface",
     "Mesh",
     "ModalBasis",
+    "NormalLaw",
+    "ParabolicSurface",
     "Patch",
     "Pendulum",
+    "PowerContact",
+    "PowerLawContact",
+    "PrescribedForce",
+    "ProductFriction",
     "Rayleigh",
+    "RestitutionContact",
     "RigidStart",
     "RoughSurface",
     "Status",
     "Study",
     "Trajectory",
+    "TwoSidedStop",
     "export_pvd",
+    "friction_law",
     "generate",
+    "memory_friction_law",
     "mode_convergence",
+    "normal_law",
     "picture",
     "plot_contact_map",
     "plot_energies",

@@ -15,22 +15,40 @@ from fecontact.laws.contract import FrictionLaw, NormalLaw
 @cache
 def law_names() -> Mapping[type, Mapping[str, type]]:
     """Classes by name, for each kind of law (the base class); the first is the default."""
-    from fecontact.laws import friction, normal
+    from fecontact.laws import friction, maxwell_slip, memory, normal, normal_measured
+    from fecontact.laws import normal_power, normal_statistical, normal_stop
 
     return {
-        NormalLaw: _named(normal.RoughSurface),
-        FrictionLaw: _named(friction.ExponentialFriction),
+        NormalLaw: {
+            "rough-surface": normal.RoughSurface,
+            "parabolic-surface": normal.ParabolicSurface,
+            "cosine-surface": normal.CosineSurface,
+            "gaussian-surface": normal.GaussianSurface,
+            "measured-surface": normal_measured.MeasuredSurface,
+            "linear": normal_stop.LinearContact,
+            "power": normal_power.PowerContact,
+            "restitution": normal_power.RestitutionContact,
+            "exponential": normal_statistical.ExponentialContact,
+            "back-burdekin": normal_power.PowerLawContact,
+            "greenwood-williamson": normal_statistical.GreenwoodWilliamson,
+            "two-sided-stop": normal_stop.TwoSidedStop,
+            "prescribed": normal_stop.PrescribedForce,
+        },
+        FrictionLaw: {
+            "exponential": friction.ExponentialFriction,
+            "gaussian": friction.GaussianFriction,
+            "hyperbolic": friction.HyperbolicFriction,
+            "constant": friction.ConstantFriction,
+            "galvanetto": friction.GalvanettoFriction,
+            "cubic": friction.CubicFriction,
+            "product": friction.ProductFriction,
+            "jenkins": maxwell_slip.JenkinsFriction,
+            "iwan": maxwell_slip.IwanFriction,
+            "dahl": memory.DahlFriction,
+            "lugre": memory.LuGreFriction,
+            "bouc-wen": memory.BoucWenFriction,
+        },
     }
-
-
-def _named(*classes: type) -> dict[str, type]:
-    return {_name(cls): cls for cls in classes}
-
-
-def _name(cls: type) -> str:
-    """``power_law`` for PowerLawContact."""
-    stem = re.sub(r"(?<=.)(Friction|Contact)$", "", cls.__name__)
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", stem).lower()
 
 
 def is_kind(hint: Any) -> bool:
