@@ -117,7 +117,7 @@ def _greenwood(u, v, p):  # type: ignore[no-untyped-def]
         return 0.0, 0.0, 0.0
     if h > _CLOSEST:
         x = (h - _CLOSEST) * _INTERVALS_PER_UNIT
-        k = int(x)
+        k = min(int(x), len(_LOADS) - 1)
         x = 2.0 * (x - k) - 1.0
         value, slope = _LOADS[k, 0], 0.0
         for i in range(1, _DEGREE + 1):

@@ -69,6 +69,7 @@ def _states(u_range, v_range, scale, count=400):
     low, high = u_range
     u = np.concatenate([rng.uniform(low, high, count), rng.uniform(low, high, count // 4) * 1e-3,
                         scale * rng.uniform(-2.0, 2.0, count),
+                        scale * 10.0 ** rng.uniform(-9.0, 0.0, count),
                         scale * np.array([-1.0, -1e-9, 0.0, 1e-9, 0.5, 1.0, 2.0])])
     u = np.clip(u, low, high)
     v = rng.uniform(*v_range, len(u)) * 10.0 ** rng.uniform(-4.0, 0.0, len(u))
