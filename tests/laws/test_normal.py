@@ -96,8 +96,6 @@ def test_damping_takes_energy():
             assert (kernel(u, v)[0] - kernel(u, 0.0)[0]) * v > 0.0
 
 
-# Energy ------------------------------------------------------------------------------------------
-
 def test_stored_energy_is_the_integral_of_the_elastic_force():
     law = RoughSurface(C, R, D)
     for s in (0.4, 1.0, 1.7, 6.0):
@@ -128,8 +126,6 @@ def test_stored_energy_of_many_times():
     assert whole.shape == (7, 2)
     assert whole[3] == pytest.approx(law.stored_energy(u[3], share), rel=1e-15)
 
-
-# Parameters --------------------------------------------------------------------------------------
 
 def test_extensive_parameters_are_shared_and_lists_are_not():
     share = np.array([0.1, 0.2, 0.7])

@@ -1,0 +1,152 @@
+"""Rough surfaces: forces against the density of heights, curves of measured profiles."""
+
+import math
+
+import numpy as np
+import pytest
+from normal_conformance import force
+from scipy.integrate import quad
+
+from fecontact.errors import InputError
+from fecontact.laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
+from fecontact.laws.normal_measured import MeasuredSurface
+from fecontact.laws.normal_stop import LinearContact
+
+R = 5e-6
+TRACE = np.random.default_rng(5).normal(size=400).cumsum() * 1e-7
+
+
+def _gaussian(deviation):
+    def density(z):
+        return (math.exp(-0.5 * ((z - 0.5) / deviation) ** 2) / deviation
+                / math.sqrt(2.0 * math.pi) / math.erf(0.5 / deviation / math.sqrt(2.0)))
+
+    return density
+
+
+DENSITIES = [
+    (RoughSurface(1e6, R, 40.0), lambda z: 1.0),
+    (ParabolicSurface(1e6, R, 40.0), lambda z: 6.0 * z * (1.0 - z)),
+    (CosineSurface(1e6, R, 40.0), lambda z: 2.0 * math.sin(math.pi * z) ** 2),
+    *((GaussianSurface(1e6, R, 40.0, s), _gaussian(s)) for s in (0.05, 1.0 / 6.0, 0.4, 1.0)),
+]
+
+
+@pytest.mark.parametrize(("law", "density"), DENSITIES)
+@pytest.mark.parametrize("s", [1e-5, 1e-3, 0.01, 0.03, 0.079, 0.081, 0.2, 0.5, 0.77, 0.999, 1.0,
+                               1.4, 30.0])
+def test_force_is_that_of_the_density(law, density, s):
+    """f and h by quadrature of p, F = c R f + d h v and its slopes c h + d p v / R and d h."""
+    top = min(s, 1.0)
+    options = {"epsabs": 0.0, "epsrel": 1e-12}
+    f = quad(lambda z: (s - z) * density(z), 0.0, top, **options)[0]
+    h = quad(density, 0.0, top, **options)[0]
+    p = density(s) if s < 1.0 else 0.0
+    assert force(law, s * R) == pytest.approx((1e6 * R * f, 1e6 * h, 40.0 * h), rel=1e-9)
+    v = 0.02
+    expected = (1e6 * R * f + 40.0 * h * v, 1e6 * h + 40.0 * p * v / R, 40.0 * h)
+    assert force(law, s * R, v) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", [RoughSurface, ParabolicSurface, CosineSurface, GaussianSurface,
+                                  MeasuredSurface])
+def test_smooth_in_the_limit(kind):
+    """A surface of vanishing roughness is the linear contact."""
+    smooth, rough = LinearContact(1e6, 40.0), kind(1e6, 1e-13, 40.0)
+    for u in (1e-8, 3e-6, 1e-4):
+        for v in (-1.0, -1e-3, 0.0, 2e-3):
+            assert force(rough, u, v) == pytest.approx(force(smooth, u, v), rel=2e-5, abs=1e-6)
+
+
+def test_penetration_scale_of_a_surface_is_the_smallest_roughness():
+    assert GaussianSurface(1e6, (R, 2 * R), 0.0).penetration_scale == R
+
+
+def test_straight_flank_is_uniform():
+    law = MeasuredSurface.from_heights(np.linspace(3e-6, 8e-6, 11), stiffness=1e6, damping=40.0)
+    assert law.roughness_height == pytest.approx(R, rel=1e-12)
+    for s in (0.1, 0.501, 0.99, 1.7):
+        assert force(law, s * R, 0.01) == pytest.approx(
+            force(RoughSurface(1e6, R, 40.0), s * R, 0.01), rel=1e-12)
+
+
+def test_measured_sine():
+    """A sine has the bearing curve arccos(1 - 2 s) / pi."""
+    x = np.linspace(0.0, 3.0, 6001)
+    law = MeasuredSurface.from_heights(R / 2.0 * np.cos(2.0 * np.pi * x), x, stiffness=1e6)
+    for s in (0.005, 0.02, 0.1, 0.33, 0.5, 0.8, 0.97, 1.0):
+        h = math.acos(1.0 - 2.0 * s) / math.pi
+        f = quad(lambda z: math.acos(1.0 - 2.0 * z) / math.pi, 0.0, s, epsrel=1e-12)[0]
+        load, slope, _ = force(law, s * R)
+        assert slope == pytest.approx(1e6 * h, rel=1e-4 if s > 0.01 else 1e-3)
+        assert load == pytest.approx(1e6 * R * f, rel=1e-3 if s > 0.01 else 5e-3)
+
+
+@pytest.mark.parametrize("abscissa", [False, True])
+def test_measured_trace_against_its_own_points(abscissa):
+    """The bed of asperities at many points of the trace, each with its part of the length."""
+    rng = np.random.default_rng(3)
+    fine = np.convolve(rng.normal(size=4200), np.hanning(200), "valid") * 1e-7
+    x = np.cumsum(rng.uniform(0.5, 1.5, len(fine))) if abscissa else np.arange(len(fine)) * 1.0
+    law = MeasuredSurface.from_heights(fine, x if abscissa else None, stiffness=1e6, damping=40.0)
+    between = np.interp(np.arange(0.0, len(x) - 1.0, 0.01), np.arange(len(x)), x)
+    x, fine = between, np.interp(between, x, fine)
+    weight = np.gradient(x)
+    weight[[0, -1]] /= 2.0
+    weight /= weight.sum()
+    depth = fine.max() - fine
+    height = np.ptp(fine)
+    assert law.roughness_height == pytest.approx(height, rel=1e-12)
+    for s in (0.1, 0.25, 0.5, 0.75, 1.0, 1.5):
+        load, slope, damping = force(law, s * height)
+        touching = weight * (depth < s * height)
+        assert load == pytest.approx(1e6 * (touching @ (s * height - depth)), rel=3e-3)
+        assert slope == pytest.approx(1e6 * touching.sum(), abs=4e-3 * 1e6)
+        assert damping == pytest.approx(40.0 * touching.sum(), abs=4e-3 * 40.0)
+    # At the depths that the curve is given for it is that of the trace.
+    for k in (8, 20, 40):
+        touching = weight @ (depth < law.depths[k] * height)
+        assert law.bearing[k] == pytest.approx(touching, abs=5e-5)
+    # All asperities in contact: the mean of the trace.
+    expected = 1e6 * (1.5 * height - weight @ depth)
+    assert force(law, 1.5 * height)[0] == pytest.approx(expected, rel=5e-4)
+
+
+def test_plateau_of_a_trace():
+    """A fifth of the length is a flat top: it bears at once, within one step of depth."""
+    law = MeasuredSurface.from_heights([1e-6, 1e-6, 0.0], [0.0, 0.2, 1.0], stiffness=1e6)
+    assert force(law, 0.5e-6)[1] == pytest.approx(1e6 * (0.2 + 0.8 * 0.5), rel=1e-9)
+
+
+def test_files(tmp_path):
+    x = np.linspace(0.0, 1.0, len(TRACE))
+    one, two = tmp_path / "one.txt", tmp_path / "two.csv"
+    one.write_text("# heights\n\n" + "\n".join(f"{z:.17g}" for z in TRACE))
+    two.write_text("\n".join(f"{a:.17g}; {z * 1e6:.17g} # um"
+                             for a, z in zip(x, TRACE, strict=True)))
+    expected = MeasuredSurface.from_heights(TRACE)
+    assert MeasuredSurface.from_file(one) == expected
+    assert MeasuredSurface(file=str(one)) == expected
+    scaled = MeasuredSurface.from_file(two, scale=1e-6)
+    assert scaled.bearing == pytest.approx(expected.bearing, rel=1e-9, abs=1e-12)
+    assert scaled.roughness_height == pytest.approx(expected.roughness_height, rel=1e-12)
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("1.0\n2.0\nhigh\n", "line 3, 'high', must be a height"),
+    ("1.0\n2.0 3.0\n", "line 2, '2.0 3.0', must be a height"),
+    ("1 2 3\n", "line 1"), ("# nothing\n", "no heights"),
+    ("0 1\n1 2\n1 3\n", r"abscissa\[2\] = 1 must be larger than the value before it, 1"),
+    ("1\n1\n1\n", "all heights are 1"), ("1\n2\n", "2 values; a profile needs at least three"),
+    ("1\nnan\n2\n", r"heights\[1\] = nan must be finite"),
+])
+def test_files_that_are_no_profile(tmp_path, text, message):
+    file = tmp_path / "trace.txt"
+    file.write_text(text)
+    with pytest.raises(InputError, match=rf"trace\.txt: .*{message}"):
+        MeasuredSurface(file=str(file))
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(InputError, match=r"none\.txt: the profile cannot be read: No such file"):
+        MeasuredSurface.from_file(tmp_path / "none.txt")
