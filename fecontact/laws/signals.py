@@ -1,0 +1,346 @@
+"""Signals: what is given in time, such as the motion of the drive or a load."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import ClassVar, Literal
+
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.compiled import CompiledLaw, i8, kernel, matrix, vector
+from fecontact.errors import (
+    InputError,
+    choices,
+    nearest,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
+from fecontact.laws.contract import signal, signal_at
+from fecontact.laws.records import numbers
+
+Array = NDArray[np.float64]
+
+
+@kernel(types.void(i8, vector, vector, matrix))
+def _history(address, t, p, out):  # type: ignore[no-untyped-def]
+    for k in range(len(t)):
+        out[k, 0], out[k, 1] = signal_at(address)(t[k], p)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.contract.signal`.
+
+    A signal of one's own sets ``kernel``, and overrides what else is not as here.
+    """
+
+    kernel: ClassVar[CompiledLaw]
+
+    def parameters(self) -> Array:
+        """Parameters of the kernel; here the fields in their order.
+
+        The kernel may get zeros after them.
+        """
+        return np.array([getattr(self, entry.name) for entry in fields(self)], dtype=float)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Times between t0 and t1 on which an integrator must step, ascending [s].
+
+        There the signal, its rate or its second derivative jumps. The ends are not among them.
+        """
+        return ()
+
+    @property
+    def shortest_period(self) -> float | None:
+        """Shortest time in which it goes up and down [s], for a limit of the step; or None."""
+        return None
+
+    @property
+    def frequency_hz(self) -> float | None:
+        """Frequency with which it repeats [Hz], or None."""
+        return None
+
+    @property
+    def largest(self) -> float:
+        """Upper bound of its magnitude."""
+        raise NotImplementedError
+
+    def history(self, times: ArrayLike) -> Array:
+        """Values and rates (N, 2) at N times [s]."""
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        out = np.empty((len(t), 2))
+        _history(self.kernel.address, t, self.parameters(), out)
+        return out
+
+
+@signal
+def _constant(t, p):  # type: ignore[no-untyped-def]
+    return p[0], 0.0
+
+
+@dataclass(frozen=True)
+class Constant(Signal):
+    """A constant value.
+
+    Parameters
+    ----------
+    value : float
+        In the unit of what is given.
+
+    Raises
+    ------
+    InputError
+        For a value that is not finite.
+    """
+
+    kernel: ClassVar = _constant
+
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite("Constant", value=self.value)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the value."""
+        return abs(float(self.value))
+
+
+@signal
+def _harmonic(t, p):  # type: ignore[no-untyped-def]
+    amplitude, w, phase = p[0], p[1], p[2]
+    angle = w * t + phase
+    return amplitude * math.sin(angle), amplitude * w * math.cos(angle)
+
+
+@dataclass(frozen=True)
+class Harmonic(Signal):
+    r"""A sine.
+
+    .. math:: A \sin(w t + \varphi)
+
+    Parameters
+    ----------
+    amplitude : float
+        A, in the unit of what is given.
+    angular_frequency : float
+        w, zero or above [rad/s].
+    phase : float
+        phi [rad]; pi / 2 for a cosine.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _harmonic
+
+    amplitude: float
+    angular_frequency: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite("Harmonic", amplitude=self.amplitude, phase=self.phase)
+        require_not_negative("Harmonic", angular_frequency=self.angular_frequency)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """2 pi / w [s]; None for a constant."""
+        w = self.angular_frequency
+        return 2.0 * math.pi / w if w > 0.0 and self.amplitude != 0.0 else None
+
+    @property
+    def frequency_hz(self) -> float | None:
+        """Its frequency [Hz]; None for a constant."""
+        return None if self.shortest_period is None else self.angular_frequency / (2.0 * math.pi)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the amplitude."""
+        return abs(float(self.amplitude))
+
+
+@signal
+def _harmonics(t, p):  # type: ignore[no-untyped-def]
+    value, rate = 0.0, 0.0
+    for k in range(int(p[0])):
+        amplitude, w = p[3 * k + 1], p[3 * k + 2]
+        angle = w * t + p[3 * k + 3]
+        value += amplitude * math.sin(angle)
+        rate += amplitude * w * math.cos(angle)
+    return value, rate
+
+
+@dataclass(frozen=True)
+class Harmonics(Signal):
+    r"""A sum of sines of any frequencies.
+
+    .. math:: \sum_k A_k \sin(w_k t + \varphi_k)
+
+    Parameters
+    ----------
+    amplitudes : sequence
+        A_k, in the unit of what is given.
+    angular_frequencies : sequence
+        w_k, zero or above [rad/s].
+    phases : sequence, optional
+        phi_k [rad]; zero by default.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, or sequences of different lengths.
+    """
+
+    kernel: ClassVar = _harmonics
+
+    amplitudes: tuple[float, ...]
+    angular_frequencies: tuple[float, ...]
+    phases: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            given = numbers("Harmonics", entry.name, getattr(self, entry.name),
+                            0 if entry.name == "phases" else 1)
+            object.__setattr__(self, entry.name, given)
+            if len(given) not in (len(self.amplitudes), 0):
+                raise InputError(f"Harmonics: {entry.name} has {len(given)} values for "
+                                 f"{len(self.amplitudes)} amplitudes; give one for each.")
+        for k, w in enumerate(self.angular_frequencies):
+            require_not_negative("Harmonics", **{f"angular_frequencies[{k}]": w})
+
+    def parameters(self) -> Array:
+        """Number of sines, then A, w and phi of each."""
+        phases = self.phases or np.zeros(len(self.amplitudes))
+        rows = np.column_stack([self.amplitudes, self.angular_frequencies, phases])
+        return np.concatenate([[len(rows)], rows.ravel()])
+
+    @property
+    def _heard(self) -> list[float]:
+        """Angular frequencies above zero whose amplitude is not zero."""
+        return sorted(w for a, w in zip(self.amplitudes, self.angular_frequencies, strict=True)
+                      if a != 0.0 and w > 0.0)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """That of the highest frequency [s]."""
+        return 2.0 * math.pi / self._heard[-1] if self._heard else None
+
+    @property
+    def frequency_hz(self) -> float | None:
+        """The lowest frequency [Hz], if all others are whole multiples of it; else None."""
+        if not self._heard:
+            return None
+        ratios = np.array(self._heard) / self._heard[0]
+        whole = np.abs(ratios - np.round(ratios)) <= 1e-9 * ratios
+        return self._heard[0] / (2.0 * math.pi) if whole.all() else None
+
+    @property
+    def largest(self) -> float:
+        """Sum of the magnitudes of the amplitudes."""
+        return math.fsum(abs(a) for a in self.amplitudes)
+
+
+@signal
+def _sweep(t, p):  # type: ignore[no-untyped-def]
+    amplitude, w0, w1, duration = p[0], p[1], p[2], p[3]
+    inside = min(max(t, 0.0), duration)
+    if p[4] == 0.0:
+        w = w0 + (w1 - w0) * inside / duration
+        angle = 0.5 * (w0 + w) * inside
+    else:
+        growth = math.log(w1 / w0) / duration
+        x = growth * inside
+        w = w0 * math.exp(x)
+        angle = w0 * inside * (math.expm1(x) / x if x != 0.0 else 1.0)
+    angle += w * (t - inside)
+    return amplitude * math.sin(angle), amplitude * w * math.cos(angle)
+
+
+@dataclass(frozen=True)
+class Sweep(Signal):
+    r"""A sine whose frequency goes from one value to another, and stays there.
+
+    .. math:: A \sin\Big(2 \pi \int_0^t f\,dt\Big), \qquad
+        f = f_0 + (f_1 - f_0) \frac{t}{T} \quad\text{or}\quad
+        f = f_0 \Big(\frac{f_1}{f_0}\Big)^{t/T}, \qquad 0 \le t \le T
+
+    f is f_0 before t = 0 and f_1 after t = T; the phase is the exact integral.
+
+    Parameters
+    ----------
+    amplitude : float
+        A, in the unit of what is given.
+    start_frequency_hz, end_frequency_hz : float
+        f_0, f_1, zero or above, for a logarithmic sweep above zero [Hz].
+    duration : float
+        T, positive [s].
+    kind : 'linear' or 'logarithmic'
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _sweep
+
+    amplitude: float
+    start_frequency_hz: float
+    end_frequency_hz: float
+    duration: float
+    kind: Literal["linear", "logarithmic"] = "linear"
+
+    def __post_init__(self) -> None:
+        require_finite("Sweep", amplitude=self.amplitude)
+        require_one_of("Sweep", "kind", self.kind, ("linear", "logarithmic"))
+        require = require_not_negative if self.kind == "linear" else require_positive
+        owner = "Sweep" if self.kind == "linear" else "Sweep, logarithmic"
+        require(owner, start_frequency_hz=self.start_frequency_hz,
+                end_frequency_hz=self.end_frequency_hz)
+        require_positive("Sweep", duration=self.duration)
+
+    def parameters(self) -> Array:
+        """A, the angular frequencies, T, and 1 for a logarithmic sweep."""
+        return np.array([self.amplitude, 2.0 * math.pi * self.start_frequency_hz,
+                         2.0 * math.pi * self.end_frequency_hz, self.duration,
+                         self.kind == "logarithmic"], dtype=float)
+
+    def instantaneous_frequency_hz(self, times: ArrayLike) -> Array:
+        """Frequencies f [Hz] at times [s]."""
+        part = np.clip(np.asarray(times, dtype=float) / self.duration, 0.0, 1.0)
+        f0, f1 = self.start_frequency_hz, self.end_frequency_hz
+        if self.kind == "linear":
+            return np.asarray(f0 + (f1 - f0) * part)
+        return np.asarray(f0 * (f1 / f0) ** part)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Start and end of the sweep, as far as they lie between t0 and t1 [s]."""
+        return between((0.0, self.duration), t0, t1)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """That of the highest frequency [s]."""
+        highest = max(self.start_frequency_hz, self.end_frequency_hz)
+        return 1.0 / highest if highest > 0.0 and self.amplitude != 0.0 else None
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the amplitude."""
+        return abs(float(self.amplitude))
+
+
+def between(times: ArrayLike, t0: float, t1: float) -> tuple[float, ...]:
+    """Those of the times that lie between t0 and t1, ascending, each once."""
+    found = np.unique(np.asarray(times, dtype=float))
+    return tuple(found[(found > t0) & (found < t1)].tolist())
+
+
+def require_one_of(owner: str, name: str, value: object, names: tuple[str, ...]) -> None:
+    """Raise :class:`InputError` unless a value is one of a few names."""
+    if value not in names:
+        raise InputError(f"{owner}: {name} = {value!r} must be one of {choices(names)}"
+                         f"{nearest(str(value), names)}.")
