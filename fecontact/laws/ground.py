@@ -65,6 +65,30 @@ class Ground:
         phase = 2.0 * np.pi * (np.asarray(abscissa) - self.speed * time) / self.wavelength
         return np.asarray(self.amplitude * np.sin(phase))
 
+    friction_scale_kernel: ClassVar[None] = None
+
+    def friction_scale_parameters(self) -> NDArray[np.float64]:
+        """None."""
+        return np.zeros(1)
+
+    @property
+    def wavy(self) -> bool:
+        """Whether its height varies."""
+        return self.amplitude > 0.0
+
+    @property
+    def shortest_wavelength(self) -> float | None:
+        """None when flat [m]."""
+        return self.wavelength if self.wavy else None
+
+    def travel(self, time: float) -> float:
+        """Travel [m]."""
+        return self.speed * time
+
+    def largest_speed(self, start: float, end: float) -> float:
+        """[m/s]."""
+        return abs(self.speed)
+
     def profile_parameters(self) -> NDArray[np.float64]:
         """Parameters of the compiled profile."""
         return np.array([self.amplitude, 2.0 * np.pi / self.wavelength], dtype=float)
