@@ -1,0 +1,248 @@
+"""Compiled run from event to event, of order 8, for contact with few independent slip velocities.
+
+Between events the sticking clusters and the closed stops are constraints. A step in which a
+cluster or a stop goes past its margin is cut at the moment where that begins, bisected in the
+step's interpolation to the last digits, and repeated with the shorter length.
+"""
+
+import math
+
+import numpy as np
+from numba import types
+
+from fecontact.compiled import f8, i8, integers, kernel, matrix, vector
+from fecontact.integrate.set_valued_decisions import decide_clusters, decide_stops, hold_velocity
+from fecontact.integrate.set_valued_nodes import (
+    DIVERGED,
+    EVENTS,
+    FINISHED,
+    FORCE,
+    GOING_ON,
+    IMPACTS,
+    OUTPUTS,
+    PENETRATION,
+    PROBLEM,
+    RATE,
+    REJECTED,
+    STARTED,
+    STEPS,
+    STICK,
+    STUCK,
+    derivative,
+    margins,
+    workspace,
+)
+from fecontact.integrate.set_valued_steps import (
+    PARTS,
+    SLOPES,
+    STAGES,
+    error,
+    interpolate,
+    prepare_dense,
+    step,
+)
+
+# Places in a step at which margins are looked at.
+SAMPLES = 4
+
+
+@kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
+                 integers, vector, i8, matrix, matrix, matrix))
+def run_events(clock, times, stops, p, rtol, longest, floor, Y, status, closed, counts, largest,
+               limit, states, friction, normal):  # type: ignore[no-untyped-def]
+    """Go on for at most ``limit`` steps, up to the last of ``times``.
+
+    ``clock`` is the time reached and the length of the next step; ``stops`` ascending times at
+    which a step ends; ``largest`` the largest slip velocity, penetration rate and penetration so
+    far. ``states`` (N, size), ``friction`` and ``normal`` (N, n) are filled as ``counts`` says.
+    """
+    s = p.system
+    n, m = s.Tx.shape
+    clusters, size = len(p.rows), len(Y)
+    rigid = p.restitution >= 0.0
+    w = workspace(p)
+    slopes, parts = np.empty((SLOPES, size)), np.empty((PARTS, size))
+    new, room, rate = np.empty(size), np.empty(size), np.empty(size)
+    margin = np.empty(clusters + n)
+    past = np.zeros(clusters + n, np.bool_)
+    fresh = np.zeros(clusters + n, np.bool_)
+    released, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
+    touched, parting = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+    t, h, end = clock[0], clock[1], times[-1]
+    tiny = 1e-14 * max(abs(times[0]), abs(end), longest)
+    stop = 0
+    while stop < len(stops) and stops[stop] <= t:
+        stop += 1
+    idle = 0
+
+    if counts[STARTED] == 0:
+        counts[STARTED] = 1
+        derivative(t, Y, p, status, closed, w, rate)
+        if rigid:
+            height = 0.0
+            for j in range(n):
+                touched[j] = w.nodes[j, PENETRATION] > 0.0
+                height = max(height, abs(w.nodes[j, PENETRATION]))
+                largest[1] = max(largest[1], abs(w.nodes[j, RATE]))
+            decide_stops(t, Y, p, touched, parting, 1e-9 * largest[1], height, status, closed,
+                         fresh[clusters:], w, rate)
+        else:
+            for c in range(clusters):
+                largest[0] = max(largest[0], abs(w.slip[c]))
+            decide_clusters(t, Y, p, released, 1e-12 * largest[0], status, fresh[:clusters],
+                            closed, w, rate)
+    while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= t:
+        derivative(t, Y, p, status, closed, w, rate)
+        row = counts[OUTPUTS]
+        states[row], friction[row] = Y, w.friction
+        normal[row] = w.nodes[:, FORCE]
+        counts[OUTPUTS] += 1
+
+    derivative(t, Y, p, status, closed, w, slopes[0])
+    for _ in range(limit):
+        if t >= end:
+            break
+        goal = end
+        if stop < len(stops):
+            goal = min(goal, stops[stop])
+        left = goal - t
+        reaching = h >= left * (1.0 - 1e-10)
+        length = left if reaching else min(h, longest)
+        length = min(length, longest)
+        reaching = reaching and length == left
+        step(t, length, Y, p, status, closed, w, slopes, new)
+        size_of_error = error(length, Y, new, slopes, rtol, floor)
+        counts[STEPS] += 1
+        if not size_of_error <= 1.0:
+            counts[REJECTED] += 1
+            if not math.isfinite(size_of_error) and length < 1e-6 * longest:
+                clock[0], clock[1] = t, length
+                return DIVERGED
+            h = length * (max(0.2, 0.9 * size_of_error**-0.125)
+                          if math.isfinite(size_of_error) else 0.1)
+            if h < tiny:
+                clock[0], clock[1] = t, h
+                return STUCK
+            continue
+        prepare_dense(t, length, Y, new, p, status, closed, w, slopes, room, parts)
+
+        low, high, found, again = 0.0, 1.0, False, False
+        for sample in range(1, SAMPLES + 1):
+            high = sample / SAMPLES
+            interpolate(high, Y, parts, room)
+            derivative(t + high * length, room, p, status, closed, w, rate)
+            margins(p, status, closed, w, margin)
+            for k in range(clusters + n):
+                past[k] = margin[k] < 0.0
+                if past[k]:
+                    found = True
+                    again = again or (sample == 1 and fresh[k])
+            if found:
+                break
+            low = high
+        if found and again and length > tiny:
+            # What has just begun to move cannot be told from its start: look at a shorter step.
+            h = 0.2 * length
+            counts[REJECTED] += 1
+            continue
+        if not found:
+            low = high = 1.0
+        elif again:
+            high = 0.0
+        else:
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                if middle <= low or middle >= high:
+                    break
+                interpolate(middle, Y, parts, room)
+                derivative(t + middle * length, room, p, status, closed, w, rate)
+                margins(p, status, closed, w, margin)
+                beyond = False
+                for k in range(clusters + n):
+                    beyond = beyond or (past[k] and margin[k] < 0.0)
+                if beyond:
+                    high = middle
+                else:
+                    low = middle
+            interpolate(high, Y, parts, room)
+            derivative(t + high * length, room, p, status, closed, w, rate)
+            margins(p, status, closed, w, margin)
+            for k in range(clusters + n):
+                past[k] = past[k] and margin[k] < 0.0
+
+        reached = t + high * length
+        if not found and reaching:
+            reached = goal
+        while counts[OUTPUTS] < len(times) and (
+                times[counts[OUTPUTS]] < reached
+                or (not found and times[counts[OUTPUTS]] == reached)):
+            row = counts[OUTPUTS]
+            interpolate((times[row] - t) / length, Y, parts, states[row])
+            derivative(times[row], states[row], p, status, closed, w, rate)
+            friction[row], normal[row] = w.friction, w.nodes[:, FORCE]
+            counts[OUTPUTS] += 1
+
+        if not found:
+            t = reached
+            if reaching and stop < len(stops) and goal == stops[stop]:
+                stop += 1
+            for i in range(size):
+                Y[i] = new[i]
+                slopes[0, i] = slopes[STAGES, i]
+            fresh[:] = False
+            idle = 0
+            h = length * min(5.0, max(0.5, 0.9 * max(size_of_error, 1e-12) ** -0.125))
+            if length < h < 1.1 * length:
+                h = length
+            any_held = False
+            for c in range(clusters):
+                held[c] = status[c] == STICK
+                any_held = any_held or held[c]
+                largest[0] = max(largest[0], abs(w.slip[c]))
+            for j in range(n):
+                largest[1] = max(largest[1], abs(w.nodes[j, RATE]))
+                largest[2] = max(largest[2], abs(w.nodes[j, PENETRATION]))
+            if any_held:
+                derivative(t, Y, p, status, closed, w, rate)
+                hold_velocity(p, held, w, Y)
+            continue
+
+        counts[EVENTS] += 1
+        idle = idle + 1 if high * length <= tiny else 0
+        if idle > 200:
+            clock[0], clock[1] = t, length
+            return STUCK
+        if high > 0.0:
+            step(t, high * length, Y, p, status, closed, w, slopes, new)
+            for i in range(size):
+                Y[i] = new[i]
+            t = reached
+        derivative(t, Y, p, status, closed, w, rate)
+        h = min(max(0.1 * length, 1e3 * tiny), longest)
+        if rigid:
+            height = largest[2]
+            for j in range(n):
+                event = past[clusters + j]
+                touched[j], parting[j] = event and closed[j] == 0, event and closed[j] == 1
+                if touched[j]:
+                    counts[IMPACTS] += 1
+            flight = decide_stops(t, Y, p, touched, parting, 0.01 * rtol * largest[1], height,
+                                  status, closed, fresh[clusters:], w, slopes[0])
+            h = min(h, max(0.5 * flight, tiny))
+        else:
+            for c in range(clusters):
+                released[c] = past[c] and status[c] == STICK and w.pressing[c] > 0.0 and not again
+                if released[c]:
+                    status[c] = 1 if w.total[c] > 0.0 else -1
+            decide_clusters(t, Y, p, released, 1e-9 * largest[0], status, fresh[:clusters],
+                            closed, w, slopes[0])
+        # Wherever the motion goes on from, an output at this moment shows what comes after.
+        while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= t:
+            row = counts[OUTPUTS]
+            states[row], friction[row] = Y, w.friction
+            normal[row] = w.nodes[:, FORCE]
+            counts[OUTPUTS] += 1
+    clock[0], clock[1] = t, h
+    return FINISHED if t >= end else GOING_ON
+
+
