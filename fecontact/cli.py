@@ -280,6 +280,22 @@ def doctor() -> int:
 
 
 @app.command(sort_key=8)
+def laws(
+    name: Annotated[str | None, Parameter(help="A law, for its formula and parameters.")] = None,
+    /,
+) -> None:
+    """List the laws of contact, friction, ground and drive, or explain one."""
+    from rich import print as show
+
+    from fecontact.law_help import law_help, laws_table
+
+    if name is None:
+        show(laws_table())
+    else:
+        print(law_help(name))
+
+
+@app.command(sort_key=9)
 def demo(
     folder: Annotated[Path, Parameter(help="Where the results go.")] = Path("demo-output"), /,
 ) -> int:

@@ -1,0 +1,77 @@
+"""Cost of the laws in the right-hand side of a system with 400 contact nodes and 40 modes.
+
+Every law of the package and one of a user's own (examples/own_law.py), all in one run. Every
+node is in contact and slides or sticks, none is skipped.
+
+Usage: python benchmarks/laws.py
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.basis import ModalBasis
+from fecontact.contact_kernels import right_hand_side
+from fecontact.laws.contract import FrictionLaw, NodeLaw, NormalLaw
+from fecontact.laws.friction import ConstantFriction
+from fecontact.laws.names import law_class, law_names
+from fecontact.laws.normal_stop import LinearContact
+from fecontact.system import ContactSystem
+
+NODES, MODES = 400, 40
+GIVEN: dict[str, dict[str, float]] = {
+    "linear": {"stiffness": 1e7}, "power": {"stiffness": 1e9}, "prescribed": {"force": 14.0},
+    "restitution": {"stiffness": 1e9, "restitution": 0.8, "reference_velocity": 0.1},
+    "exponential": {"force": 10.0, "decay_length": 1e-6},
+    "back-burdekin": {"nominal_area": 1e-4, "coefficient": 1e-9},
+    "greenwood-williamson": {"asperities": 1e4, "asperity_radius": 1e-5,
+                             "composite_modulus": 1e11, "height_deviation": 1e-6},
+    "two-sided-stop": {"stiffness": 1e7, "clearance": 1e-3},
+}
+
+
+def microseconds(normal: NormalLaw, friction: FrictionLaw) -> float:
+    """Shortest time of a right-hand side [us]."""
+    rng = np.random.default_rng(0)
+    T = rng.standard_normal((2 + NODES, 3, MODES))
+    basis = ModalBasis(np.geomspace(1e2, 1e5, MODES), np.diag(np.geomspace(1.0, 1e3, MODES)), T,
+                       np.zeros((2 + NODES, 2)), np.ones(NODES))
+    system = ContactSystem(basis, normal=normal, friction=friction)
+    y = 1e-7 * rng.standard_normal(system.size)
+    # All nodes pressed in by some micrometres.
+    y[:MODES] += np.linalg.lstsq(T[2 : 2 + MODES, 1], np.full(MODES, -3e-6), rcond=None)[0]
+    arrays = system.arrays._replace(gap=-np.abs(T[2:, 1] @ y[:MODES]) - 3e-6)
+    out = np.empty(system.size)
+    best = np.inf
+    for _ in range(30):
+        begin = time.perf_counter()
+        for _ in range(100):
+            right_hand_side(0.0, y, arrays, out)
+        best = min(best, (time.perf_counter() - begin) / 100)
+    return 1e6 * best
+
+
+def main() -> None:
+    """Print the tables."""
+    own = f"{Path(__file__).parents[1] / 'examples' / 'own_law.py'}:LogarithmicFriction"
+    for kind, other in ((NormalLaw, ConstantFriction()), (FrictionLaw, LinearContact(1e7))):
+        names = [*law_names()[kind], *([own] if kind is FrictionLaw else [])]
+        costs = {}
+        for name in names:
+            law: NodeLaw = law_class(kind, name, "")(**GIVEN.get(name, {})
+                                                     if kind is NormalLaw else {})
+            parts = (law, other) if kind is NormalLaw else (other, law)
+            costs[Path(name).name] = microseconds(*parts)  # type: ignore[arg-type]
+            memory = getattr(law, "memory", 0)
+            print(f"{kind.__name__:12s} {Path(name).name:32s} {costs[Path(name).name]:6.1f} us"
+                  f"{f', {memory} internal variables a node' if memory else ''}", flush=True)
+        plain = [cost for name, cost in costs.items()
+                 if name not in ("jenkins", "iwan", "dahl", "lugre", "bouc-wen")]
+        print(f"{kind.__name__:12s} slowest to fastest, without memory: "
+              f"{max(plain) / min(plain):.2f}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
