@@ -55,6 +55,33 @@ def require_closed(owner: str, name: str, values: tuple[float, ...]) -> tuple[fl
     return (*values[:-1], values[0])
 
 
+def read_or_given(
+    owner: str, file: str | None, *, least: int, **columns: tuple[float, ...]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Two sequences of the same length, the first growing, from a file or as given.
+
+    Raises
+    ------
+    InputError
+        Unless exactly one of both is there, and can be used.
+    """
+    (first, x), (second, y) = columns.items()
+    if file is not None:
+        if np.size(x) or np.size(y):
+            raise InputError(f"{owner}: file = {file!r} cannot stand beside {first} and {second}; "
+                             f"give the file or the two lists.")
+        if not isinstance(file, str):
+            raise InputError(f"{owner}: file = {file!r} must be the name of a file.")
+        x, y = (tuple(column.tolist()) for column in read_columns(owner, file, (first, second)))
+        owner = f"{owner}: file = '{file}'"
+    x, y = numbers(owner, first, x, least), numbers(owner, second, y)
+    if len(x) != len(y):
+        raise InputError(f"{owner}: {second} has {len(y)} values for {len(x)} {first}; give one "
+                         f"for each.")
+    require_growing(owner, first, x)
+    return x, y
+
+
 def read_columns(owner: str, file: str, names: tuple[str, str]) -> tuple[Array, Array]:
     """Two columns of numbers from a text or CSV file.
 

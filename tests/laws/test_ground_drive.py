@@ -58,10 +58,9 @@ def test_flat_ground():
 
 def test_drive():
     drive = Drive(10.0, 20.0, 1.0, 2.0, 0.5e-3, -0.47e-3, 13.8)
-    for axis, amplitude in ((0, 0.5e-3), (1, -0.47e-3)):
-        p = drive.motion_parameters()[axis]
+    for motion, amplitude in zip(drive.motions, (0.5e-3, -0.47e-3), strict=True):
         for t in (0.0, 0.1, 3.3):
-            value, rate = drive.motion_kernel.python(t, p)
+            value, rate = motion.kernel.python(t, motion.parameters())
             assert value == pytest.approx(amplitude * math.sin(13.8 * t), abs=1e-18)
             assert rate == pytest.approx(amplitude * 13.8 * math.cos(13.8 * t), abs=1e-16)
     assert drive.frequency_hz == pytest.approx(13.8 / (2.0 * math.pi), rel=1e-15)
