@@ -131,7 +131,7 @@ class FourierSeries(Profile):
 
     .. math:: y = \sum_{k=1}^{n} A_k \sin(2 \pi k \xi / \lambda + \varphi_k)
 
-    The sines are powers of the first, so that a hundred cost about as much as ten sines.
+    The sines are powers of the first, so that a hundred cost less than ten sines.
 
     Parameters
     ----------
