@@ -93,7 +93,8 @@ def phase_figure(trajectory: Trajectory, point: Point = "B", axis: str = "x") ->
     factor = _labelled(plane, f"velocity {axis}", "m/s", v)
     plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
     plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
-    speed = trajectory.system.ground.speed
+    ground = trajectory.system.ground
+    speed = ground.speed if ground.motion is None else 0.0
     # A ground that is much faster would leave a line of the curve.
     if row == 0 and 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
         plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,

@@ -93,7 +93,8 @@ class Motion:
             return float(self.given_scale)
         extent = float(np.linalg.norm(np.ptp(self.field.nodes, axis=0)))
         gap = float(self.trajectory.system.arrays.gap.min())
-        size = max(self._largest["shape"], self.trajectory.system.ground.amplitude, gap)
+        low, high = self.trajectory.system.ground.height_range
+        size = max(self._largest["shape"], 0.5 * (high - low), gap)
         return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
 
     @cached_property
@@ -139,9 +140,7 @@ class Motion:
     def travel(self) -> Array:
         """Drawn travel (F,) of the ground [m]."""
         ground = self.trajectory.system.ground
-        law, parameters = ground.motion_kernel.python, ground.motion_parameters()
-        return self._drift_scale * np.array(
-            [law(float(time), parameters)[0] for time in self.times])
+        return self._drift_scale * np.array([ground.travel(float(time)) for time in self.times])
 
     @property
     def _drift_scale(self) -> float:
@@ -150,7 +149,7 @@ class Motion:
         Both have the same factor, so that a node that sticks stays with the marks of the ground.
         Over waves, which are drawn in their true length, the factor is one.
         """
-        return 1.0 if self.trajectory.system.ground.amplitude > 0.0 else self.scale
+        return 1.0 if self.trajectory.system.ground.wavy else self.scale
 
     def _drift(self, q: Array) -> Array:
         """Mean displacement (k,) of the contact nodes along the ground [m]."""
@@ -179,7 +178,7 @@ class Motion:
     @cached_property
     def _largest(self) -> dict[str, float]:
         largest = dict.fromkeys((*COLOURS, "shape"), 0.0)
-        wavy = self.trajectory.system.ground.amplitude > 0.0
+        wavy = self.trajectory.system.ground.wavy
         for which in blocks(self.indices, len(self.field.nodes)):
             q = self.trajectory.modal_coordinates[which]
             motion = displacement(self.field, q)

@@ -24,7 +24,8 @@ _MARGIN = 0.05  # of the view, beside and above the body
 _DEPTH = 0.20  # of the view's height, for the ground
 _ARROW = 0.15  # of the view's height (in portrait of half its width), the longest
 _CORNERS = 20
-_COLUMNS = 2  # of the ground per pixel, so that short waves stay smooth
+_COLUMNS, _MOST_COLUMNS = 2, 8  # of the ground per pixel
+_POINTS = 16  # on a wave of the ground, so that short waves stay smooth
 
 
 class Scene:
@@ -82,9 +83,9 @@ class Scene:
         """Place the camera so that body and ground fill the picture in all frames."""
         left, right, bottom, top = self._motion.box
         level = self._motion.ground_level
-        ground = self._motion.scale * self._motion.trajectory.system.ground.amplitude
-        body = max(top - level, 0.0)
-        below = max(level - bottom, ground)
+        low, high = self._motion.trajectory.system.ground.height_range
+        body = max(top - level, self._motion.scale * high, 0.0)
+        below = max(level - bottom, -self._motion.scale * low)
         height = max((right - left) / (1.0 - 2.0 * _MARGIN) / aspect,
                      body / (1.0 - _DEPTH - _MARGIN), (body + below) / (1.0 - 3.0 * _MARGIN))
         depth = max(_DEPTH * height, 0.46 * (height - body), below + 2.0 * _MARGIN * height)
@@ -135,8 +136,10 @@ class Scene:
                   line_width=line)
 
     def _add_ground(self, width: int, line: float) -> None:
-        ground = self._motion.trajectory.system.ground
-        count = _COLUMNS * width if ground.amplitude > 0.0 else 2
+        ground, view = self._motion.trajectory.system.ground, self._x[1] - self._x[0]
+        wave = ground.shortest_wavelength if ground.wavy else None
+        count = 2 if wave is None else int(np.clip(
+            _POINTS * view / wave, _COLUMNS * width, _MOST_COLUMNS * width))
         self._ground_x = np.linspace(*self._x, count)
         top = np.column_stack([self._ground_x, np.full(count, self._motion.ground_level)])
         below = np.column_stack([self._ground_x, np.full(count, self._bottom - self._height)])
@@ -163,7 +166,7 @@ class Scene:
         self._mark_size = np.where(np.arange(len(self._marks)) % 4 == 0, 2.0 * size, size)
 
     def _draw_ground(self, frame: int) -> None:
-        if self._motion.trajectory.system.ground.amplitude > 0.0:
+        if self._motion.trajectory.system.ground.wavy:
             top = self._motion.ground(frame, self._ground_x)
             for mesh in (self._ground, self._surface):
                 mesh.points[: len(top), 1] = top

@@ -154,7 +154,7 @@ def test_variation_that_reaches_zero_friction():
                       RandomRoughness(0.5, 0.8, 0.1, 0.01, 1.0)):
         low = variation.height_range[0]
         assert low < -1.0
-        with pytest.raises(InputError, match=r"friction_variation falls to -1\..* negative; its lo"):
+        with pytest.raises(InputError, match=r"variation falls to -1\..* negative; its lowest"):
             Ground(friction_variation=variation)
 
 
