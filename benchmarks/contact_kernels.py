@@ -35,7 +35,7 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     z = u / R
     elastic = c * R * np.where(z <= 0.0, 0.0, np.where(z < 1.0, 0.5 * z * z, z - 0.5))
     F = np.maximum(0.0, elastic + b * np.clip(z, 0.0, 1.0) * rate)
-    mu0, mu, decay, slope = s.friction_parameters.T
+    mu0, mu, decay, slope = s.friction_parameters[:, :4].T
     friction = ((mu0 - mu) * np.exp(-decay * np.abs(slip)) + mu) * F * (
         2.0 / np.pi) * np.arctan(slope * slip)
     drive = system.drive

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import types
 
-from fecontact.compiled import block, f8, kernel, matrix, vector
+from fecontact.compiled import block, borrowed, f8, kernel, matrix, vector
 from fecontact.contact_kernels import SYSTEM, memory_of, node_gradients, node_motion
 from fecontact.laws.contract import signal_at
 
@@ -17,6 +17,7 @@ def contact_gradients(t, y, s, gradients, active, out):  # type: ignore[no-untyp
     modes. Returns their number. The parts of friction with memory are put into the Jacobian
     ``out`` at once.
     """
+    y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
     travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     states = s.memory.max()
@@ -55,6 +56,7 @@ def contact_gradients(t, y, s, gradients, active, out):  # type: ignore[no-untyp
 @kernel(types.void(f8, vector, SYSTEM, matrix))
 def jacobian(t, y, s, out):  # type: ignore[no-untyped-def]
     """Fill out (2 m + n s, 2 m + n s) with dy'/dy."""
+    y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
     gradients, active = np.empty((4, n, m)), np.empty((n, 2 * m))
     out[:] = 0.0

@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import block, f8, helper, i8, integers, kernel, matrix, vector
+from fecontact.compiled import block, borrowed, f8, helper, i8, integers, kernel, matrix, vector
 from fecontact.laws.contract import friction_at, ground_at, memory_at, normal_at, signal_at
 
 Array = NDArray[np.float64]
@@ -150,6 +150,7 @@ def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force
 @kernel(types.void(f8, vector, SYSTEM, matrix))
 def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
     """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node."""
+    y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)
     travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     states = s.memory.max()
@@ -163,6 +164,7 @@ def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
 @kernel(types.void(f8, vector, SYSTEM, vector))
 def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
     """Fill out (2 m + n s,) with y'."""
+    y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
     travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]

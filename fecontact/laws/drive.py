@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from numbers import Integral
 from typing import Literal
 
 from fecontact.errors import (
@@ -117,7 +118,9 @@ class PointLoad:
     signal: Signal = field(kw_only=True)
 
     def __post_init__(self) -> None:
-        if isinstance(self.point, bool) or not isinstance(self.point, str | int):
+        if isinstance(self.point, Integral) and not isinstance(self.point, bool):
+            object.__setattr__(self, "point", int(self.point))
+        elif not isinstance(self.point, str):
             raise InputError(f"PointLoad: point = {self.point!r} must be the name of a point or "
                              f"the number of a contact node.")
         if self.direction not in _DIRECTIONS:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
+from numbers import Integral
 from typing import ClassVar
 
 import numpy as np
@@ -284,9 +285,10 @@ class RandomRoughness(Profile):
         if self.length > _MOST_HARMONICS * self.cut_off_wavelength:
             raise InputError(f"{owner}: cut_off_wavelength = {self.cut_off_wavelength!r} must be "
                              f"at least length / {_MOST_HARMONICS}.")
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+        if isinstance(self.seed, bool) or not isinstance(self.seed, Integral) or self.seed < 0:
             raise InputError(f"{owner}: seed = {self.seed!r} must be a whole number, zero or "
                              f"above.")
+        object.__setattr__(self, "seed", int(self.seed))
 
     @cached_property
     def series(self) -> FourierSeries:

@@ -2,14 +2,17 @@
 
 import math
 import pickle
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from fecontact.errors import InputError
-from fecontact.laws.profiles import Flat, FourierSeries, RandomRoughness, Sine, Trace
+from fecontact.laws.contract import ground_profile
+from fecontact.laws.ground import Ground
+from fecontact.laws.profiles import Flat, FourierSeries, Profile, RandomRoughness, Sine, Trace
 
 RNG = np.random.default_rng(3)
 TRACE_X = np.cumsum(RNG.uniform(0.5e-4, 2e-4, 40)) - 1e-3
@@ -230,6 +233,7 @@ def test_seeds_reproduce():
     xi = np.linspace(0.0, 1e-2, 50)
     np.testing.assert_array_equal(first.height(xi), same.height(xi))
     assert np.abs(first.height(xi) - other.height(xi)).max() > 1e-7
+    assert RandomRoughness(*options, seed=np.int64(7)) == first
     # What numpy's manual prints for this seed.
     published = RandomRoughness(*options, seed=12345).series.phases[:3]
     assert np.array(published) / (2.0 * math.pi) == pytest.approx(
@@ -311,3 +315,22 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_values_are_checked(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+@ground_profile
+def _unlevelled(xi, p):
+    return p[1] * xi, p[1], 0.0
+
+
+@dataclass(frozen=True)
+class Slope(Profile):
+    kernel: ClassVar = _unlevelled
+    slope: float = 0.1
+    height_range: ClassVar = (-0.1, 0.1)
+    shortest_wavelength: ClassVar = 1.0
+
+
+def test_profile_of_ones_own():
+    assert Ground(profile=Slope()).height([2.0]) == pytest.approx([0.2])
+    with pytest.raises(InputError, match="must add its first parameter to the height"):
+        Ground(friction_variation=Slope())
