@@ -10,8 +10,8 @@ from .geometry import Beam, Block, Pendulum, generate
 from .integrate.initial import RigidStart
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
-from .laws.drive import Drive, Load
 from .laws.contract import FrictionLaw, NormalLaw, friction_law, memory_friction_law, normal_law
+from .laws.drive import Drive, Load, PointLoad
 from .laws.friction import (
     ConstantFriction,
     CubicFriction,
@@ -22,6 +22,7 @@ from .laws.friction import (
     ProductFriction,
 )
 from .laws.ground import Ground
+from .laws.ground_motion import HarmonicSpeed, SpeedRamp
 from .laws.memory import (
     BoucWenFriction,
     DahlFriction,
@@ -34,6 +35,10 @@ from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
+from .laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from .laws.signals import Constant, Harmonic, Harmonics, Sweep
+from .laws.trace import Trace
+from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
@@ -54,6 +59,7 @@ __all__ = [
     "Beam",
     "Block",
     "BoucWenFriction",
+    "Constant",
     "ConstantFriction",
     "ContactState",
     "ContactSystem",
@@ -67,12 +73,17 @@ __all__ = [
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
+    "Flat",
+    "FourierSeries",
     "FrictionLaw",
     "GalvanettoFriction",
     "GaussianFriction",
     "GaussianSurface",
     "GreenwoodWilliamson",
     "Ground",
+    "Harmonic",
+    "HarmonicSpeed",
+    "Harmonics",
     "HyperbolicFriction",
     "IwanFriction",
     "JenkinsFriction",
@@ -88,16 +99,24 @@ __all__ = [
     "ParabolicSurface",
     "Patch",
     "Pendulum",
+    "PointLoad",
     "PowerContact",
     "PowerLawContact",
     "PrescribedForce",
     "ProductFriction",
+    "Pulse",
+    "RandomRoughness",
     "Rayleigh",
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sine",
+    "SpeedRamp",
     "Status",
     "Study",
+    "Sweep",
+    "Tabulated",
+    "Trace",
     "Trajectory",
     "TwoSidedStop",
     "export_pvd",

@@ -91,8 +91,8 @@ def borrowed(typingctx: Any, array: Any) -> Any:
 
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     if isinstance(kind, types.BaseTuple):
-        items = [_without_owner(context, builder, item, builder.extract_value(value, index))
-                 for index, item in enumerate(kind)]
+        items = [_without_owner(context, builder, kind[index], builder.extract_value(value, index))
+                 for index in range(len(kind))]
         return context.make_tuple(builder, kind, items)
     if not isinstance(kind, types.Array):
         return value

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import types
 
-from fecontact.compiled import f8, kernel, matrix, vector
+from fecontact.compiled import f8, kernel, vector
 from fecontact.contact_kernels import SYSTEM, contact_state
 from fecontact.laws.contract import normal_at, signal_at
 

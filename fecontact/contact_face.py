@@ -47,7 +47,8 @@ def contact_groups(
     import scipy.sparse as sp
 
     names = (boundaries,) if isinstance(boundaries, str) else tuple(boundaries)
-    each = tuple(counts) if isinstance(counts, list | tuple) else (counts,) * len(names)
+    each: tuple[Any, ...] = (tuple(counts) if isinstance(counts, list | tuple)
+                             else (counts,) * len(names))
     if not names or len(set(names)) < len(names):
         raise InputError(f"contact = {boundaries!r} must name boundaries, each once.")
     if len(each) != len(names):

@@ -49,7 +49,7 @@ def _example(kind: type, name: str, cls: type) -> str:
 
 
 def _title(kind: type) -> str:
-    return _SECTIONS[kind.__name__].replace("_", " ")
+    return _TITLES.get(kind.__name__, _SECTIONS[kind.__name__])
 
 
 def _summary(cls: type) -> str:
@@ -58,3 +58,4 @@ def _summary(cls: type) -> str:
 
 _SECTIONS = {"NormalLaw": "normal", "FrictionLaw": "friction", "Profile": "ground.profile",
              "GroundMotion": "ground.motion", "Signal": "drive.motion_x"}
+_TITLES = {"Profile": "profile", "GroundMotion": "ground motion", "Signal": "signal"}

@@ -29,8 +29,8 @@ def static_equilibrium(
 ) -> Array:
     """Modal coordinates q (m,) of an equilibrium under the constant load.
 
-    Solves ``w^2 q = T^T f`` with the drive and the loads at their means, by Newton's method, with continuation in
-    the load where Newton's method alone does not get there.
+    Solves ``w^2 q = T^T f`` with the drive and the loads at their means, by Newton's method, with
+    continuation in the load where Newton's method alone does not get there.
 
     Parameters
     ----------

@@ -79,9 +79,9 @@ class ContactSystem:
                     raise InputError(f"ContactSystem: {name} = {one!r} cannot serve as {name}; it "
                                      f"must be a {law.__name__}.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
-        for kind in ("normal", "friction"):
-            for _, _, law in self.law_groups(kind):
-                require_sound(law)
+        for part in (self.law_groups("normal"), self.law_groups("friction")):
+            for _, _, one in part:
+                require_sound(one)
         _ = self.arrays
 
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:

@@ -123,7 +123,7 @@ def test_groups_have_laws_of_their_own():
         ground=Ground(speed=5e-3), load=Load(normal=20.0),
         drive=Drive(stiffness_x=4000.0, damping_x=1.0))
     assert system.basis.groups == (("left", 1), ("right", 1))
-    assert system.memory == 1 and system.size == 6 + 2
+    assert (system.memory, system.size) == (1, 6 + 2)
     assert system.parameters()["contact.left.friction.stiffness"] == 1e5
     changed = system.with_(**{"contact.right.friction.static_coefficient": 0.9})
     assert changed.friction["right"].static_coefficient == 0.9

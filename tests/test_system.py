@@ -6,9 +6,9 @@ from meshes_for_tests import rectangle
 from model_for_tests import Model
 
 from fecontact import contact_kernels as kernels
-from fecontact.contact_energy import POWERS, powers
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
+from fecontact.contact_energy import POWERS, powers
 from fecontact.errors import InputError
 from fecontact.integrate.initial import RigidStart, initial_state
 from fecontact.laws.drive import Drive, Load

@@ -130,7 +130,8 @@ def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
 def _energy_scale(system: ContactSystem, state: Array) -> float:
     """Energy at the start, of the drive's springs and of the load over the roughness [J]."""
     m, drive = system.basis.modes, system.drive
-    start = 0.5 * (state[m : 2 * m] ** 2).sum() + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
+    q, rate = state[:m], state[m : 2 * m]
+    start = 0.5 * (rate @ rate + q @ system.arrays.stiffness @ q)
     springs = 0.5 * sum(
         c * motion.largest**2
         for c, motion in zip((drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))

@@ -56,8 +56,7 @@ def run_events(clock, times, stops, p, rtol, longest, floor, Y, status, closed, 
     which a step ends; ``largest`` the largest slip velocity, penetration rate and penetration so
     far. ``states`` (N, size), ``friction`` and ``normal`` (N, n) are filled as ``counts`` says.
     """
-    s = p.system
-    n, m = s.Tx.shape
+    n = len(p.cluster)
     clusters, size = len(p.rows), len(Y)
     rigid = p.restitution >= 0.0
     w = workspace(p)

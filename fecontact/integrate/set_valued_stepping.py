@@ -62,12 +62,16 @@ _ITERATIONS = 40
 
 
 @helper
-def _linearise(t, Y, g, p, grip, multiplier, force, gradients, active, balance):  # type: ignore[no-untyped-def]
+def _linearise(t, Y, g, p, grip, multiplier, side, keep, force, gradients, active,
+               balance):  # type: ignore[no-untyped-def]
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
     Adds ``Ty F - Tx R`` to ``balance`` (m,), fills ``force`` (n,) with R, ``active`` (2, n, m)
     with rows Tx, Ty and ``gradients`` (2, n, m) with dR/dV and -dF/dV of the nodes under force.
-    Returns their number and the largest creep velocity of a sticking node.
+    ``side`` (n,) is the sign of the slip of each node at the last call, zero for stick: a node
+    that would turn its slip around is first tried as sticking, or the iteration would jump
+    across stick for ever. With ``keep`` every node stays as it is. Returns the number of nodes under force and the largest creep velocity
+    of a sticking node, infinite when a node has changed between stick and slip.
     """
     s = p.system
     n, m = s.Tx.shape
@@ -97,14 +101,21 @@ def _linearise(t, Y, g, p, grip, multiplier, force, gradients, active, balance):
         if p.static[j] < 0.0:
             limit = friction_at(s.friction[j])(CREEP, pressing, s.friction_parameters[j])[0]
         trial = multiplier[j] + grip[j] * slip
-        if abs(trial) <= limit:
+        turned = trial if abs(trial) > limit else 0.0
+        if keep:
+            turned = side[j]
+        if turned * side[j] < 0.0 or turned == 0.0:
             R, R_along, R_away = trial, grip[j], 0.0
-            creep = max(creep, abs(slip))
+            creep = max(creep, abs(slip)) if turned == side[j] else math.inf
+            side[j] = 0.0
         else:
-            side = 1.0 if trial > 0.0 else -1.0
-            R, R_v, R_F = friction_at(s.friction[j])(side * max(side * slip, CREEP), pressing,
+            sense = 1.0 if turned > 0.0 else -1.0
+            if side[j] != sense:
+                creep = math.inf
+            side[j] = sense
+            R, R_v, R_F = friction_at(s.friction[j])(sense * max(sense * slip, CREEP), pressing,
                                                      s.friction_parameters[j])
-            if side * slip < 0.0:
+            if sense * slip < 0.0:
                 creep = max(creep, abs(slip))
                 R_v = 0.0
             R_along, R_away = R_v + R_F * pressing_along, R_F * pressing_away
@@ -120,21 +131,22 @@ def _linearise(t, Y, g, p, grip, multiplier, force, gradients, active, balance):
 
 
 @helper
-def _stage(t, g, start, known, Y, p, grip, multiplier, force, room, linear, system_matrix, floor,
-           rtol, finest):  # type: ignore[no-untyped-def]
+def _stage(t, g, start, known, Y, p, grip, multiplier, side, force, room, linear, system_matrix,
+           floor, rtol, finest):  # type: ignore[no-untyped-def]
     """Solve one stage for the velocities, Y[m : 2 m]; returns whether that succeeded.
 
     ``start`` and ``known`` (m,) are Q_e and V_e, ``linear`` is 1 + g C + g^2 K.
     """
     s = p.system
-    n, m = s.Tx.shape
+    m = len(start)
     gradients, active = room[:2], room[2:]
     balance, residual = np.empty(m), np.empty(m)
-    for _ in range(_ITERATIONS):
+    for iteration in range(_ITERATIONS):
         for i in range(m):
             Y[i] = start[i] + g * Y[m + i]
         free_acceleration(t, Y, s, balance)
-        count, _ = _linearise(t, Y, g, p, grip, multiplier, force, gradients, active, balance)
+        count, _ = _linearise(t, Y, g, p, grip, multiplier, side, iteration == 0, force,
+                              gradients, active, balance)
         system_matrix[:] = linear
         if count:
             Tx, Ty = active[0, :count].T, active[1, :count].T
@@ -155,17 +167,19 @@ def _stage(t, g, start, known, Y, p, grip, multiplier, force, room, linear, syst
             for i in range(m):
                 Y[i] = start[i] + g * Y[m + i]
             free_acceleration(t, Y, s, balance)
-            _, creep = _linearise(t, Y, g, p, grip, multiplier, force, gradients, active, balance)
+            _, creep = _linearise(t, Y, g, p, grip, multiplier, side, False, force, gradients,
+                                  active, balance)
             if creep <= finest:
                 return True
-            multiplier[:] = force
+            if creep < math.inf:
+                multiplier[:] = force
     return False
 
 
 @helper
 def _output(row, time, t, h, Y, before, after, new, p, old_force, force, w, states, friction,
             normal):  # type: ignore[no-untyped-def]
-    """State at an output time within a step, by cubics through places, velocities, accelerations."""
+    """State at an output time within a step, by cubics through both ends."""
     m = p.system.Tx.shape[1]
     x = (time - t) / h
     early, late = (1.0 - x) * (1.0 - x), x * x
@@ -176,7 +190,8 @@ def _output(row, time, t, h, Y, before, after, new, p, old_force, force, w, stat
         states[row, m + i] = (early * ((1.0 + 2.0 * x) * v + x * h * before[i])
                               + late * ((3.0 - 2.0 * x) * v_new + (x - 1.0) * h * after[i]))
     for i in range(2 * m, len(Y)):
-        states[row, i] = (1.0 - x) * Y[i] + x * new[i]
+        states[row, i] = (early * ((1.0 + 2.0 * x) * Y[i] + x * h * before[i - m])
+                          + late * ((3.0 - 2.0 * x) * new[i] + (x - 1.0) * h * after[i - m]))
     observe(time, states[row], p, w.nodes)
     normal[row] = w.nodes[:, FORCE]
     for j in range(len(force)):
@@ -200,8 +215,10 @@ def run_steps(clock, times, stops, p, rtol, longest, floor, Y, status, closed, c
     linear, system_matrix = np.empty((m, m)), np.empty((m, m))
     stage_states, accelerations = np.empty((3, 2 * m)), np.empty((3, m))
     rates, new = np.empty((3, EFFORTS + n)), np.empty(size)
-    start, known, before = np.empty(m), np.empty(m), np.zeros(m)
+    start, known = np.empty(m), np.empty(m)
+    before, after = np.empty(size - m), np.empty(size - m)
     grip, multiplier, stage_force = np.empty(n), np.empty(n), np.empty((3, n))
+    side = np.zeros(n)
     force = carried[3:]
     inertia = np.empty(n)
     slowest = 0.0
@@ -252,7 +269,7 @@ def run_steps(clock, times, stops, p, rtol, longest, floor, Y, status, closed, c
                                           + B2 * stage_states[1, m + i])
                     known[i] += length * (B1 * accelerations[0, i] + B2 * accelerations[1, i])
                 state[m + i] = Y[m + i] if k == 0 else stage_states[k - 1, m + i]
-            good = _stage(t + node * length, g, start, known, state, p, grip, multiplier,
+            good = _stage(t + node * length, g, start, known, state, p, grip, multiplier, side,
                           stage_force[k], room, linear, system_matrix, floor, rtol, finest)
             if not good:
                 break
@@ -305,19 +322,22 @@ def run_steps(clock, times, stops, p, rtol, longest, floor, Y, status, closed, c
             new[2 * m + i] = Y[2 * m + i] + length * (
                 B1 * rates[0, i] + B2 * rates[1, i] + GAMMA * rates[2, i])
         reached = goal if reaching else t + length
+        after[:m] = accelerations[2]
+        after[m:] = rates[2]
         if not known_before:
-            before[:] = accelerations[0]
+            before[:m] = accelerations[0]
+            before[m:] = rates[0]
         if counts[STARTED] == 0:
             counts[STARTED] = 1
             force[:] = stage_force[0]
         while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= reached:
             row = counts[OUTPUTS]
-            _output(row, times[row], t, reached - t, Y, before, accelerations[2], new, p, force,
+            _output(row, times[row], t, reached - t, Y, before, after, new, p, force,
                     stage_force[2], w, states, friction, normal)
             counts[OUTPUTS] += 1
         t = reached
         Y[:] = new
-        before[:] = accelerations[2]
+        before[:] = after
         known_before = True
         force[:] = stage_force[2]
         if reaching and stop < len(stops) and goal == stops[stop]:

@@ -128,7 +128,7 @@ class NodeLaw:
             if not value.ndim and entry.name in self.extensive:
                 value = value * share
             columns.append(np.broadcast_to(value, share.shape))
-        return np.array(columns).T.copy()
+        return np.array(columns).T.reshape(len(share), -1).copy()
 
     def require(self, allowed: str, test: Callable[[NDArray[np.float64]], Any],
                 *names: str) -> None:

@@ -10,13 +10,29 @@ from typing import Any
 
 from fecontact.errors import InputError, choices, nearest
 from fecontact.laws.contract import FrictionLaw, NormalLaw
+from fecontact.laws.ground_motion import GroundMotion
+from fecontact.laws.profile_base import Profile
+from fecontact.laws.signal_base import Signal
 
 
 @cache
 def law_names() -> Mapping[type, Mapping[str, type]]:
-    """Classes by name, for each kind of law (the base class); the first is the default."""
-    from fecontact.laws import friction, maxwell_slip, memory, normal, normal_measured
-    from fecontact.laws import normal_power, normal_statistical, normal_stop
+    """Classes by name, for each kind of law (the base class)."""
+    from fecontact.laws import (
+        friction,
+        ground_motion,
+        maxwell_slip,
+        memory,
+        normal,
+        normal_measured,
+        normal_power,
+        normal_statistical,
+        normal_stop,
+        profiles,
+        signals,
+        trace,
+        transients,
+    )
 
     return {
         NormalLaw: {
@@ -48,7 +64,30 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "lugre": memory.LuGreFriction,
             "bouc-wen": memory.BoucWenFriction,
         },
+        Profile: {
+            "flat": profiles.Flat,
+            "sine": profiles.Sine,
+            "fourier-series": profiles.FourierSeries,
+            "trace": trace.Trace,
+            "random-roughness": profiles.RandomRoughness,
+        },
+        GroundMotion: {
+            "harmonic-speed": ground_motion.HarmonicSpeed,
+            "speed-ramp": ground_motion.SpeedRamp,
+        },
+        Signal: {
+            "constant": signals.Constant,
+            "harmonic": signals.Harmonic,
+            "harmonics": signals.Harmonics,
+            "sweep": signals.Sweep,
+            "pulse": transients.Pulse,
+            "tabulated": transients.Tabulated,
+        },
     }
+
+
+# The law of a table that names none.
+_DEFAULTS: dict[type, str] = {NormalLaw: "rough-surface", FrictionLaw: "exponential"}
 
 
 def is_kind(hint: Any) -> bool:
@@ -57,7 +96,7 @@ def is_kind(hint: Any) -> bool:
 
 
 def law_class(kind: type, name: Any, where: str) -> type:
-    """The class of a law by its name, or by ``FILE.py:CLASS``; the default for None.
+    """The class of a law by its name, or by ``FILE.py:CLASS``; for None the default, if any.
 
     Raises
     ------
@@ -65,8 +104,9 @@ def law_class(kind: type, name: Any, where: str) -> type:
         If there is no such law (with those that there are), file or class.
     """
     names = law_names()[kind]
-    if name is None:
-        return next(iter(names.values()))
+    if name is None and kind not in _DEFAULTS:
+        raise InputError(f"{where} lacks the key 'law', one of {choices(names)}.")
+    name = _DEFAULTS[kind] if name is None else name
     if not isinstance(name, str) or (name not in names and ".py:" not in name):
         raise InputError(f"{where}: law = {name!r} must be one of {choices(names)}"
                          f"{nearest(str(name), names)}, or a law of your own, "
@@ -96,9 +136,9 @@ def name_of(law: Any) -> str | None:
     cls = type(law)
     for kind, names in law_names().items():
         if isinstance(law, kind):
-            for index, (name, known) in enumerate(names.items()):
+            for name, known in names.items():
                 if known is cls:
-                    return name if index else None
+                    return None if _DEFAULTS.get(kind) == name else name
             file = getattr(sys.modules.get(cls.__module__), "__file__", None)
             if file is None or "." in cls.__qualname__:
                 raise InputError(f"The law {cls.__name__} cannot be written down: define it in a "
@@ -121,7 +161,7 @@ def _located(key: str, value: Any, folder: Path) -> Any:
     return str(folder.resolve() / value) if named else value
 
 
-def _subclasses(kind: type) -> Iterator[type]:
+def _subclasses(kind: type[Any]) -> Iterator[type]:
     for cls in kind.__subclasses__():
         yield cls
         yield from _subclasses(cls)
