@@ -145,6 +145,13 @@ class ContactSystem:
             scales[nodes, : law.memory] = law.state_scale
         return scales.reshape(-1)
 
+    def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
+        """Times between two [s] at which something given in time has a kink, ascending."""
+        given: tuple[Any, ...] = (
+            *self.drive.motions, *(force.signal for force in self.load.forces), self.ground)
+        return tuple(sorted({time for source in given
+                             for time in source.breakpoints(start, end)}))
+
     def stored_energy(self, penetration: Array) -> Array:
         """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""
         energy = np.zeros(penetration.shape[:-1])

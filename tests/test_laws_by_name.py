@@ -257,3 +257,32 @@ def test_command_laws(capsys):
     assert "bristle_stiffness" in capsys.readouterr().out
     assert execute(["laws", "lugr"]) == 1
     assert "did you mean 'lugre'" in capsys.readouterr().err
+
+
+def test_documentation_names_every_law():
+    text = (Path(__file__).parents[1] / "docs" / "laws.md").read_text()
+    for kind, name in ALL:
+        assert f"`{name}`" in text, (kind, name)
+
+
+def test_example_law_conforms():
+    import sys
+
+    sys.path[:0] = [str(Path(__file__).parent / "laws"),
+                    str(Path(__file__).parents[1] / "examples")]
+    try:
+        from friction_conformance import check_friction_law
+        from own_law import LogarithmicFriction
+    finally:
+        del sys.path[:2]
+    check_friction_law(LogarithmicFriction())
+    check_friction_law(LogarithmicFriction(0.2, 0.1, 1e-3, 1e5))
+
+
+def test_example_in_the_documentation_is_the_example():
+    root = Path(__file__).parents[1]
+    example = (root / "examples" / "own_law.py").read_text()
+    block = (root / "docs" / "laws.md").read_text().split("```python\n@fc.friction_law")[1]
+    for line in block.split("```")[0].splitlines():
+        if line.strip() and not line.startswith("    def "):
+            assert line in example, line

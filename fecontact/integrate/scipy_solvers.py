@@ -60,9 +60,14 @@ def integrate(
     begin = clock.perf_counter()
     energy = 0.01 * rtol * _energy_scale(system, state)
     tolerance = np.concatenate([absolute_tolerances(system, rtol), np.full(extra, energy)])
-    solver = getattr(scipy.integrate, method)(
-        rhs, float(times[0]), np.concatenate([state, np.zeros(extra)]), float(times[-1]),
-        jac=jacobian, rtol=rtol, atol=tolerance, max_step=longest_step(system, times))
+    ends = [*system.breakpoints(float(times[0]), float(times[-1])), float(times[-1])]
+
+    def started(t: float, y: Array) -> Any:
+        return getattr(scipy.integrate, method)(
+            rhs, t, y, ends.pop(0), jac=jacobian, rtol=rtol, atol=tolerance,
+            max_step=longest_step(system, times))
+
+    solver = started(float(times[0]), np.concatenate([state, np.zeros(extra)]))
     result = np.empty((len(times), size + extra))
     result[0] = solver.y
     done, steps, stalled = 1, 0, 0
@@ -81,11 +86,13 @@ def integrate(
                 break
             steps += 1
             reached = done + int(np.searchsorted(times[done:], solver.t, side="right"))
-            if solver.status == "finished":
+            if solver.status == "finished" and not ends:
                 reached = len(times)
             if reached > done:
                 result[done:reached] = solver.dense_output()(times[done:reached]).T
                 done = reached
+            if solver.status == "finished" and ends:
+                solver = started(solver.t, solver.y)
             if progress is not None:
                 progress(float(solver.t))
     except KeyboardInterrupt:

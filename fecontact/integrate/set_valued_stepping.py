@@ -70,8 +70,9 @@ def _linearise(t, Y, g, p, grip, multiplier, side, keep, force, gradients, activ
     with rows Tx, Ty and ``gradients`` (2, n, m) with dR/dV and -dF/dV of the nodes under force.
     ``side`` (n,) is the sign of the slip of each node at the last call, zero for stick: a node
     that would turn its slip around is first tried as sticking, or the iteration would jump
-    across stick for ever. With ``keep`` every node stays as it is. Returns the number of nodes under force and the largest creep velocity
-    of a sticking node, infinite when a node has changed between stick and slip.
+    across stick for ever. With ``keep`` every node stays as it is. Returns the number of nodes
+    under force and the largest creep velocity of a sticking node, infinite when a node has
+    changed between stick and slip.
     """
     s = p.system
     n, m = s.Tx.shape
@@ -141,12 +142,14 @@ def _stage(t, g, start, known, Y, p, grip, multiplier, side, force, room, linear
     m = len(start)
     gradients, active = room[:2], room[2:]
     balance, residual = np.empty(m), np.empty(m)
-    for iteration in range(_ITERATIONS):
+    keep = True
+    for _ in range(_ITERATIONS):
         for i in range(m):
             Y[i] = start[i] + g * Y[m + i]
         free_acceleration(t, Y, s, balance)
-        count, _ = _linearise(t, Y, g, p, grip, multiplier, side, iteration == 0, force,
+        count, _ = _linearise(t, Y, g, p, grip, multiplier, side, keep, force,
                               gradients, active, balance)
+        keep = False
         system_matrix[:] = linear
         if count:
             Tx, Ty = active[0, :count].T, active[1, :count].T
@@ -172,7 +175,9 @@ def _stage(t, g, start, known, Y, p, grip, multiplier, side, force, room, linear
             if creep <= finest:
                 return True
             if creep < math.inf:
+                # The creep belongs to the old multiplier and must not count again with the new.
                 multiplier[:] = force
+                keep = True
     return False
 
 
