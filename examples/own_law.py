@@ -48,7 +48,7 @@ class LogarithmicFriction(fc.FrictionLaw):
 
 def main() -> None:
     """Steady sliding with the law above, and with the falling law of the package."""
-    body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)))
+    body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)), thickness=0.01)
     basis = body.modal_basis(12, contact_nodes=20, damping=0.01)
     for friction in (LogarithmicFriction(), fc.ExponentialFriction(0.2, 0.12, smoothing_slope=1e4)):
         system = fc.ContactSystem(
