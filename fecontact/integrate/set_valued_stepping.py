@@ -34,6 +34,7 @@ from fecontact.integrate.set_valued_nodes import (
     FINISHED,
     FORCE,
     GOING_ON,
+    LIMIT,
     OUTPUTS,
     PROBLEM,
     REJECTED,
@@ -58,20 +59,25 @@ ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 _GRIP = 1e6
-_ITERATIONS = 40
+_ROUNDING = 2e-8
+_ITERATIONS = 60
+# Newton steps without shortening.
+_HASTY = 8
+
+KEPT, HESITANT, FREE = range(3)
 
 
 @helper
-def _linearise(t, Y, g, p, grip, multiplier, side, keep, force, gradients, active,
+def _linearise(t, Y, g, p, grip, multiplier, side, turning, force, gradients, active,
                balance):  # type: ignore[no-untyped-def]
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
     Adds ``Ty F - Tx R`` to ``balance`` (m,), fills ``force`` (n,) with R, ``active`` (2, n, m)
     with rows Tx, Ty and ``gradients`` (2, n, m) with dR/dV and -dF/dV of the nodes under force.
-    ``side`` (n,) is the sign of the slip of each node at the last call, zero for stick: a node
-    that would turn its slip around is first tried as sticking, or the iteration would jump
-    across stick for ever. With ``keep`` every node stays as it is. Returns the number of nodes
-    under force and the largest creep velocity of a sticking node, infinite when a node has
+    ``side`` (n,) is the sign of the slip of each node at the last call, zero for stick. KEPT
+    nodes stay as they are; HESITANT ones that would turn their slip around are first tried as
+    sticking, or the iteration would jump across stick for ever. Returns the number of nodes under
+    force and the largest creep velocity of a sticking node, infinite when a node has
     changed between stick and slip.
     """
     s = p.system
@@ -103,11 +109,11 @@ def _linearise(t, Y, g, p, grip, multiplier, side, keep, force, gradients, activ
             limit = friction_at(s.friction[j])(CREEP, pressing, s.friction_parameters[j])[0]
         trial = multiplier[j] + grip[j] * slip
         turned = trial if abs(trial) > limit else 0.0
-        if keep:
+        if turning == KEPT:
             turned = side[j]
-        if turned * side[j] < 0.0 or turned == 0.0:
+        if turned == 0.0 or (turning == HESITANT and turned * side[j] < 0.0):
             R, R_along, R_away = trial, grip[j], 0.0
-            creep = max(creep, abs(slip)) if turned == side[j] else math.inf
+            creep = max(creep, abs(slip)) if turned == side[j] == 0.0 else math.inf
             side[j] = 0.0
         else:
             sense = 1.0 if turned > 0.0 else -1.0
@@ -132,52 +138,76 @@ def _linearise(t, Y, g, p, grip, multiplier, side, keep, force, gradients, activ
 
 
 @helper
+def _residual(t, g, start, known, Y, p, grip, multiplier, side, turning, force, room, balance,
+              residual):  # type: ignore[no-untyped-def]
+    """What is left of the equations of a stage, with places and contact at the velocities in Y."""
+    m = len(start)
+    for i in range(m):
+        Y[i] = start[i] + g * Y[m + i]
+    free_acceleration(t, Y, p.system, balance)
+    count, creep = _linearise(t, Y, g, p, grip, multiplier, side, turning, force, room[:2],
+                              room[2:], balance)
+    for i in range(m):
+        residual[i] = known[i] + g * balance[i] - Y[m + i]
+    return count, creep
+
+
+@helper
 def _stage(t, g, start, known, Y, p, grip, multiplier, side, force, room, linear, system_matrix,
            floor, rtol, finest):  # type: ignore[no-untyped-def]
     """Solve one stage for the velocities, Y[m : 2 m]; returns whether that succeeded.
 
-    ``start`` and ``known`` (m,) are Q_e and V_e, ``linear`` is 1 + g C + g^2 K.
+    ``start`` and ``known`` (m,) are Q_e and V_e, ``linear`` is 1 + g C + g^2 K. With given normal
+    forces the equations are those of a convex minimum: when the sticking set is not found at
+    once, each Newton step is shortened to where the minimum along it lies.
     """
-    s = p.system
     m = len(start)
-    gradients, active = room[:2], room[2:]
     balance, residual = np.empty(m), np.empty(m)
-    keep = True
-    for _ in range(_ITERATIONS):
-        for i in range(m):
-            Y[i] = start[i] + g * Y[m + i]
-        free_acceleration(t, Y, s, balance)
-        count, _ = _linearise(t, Y, g, p, grip, multiplier, side, keep, force,
-                              gradients, active, balance)
-        keep = False
+    turning = KEPT
+    for iteration in range(_ITERATIONS):
+        count, _ = _residual(t, g, start, known, Y, p, grip, multiplier, side, turning, force,
+                             room, balance, residual)
+        turning = HESITANT if iteration < _HASTY else FREE
         system_matrix[:] = linear
         if count:
-            Tx, Ty = active[0, :count].T, active[1, :count].T
-            system_matrix += g * (np.dot(Tx, gradients[0, :count])
-                                  + np.dot(Ty, gradients[1, :count]))
-        finite = True
+            Tx, Ty = room[2, :count].T, room[3, :count].T
+            system_matrix += g * (np.dot(Tx, room[0, :count]) + np.dot(Ty, room[1, :count]))
         for i in range(m):
-            residual[i] = known[i] + g * balance[i] - Y[m + i]
-            finite = finite and math.isfinite(residual[i])
-        if not finite:
-            return False
+            if not math.isfinite(residual[i]):
+                return False
         change = np.linalg.solve(system_matrix, residual)
-        moved = 0.0
+        moved, downhill = 0.0, 0.0
         for i in range(m):
+            downhill += residual[i] * change[i]
             Y[m + i] += change[i]
             moved = max(moved, abs(change[i]) / (rtol * (floor[m + i] + abs(Y[m + i]))))
-        if moved <= 1e-3:
-            for i in range(m):
-                Y[i] = start[i] + g * Y[m + i]
-            free_acceleration(t, Y, s, balance)
-            _, creep = _linearise(t, Y, g, p, grip, multiplier, side, False, force, gradients,
-                                  active, balance)
+        if moved <= 1e-2:
+            _, creep = _residual(t, g, start, known, Y, p, grip, multiplier, side, turning, force,
+                                 room, balance, residual)
             if creep <= finest:
                 return True
             if creep < math.inf:
                 # The creep belongs to the old multiplier and must not count again with the new.
                 multiplier[:] = force
-                keep = True
+                turning = KEPT
+        elif turning == FREE:
+            low, high, part = 0.0, 1.0, 1.0
+            for _ in range(40):
+                _residual(t, g, start, known, Y, p, grip, multiplier, side, FREE, force, room,
+                          balance, residual)
+                uphill = 0.0
+                for i in range(m):
+                    uphill -= residual[i] * change[i]
+                if abs(uphill) <= 0.1 * abs(downhill) or (part == 1.0 and uphill < 0.0):
+                    break
+                if uphill > 0.0:
+                    high = part
+                else:
+                    low = part
+                middle = 0.5 * (low + high)
+                for i in range(m):
+                    Y[m + i] += (middle - part) * change[i]
+                part = middle
     return False
 
 
@@ -252,14 +282,20 @@ def run_steps(clock, times, stops, p, rtol, longest, floor, Y, status, closed, c
             length = goal - t
         g = GAMMA * length
         counts[STEPS] += 1
+        observe(t, Y, p, w.nodes)
+        quick = carried[0] + abs(signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1])
         for i in range(m):
             for k in range(m):
                 linear[i, k] = g * s.damping[i, k] + g * g * s.stiffness[i, k]
             linear[i, i] += 1.0
         for j in range(n):
-            grip[j] = _GRIP / (g * inertia[j]) if inertia[j] > 0.0 else 0.0
+            # Of a force within its limit the rounding of the slip velocity may move no more.
+            softest = inertia[j] * g / _GRIP
+            if w.nodes[j, LIMIT] > 0.0:
+                softest += _ROUNDING * quick / w.nodes[j, LIMIT]
+            grip[j] = 1.0 / softest if inertia[j] > 0.0 else 0.0
             multiplier[j] = force[j]
-        finest = 1e-3 * rtol * max(slowest, carried[0])
+        finest = (1e-2 * rtol + 1e-11) * max(slowest, quick)
         good = True
         for k in range(3):
             node = GAMMA if k == 0 else (GAMMA + A21 if k == 1 else 1.0)
