@@ -94,7 +94,8 @@ def test_resolved_study_reads_back_the_same(text):
 
 def test_resolved_study_has_every_key_that_has_a_value(tiny):
     tables = tiny.tables()
-    assert set(tables["ground"]) == {entry.name for entry in fields(Ground)}
+    assert set(tables["ground"]) == {entry.name for entry in fields(Ground)
+                                     if getattr(Ground(), entry.name) is not None}
     assert tables["simulation"]["rtol"] == 1e-6
     assert tables["geometry"]["shape"] == "beam"
     assert "B" not in tables["basis"]
