@@ -17,6 +17,7 @@ from fecontact.system import ContactSystem
 Array = NDArray[np.float64]
 
 FRICTION_PART = 0.1
+LONG=5.0
 
 
 @ground_profile
@@ -113,13 +114,16 @@ def start(
     slip_scale = np.empty(n)
     for nodes, _, law in system.law_groups("friction"):
         slip_scale[nodes] = law.velocity_scale
-    longest = longest_step(system, times)
+    depth = np.empty(n)
+    for nodes, _, law in system.law_groups("normal"):
+        depth[nodes] = law.penetration_scale
+    longest = LONG*longest_step(system, times)
     velocity_scale = system.velocity_scale
     acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
     first = 0.1 * velocity_scale / max(float(acceleration.max()), 1e-300)
     control = stepping.Control(
         displacement_scale=system.penetration_scale / largest,
-        memory_scale=system.memory_scales, slip_scale=slip_scale, largest=largest,
+        memory_scale=system.memory_scales, slip_scale=slip_scale, depth=depth, slow=20.0*slip_scale,largest=largest,
         breaks=np.array([] if breaks is None else breaks, dtype=float), rtol=float(rtol),
         friction_part=friction_part, longest=longest, velocity_scale=velocity_scale,
         work=int(work))

@@ -4,6 +4,7 @@ The same equations as :mod:`fecontact.contact_kernels`, laid out for speed: rows
 nodes side by side in ``shapes`` (m, 2 n), so that sums over nodes vectorise.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from fecontact import contact_kernels as kernels
 from fecontact.compiled import block, matrix
 from fecontact.integrate.borrowed import inlined
-from fecontact.laws.contract import signal_at
+from fecontact.laws.contract import normal_at, signal_at
 
 Array = NDArray[np.float64]
 
@@ -165,3 +166,53 @@ def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):  # 
         out[m + i] = total
 
 
+@inlined
+def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):  # type: ignore[no-untyped-def]
+    """Time until the forces of a node change their character, or ``within`` if later.
+
+    By the velocity and acceleration of the nodes: touch-down and lift-off on level ground, the
+    penetrations ``depth`` (n,), slip velocities that fall to ``slow`` (n,) of either sign, and
+    normal forces that fall to zero. Stepping there saves the steps that would fail because
+    forces change within them; it is an estimate, and nothing depends on its accuracy.
+    """
+    m, rows = shapes.shape
+    n = rows // 2
+    project(shapes, y, w[0], w[1])
+    for j in range(rows):
+        total = 0.0
+        for i in range(m):
+            total += shapes[i, j] * rate[m + i]
+        w[2, j] = total
+    first = within
+    for j in range(n):
+        u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]
+        first = _crossing(u, v, a, first)
+        first = _crossing(u - depth[j], v, a, first)
+        force = normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+        if force > 0.0:
+            fall = g.partial[j, 0, 1] * -v + g.partial[j, 0, 3] * -a
+            if fall < 0.0 and -force / fall < first:
+                first = -force / fall
+            slip = w[1, j] - speed
+            towards = -w[2, j] if slip > 0.0 else w[2, j]
+            if abs(slip) > 1.5 * slow[j] and (abs(slip) - slow[j]) < towards * first:
+                first = (abs(slip) - slow[j]) / towards
+    return first
+
+
+@inlined
+def _crossing(u, v, a, within):  # type: ignore[no-untyped-def]
+    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
+    if u * v > 0.0 and u * a >= 0.0:
+        return within
+    discriminant = v * v - 2.0 * a * u
+    if discriminant < 0.0:
+        return within
+    q = -(v + math.copysign(math.sqrt(discriminant), v))
+    one = q / a if a != 0.0 else -1.0
+    other = 2.0 * u / q if q != 0.0 else -1.0
+    if 0.0 < one < within:
+        within = one
+    if 0.0 < other < within:
+        within = other
+    return within

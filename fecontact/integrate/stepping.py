@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE = range(4)
 
-TIME, STEP, SPEED_SCALE, REJECTED_LAST = range(4)
-NUMBERS = 4
+TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS = range(7)
+NUMBERS = 7
 STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(6)
 COUNTS = 6
 
@@ -48,6 +48,8 @@ class Control(NamedTuple):
     displacement_scale: Array
     memory_scale: Array
     slip_scale: Array
+    depth: Array
+    slow: Array
     largest: Array
     breaks: Array
     rtol: float
@@ -57,7 +59,7 @@ class Control(NamedTuple):
     work: int
 
 
-CONTROL = types.NamedTuple([vector, vector, vector, vector, vector, f8, f8, f8, f8, i8], Control)
+CONTROL = types.NamedTuple([vector, vector, vector, vector, vector, vector, vector, f8, f8, f8, f8, i8], Control)
 
 
 class Progress(NamedTuple):
@@ -186,6 +188,16 @@ def advance(s_, shapes_, times_, control_, progress_, room_, most, out_, work_ou
             target = stop
         elif target + h > stop:
             target = t + 0.5 * (stop - t)
+        limited = False
+        if numbers[CAUTIOUS] > 0.0:
+            reach = max(target - t, numbers[CAUTIOUS])
+            kink = motion.next_kink(state, progress.rate, s, shapes, current, control.depth,
+                                    control.slow, given[motion.SPEED], node_room, reach)
+            if kink < 0.9 * reach and t + kink < stop:
+                # Rather a little too far than too short.
+                target = t + max(1.0003 * kink, 1e-3 * (target - t))
+                limited = True
+            numbers[CAUTIOUS] = 0.0
         h = target - t
         latest = np.nextafter(stop, t) if is_break else stop
 
@@ -278,6 +290,7 @@ def advance(s_, shapes_, times_, control_, progress_, room_, most, out_, work_ou
                         stages[i, k] = 0.0
             counts[REJECTIONS] += 1
             numbers[REJECTED_LAST] = 1.0
+            numbers[CAUTIOUS] = 0.0 if limited else h
             h *= factor
             if h < smallest:
                 status = MINIMUM_STEP if error < np.inf else NOT_FINITE
@@ -326,9 +339,17 @@ def advance(s_, shapes_, times_, control_, progress_, room_, most, out_, work_ou
         t = target
         new = True
         counts[STEPS] += 1
+        if numbers[LAST_STEP] > 0.0:
+            # Steps that had to shrink will have to shrink on (Gustafsson's predictive control).
+            trend = (h / numbers[LAST_STEP]) * (numbers[LAST_ERROR] / max(error, 1e-6)) ** (
+                1.0 / rodas.ORDER)
+            factor = max(min(factor, factor * trend), _SMALLEST_FACTOR)
+        numbers[LAST_STEP], numbers[LAST_ERROR] = h, max(error, 1e-2)
         if numbers[REJECTED_LAST] != 0.0:
             factor = min(factor, 1.0)
         numbers[REJECTED_LAST] = 0.0
+        if limited:
+            numbers[CAUTIOUS] = h
         h = min(h * factor, control.longest)
     numbers[TIME], numbers[STEP] = t, h
     return status
