@@ -16,8 +16,9 @@ from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
 
-FRICTION_PART = 0.1
-LONG=5.0
+FRICTION_PART = 0.01
+# Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
+_SLOW = 20.0
 
 
 @ground_profile
@@ -98,8 +99,8 @@ def start(
         Error of one step: of each modal displacement relative to its largest value so far, or to
         the penetration scale of the normal laws where that is more; of modal velocities relative
         to the largest so far; of internal variables relative to their scale. At nodes with
-        friction without memory slip velocities are resolved to a tenth of their distance from
-        rest, or of the width of the smoothing.
+        friction without memory slip velocities are resolved to a hundredth of their distance
+        from rest, or of the width of the smoothing.
     work : bool
         Whether to integrate the powers.
     breaks : (k,) array, optional
@@ -117,14 +118,14 @@ def start(
     depth = np.empty(n)
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
-    longest = LONG*longest_step(system, times)
+    longest = 5.0 * longest_step(system, times)
     velocity_scale = system.velocity_scale
     acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
     first = 0.1 * velocity_scale / max(float(acceleration.max()), 1e-300)
     control = stepping.Control(
         displacement_scale=system.penetration_scale / largest,
-        memory_scale=system.memory_scales, slip_scale=slip_scale, depth=depth, slow=20.0*slip_scale,largest=largest,
-        breaks=np.array([] if breaks is None else breaks, dtype=float), rtol=float(rtol),
+        memory_scale=system.memory_scales, slip_scale=slip_scale, depth=depth, slow=_SLOW * slip_scale,
+        largest=largest, breaks=np.array([] if breaks is None else breaks, dtype=float), rtol=float(rtol),
         friction_part=friction_part, longest=longest, velocity_scale=velocity_scale,
         work=int(work))
     numbers = np.zeros(stepping.NUMBERS)

@@ -20,7 +20,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import block, integers, matrix
+from fecontact.compiled import block, integers, matrix, vector
 from fecontact.integrate.borrowed import inlined
 from fecontact.integrate.motion import project
 
@@ -30,20 +30,22 @@ Array = NDArray[np.float64]
 class Reduced(NamedTuple):
     """The reduced system of a step.
 
-    Jq, Jv (m, m); factors (m, m) and pivots (m,) of its matrix; per node the inverse of G - Zz
-    (n, s, s) and e (n, s); room to work in: (16, m).
+    J = [Jq, Jv] (m, 2 m); factors (m, m) and pivots (m,) of its matrix; per node the inverse of
+    G - Zz (n, s, s) and e (n, s); room to work in: (m,), (4, 2 n) and (2 m, 2 n).
     """
 
-    Jq: Array
-    Jv: Array
+    J: Array
     factors: Array
     pivots: NDArray[np.int64]
     inverse: Array
     weights: Array
     room: Array
+    coefficients: Array
+    answers: Array
 
 
-REDUCED = types.NamedTuple([matrix, matrix, matrix, integers, block, matrix, matrix], Reduced)
+REDUCED = types.NamedTuple(
+    [matrix, matrix, integers, block, matrix, vector, matrix, matrix], Reduced)
 
 
 @inlined
@@ -116,54 +118,52 @@ def eliminate_memory(G, s, g, w):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def assemble(s, g, w):  # type: ignore[no-untyped-def]
-    """Fill Jq and Jv, four nodes at a time."""
-    n, m = s.Tx.shape
+def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
+    """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
+    m, rows = shapes.shape
+    n = rows // 2
     states = w.weights.shape[1]
-    Jq, Jv, room = w.Jq, w.Jv, w.room
+    c = w.coefficients
+    for j in range(n):
+        p = g.partial[j]
+        pressing, slip = 0.0, 0.0
+        for k in range(states):
+            slip += w.weights[j, k] * g.rates[j, k, 1]
+            pressing += w.weights[j, k] * g.rates[j, k, 2]
+        for k in range(4):
+            c[k, j] = -p[1, k] - pressing * p[2, k]
+            c[k, n + j] = p[0, k]
+        c[2, j] -= slip
+    for k in range(m):
+        for half in range(2):
+            first = half * n
+            for j in range(n):
+                w.answers[k, first + j] = (c[0, first + j] * shapes[k, j]
+                                           + c[1, first + j] * shapes[k, n + j])
+            for j in range(n):
+                w.answers[m + k, first + j] = (c[2, first + j] * shapes[k, j]
+                                               + c[3, first + j] * shapes[k, n + j])
+    for i in range(0, m - 1, 2):
+        for k in range(0, 2 * m, 2):
+            a00, a01, a10, a11 = 0.0, 0.0, 0.0, 0.0
+            for j in range(rows):
+                x, y = shapes[i, j], shapes[i + 1, j]
+                u, v = w.answers[k, j], w.answers[k + 1, j]
+                a00 += x * u
+                a01 += x * v
+                a10 += y * u
+                a11 += y * v
+            w.J[i, k], w.J[i, k + 1], w.J[i + 1, k], w.J[i + 1, k + 1] = a00, a01, a10, a11
+    if m % 2:
+        for k in range(2 * m):
+            total = 0.0
+            for j in range(rows):
+                total += shapes[m - 1, j] * w.answers[k, j]
+            w.J[m - 1, k] = total
     for i in range(m):
         for k in range(m):
-            Jq[i, k] = -s.stiffness[i, k]
-            Jv[i, k] = -s.damping[i, k]
-    for first in range(0, n, 4):
-        count = min(4, n - first)
-        for node in range(count):
-            j = first + node
-            p = g.partial[j]
-            through_pressing, through_slip = 0.0, 0.0
-            for k in range(states):
-                through_slip += w.weights[j, k] * g.rates[j, k, 1]
-                through_pressing += w.weights[j, k] * g.rates[j, k, 2]
-            R_x = p[1, 0] + through_pressing * p[2, 0]
-            R_y = p[1, 1] + through_pressing * p[2, 1]
-            R_vx = p[1, 2] + through_pressing * p[2, 2] + through_slip
-            R_vy = p[1, 3] + through_pressing * p[2, 3]
-            for k in range(m):
-                tx, ty = s.Tx[j, k], s.Ty[j, k]
-                room[4 * node, k] = -R_x * tx - R_y * ty
-                room[4 * node + 1, k] = p[0, 0] * tx + p[0, 1] * ty
-                room[4 * node + 2, k] = -R_vx * tx - R_vy * ty
-                room[4 * node + 3, k] = p[0, 2] * tx + p[0, 3] * ty
-        if count == 4:
-            for i in range(m):
-                x0, x1 = s.Tx[first, i], s.Tx[first + 1, i]
-                x2, x3 = s.Tx[first + 2, i], s.Tx[first + 3, i]
-                y0, y1 = s.Ty[first, i], s.Ty[first + 1, i]
-                y2, y3 = s.Ty[first + 2, i], s.Ty[first + 3, i]
-                for k in range(m):
-                    Jq[i, k] += (x0 * room[0, k] + y0 * room[1, k] + x1 * room[4, k]
-                                 + y1 * room[5, k] + x2 * room[8, k] + y2 * room[9, k]
-                                 + x3 * room[12, k] + y3 * room[13, k])
-                    Jv[i, k] += (x0 * room[2, k] + y0 * room[3, k] + x1 * room[6, k]
-                                 + y1 * room[7, k] + x2 * room[10, k] + y2 * room[11, k]
-                                 + x3 * room[14, k] + y3 * room[15, k])
-        else:
-            for node in range(count):
-                for i in range(m):
-                    tx, ty = s.Tx[first + node, i], s.Ty[first + node, i]
-                    for k in range(m):
-                        Jq[i, k] += tx * room[4 * node, k] + ty * room[4 * node + 1, k]
-                        Jv[i, k] += tx * room[4 * node + 2, k] + ty * room[4 * node + 3, k]
+            w.J[i, k] -= s.stiffness[i, k]
+            w.J[i, m + k] -= s.damping[i, k]
 
 
 @inlined
@@ -172,7 +172,7 @@ def factorise_step(G, w):  # type: ignore[no-untyped-def]
     m = len(w.pivots)
     for i in range(m):
         for k in range(m):
-            w.factors[i, k] = -G * w.Jv[i, k] - w.Jq[i, k]
+            w.factors[i, k] = -G * w.J[i, m + k] - w.J[i, k]
         w.factors[i, i] += G * G
     factorise(w.factors, w.pivots)
 
@@ -183,7 +183,7 @@ def solve_stage(G, s, shapes, g, w, r, motion, out):  # type: ignore[no-untyped-
     m, rows = shapes.shape
     n = rows // 2
     states = w.weights.shape[1]
-    x = w.room[0]
+    x = w.room
     if states > 0:
         for j in range(n):
             total = 0.0
@@ -197,7 +197,7 @@ def solve_stage(G, s, shapes, g, w, r, motion, out):  # type: ignore[no-untyped-
                 total += shapes[i, j] * motion[2, j]
         total *= G
         for k in range(m):
-            total += w.Jq[i, k] * r[k]
+            total += w.J[i, k] * r[k]
         x[i] = total
     back_substitute(w.factors, w.pivots, x)
     for i in range(m):

@@ -111,9 +111,9 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
                                 np.zeros((nodes, states, 3 + states)))
 
     reduced = linear.Reduced(
-        np.zeros((modes, modes)), np.zeros((modes, modes)), np.zeros((modes, modes)),
-        np.zeros(modes, dtype=np.int64), np.zeros((nodes, states, states)),
-        np.zeros((nodes, states)), np.zeros((16, modes)))
+        np.zeros((modes, 2 * modes)), np.zeros((modes, modes)), np.zeros(modes, dtype=np.int64),
+        np.zeros((nodes, states, states)), np.zeros((nodes, states)), np.zeros(modes),
+        np.zeros((4, 2 * nodes)), np.zeros((2 * modes, 2 * nodes)))
     return Room(np.zeros((20, size)), np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN),
                 np.zeros((4, len(POWERS) + nodes)), reduced, gradients(), gradients())
 
@@ -166,9 +166,8 @@ def advance(s_, shapes_, times_, control_, progress_, room_, most, out_, work_ou
         for i in range(size):
             out[0, i] = state[i]
         counts[STARTED], counts[OUTPUTS] = 1, 1
-        new = True
         h = min(h, control.longest)
-    new = True
+    new, speed = True, 0.0
     attempts = 0
     status = RUNNING
     while True:
@@ -188,14 +187,17 @@ def advance(s_, shapes_, times_, control_, progress_, room_, most, out_, work_ou
             target = stop
         elif target + h > stop:
             target = t + 0.5 * (stop - t)
+        if new:
+            motion.set_given(t, s, given, pull)
+            speed = given[motion.SPEED]
         limited = False
         if numbers[CAUTIOUS] > 0.0:
             reach = max(target - t, numbers[CAUTIOUS])
             kink = motion.next_kink(state, progress.rate, s, shapes, current, control.depth,
-                                    control.slow, given[motion.SPEED], node_room, reach)
+                                    control.slow, speed, node_room, reach)
             if kink < 0.9 * reach and t + kink < stop:
                 # Rather a little too far than too short.
-                target = t + max(1.0003 * kink, 1e-3 * (target - t))
+                target = min(t + max(1.0003 * kink, 1e-3 * (target - t)), stop)
                 limited = True
             numbers[CAUTIOUS] = 0.0
         h = target - t
@@ -203,13 +205,12 @@ def advance(s_, shapes_, times_, control_, progress_, room_, most, out_, work_ou
 
         G = 1.0 / (h * rodas.GAMMA)
         if new:
-            motion.set_given(t, s, given, pull)
             small = 1e-4 * h
             later = min(t + small, latest)
             acceleration = 0.0
             if later > t:
                 acceleration = (signal_at(s.ground_motion)(later, s.ground_motion_parameters)[1]
-                                - given[motion.SPEED]) / (later - t)
+                                - speed) / (later - t)
             for i in range(m):
                 pull_rate[i] = 0.0
             for k in range(len(s.load)):
@@ -225,7 +226,7 @@ def advance(s_, shapes_, times_, control_, progress_, room_, most, out_, work_ou
         if states > 0:
             linear.eliminate_memory(G, s, current, reduced)
         if new or states > 0:
-            linear.assemble(s, current, reduced)
+            linear.assemble(s, shapes, current, reduced)
         new = False
         linear.factorise_step(G, reduced)
 
