@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,43 +16,12 @@ from fecontact import (
     Material,
     Mesh,
     ModalBasis,
+    PrescribedForce,
     RoughSurface,
 )
-from fecontact.laws.contract import NormalLaw, PerNode, normal_law, signal
+from fecontact.laws.signals import Constant
 
 Array = NDArray[np.float64]
-
-
-@normal_law
-def _prescribed(u, v, p):  # type: ignore[no-untyped-def]
-    return p[0], 0.0, 0.0
-
-
-@dataclass(frozen=True)
-class PrescribedForce(NormalLaw):
-    """A constant normal force [N]."""
-
-    kernel: ClassVar = _prescribed
-    extensive: ClassVar = frozenset({"force"})
-    penetration_scale: ClassVar = 10e-6
-
-    force: PerNode = 14.0
-
-    def stored_energy(self, penetration: Array, share: Array) -> Array:
-        """Zero."""
-        return 0.0 * penetration
-
-
-@signal
-def _held(t, p):  # type: ignore[no-untyped-def]
-    return p[0], 0.0
-
-
-@dataclass(frozen=True)
-class HeldSpring(Drive):
-    """Springs at B whose other ends rest at amplitude_x, amplitude_y."""
-
-    motion_kernel: ClassVar = _held
 
 
 @dataclass(frozen=True)
@@ -149,7 +117,7 @@ def beam(name: str, nodes: int, modes: int, speed: float = 0.01) -> Problem:
     system = ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0), friction=FRICTION,
         ground=Ground(speed=speed), load=Load(14.0),
-        drive=HeldSpring(stiffness_x=5610.0, damping_x=0.768, amplitude_x=-pull / 5610.0))
+        drive=Drive(stiffness_x=5610.0, damping_x=0.768, motion_x=Constant(-pull / 5610.0)))
     rigid_depth = 14.0 / 0.3e6 + 0.5 * 5.2e-6
     target = np.zeros((len(basis.T), 2))
     target[:, 1] = -rigid_depth

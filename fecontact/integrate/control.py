@@ -9,21 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.contact_energy import POWERS
-from fecontact.integrate import stepping
-from fecontact.integrate.scipy_solvers import longest_step
-from fecontact.laws.contract import ground_profile
+from fecontact.integrate import run_arrays, stepping
+from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
 
-FRICTION_PART = 0.01
+# Slip velocities are resolved to this part of their distance from stick. Where friction falls
+# with slip velocity, what is left undetermined there decides when a contact breaks away.
+_SLIP_PART = 0.01
 # Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
 _SLOW = 20.0
-
-
-@ground_profile
-def _flat(xi, p):  # type: ignore[no-untyped-def]
-    return 0.0, 0.0, 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,30 +41,30 @@ class Run:
     arrays: Any
     shapes: Array
     times: Array
-    control: stepping.Control
-    progress: stepping.Progress
-    room: stepping.Room
+    control: Control
+    progress: Progress
+    room: Room
     states: Array
     work: Array
 
     @property
     def outputs(self) -> int:
         """Number of output times passed."""
-        return int(self.progress.counts[stepping.OUTPUTS])
+        return int(self.progress.counts[run_arrays.OUTPUTS])
 
     @property
     def time(self) -> float:
         """Time reached [s]."""
-        return float(self.progress.numbers[stepping.TIME])
+        return float(self.progress.numbers[run_arrays.TIME])
 
     @property
     def statistics(self) -> dict[str, int]:
         """Counts of steps, rejected steps, right-hand sides and Jacobians."""
         counts = self.progress.counts
-        return {"steps": int(counts[stepping.STEPS]),
-                "rejected": int(counts[stepping.REJECTIONS]),
-                "right_hand_sides": int(counts[stepping.RATES]),
-                "jacobians": int(counts[stepping.STEPS]) + 1}
+        return {"steps": int(counts[run_arrays.STEPS]),
+                "rejected": int(counts[run_arrays.REJECTIONS]),
+                "right_hand_sides": int(counts[run_arrays.RATES]),
+                "jacobians": int(counts[run_arrays.STEPS]) + 1}
 
     def advance(self, steps: int) -> int:
         """At most so many steps more; returns the status."""
@@ -83,8 +79,6 @@ def start(
     *,
     rtol: float,
     work: bool = True,
-    breaks: Array | None = None,
-    friction_part: float = FRICTION_PART,
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -103,42 +97,54 @@ def start(
         from rest, or of the width of the smoothing.
     work : bool
         Whether to integrate the powers.
-    breaks : (k,) array, optional
-        Times at which what is given in time has jumps or kinks; steps end there.
     """
-    arrays, basis = system.arrays, system.basis
-    if system.ground.shortest_wavelength is None:
-        arrays = arrays._replace(profile=_flat.address)
+    basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
+    times = np.array(times, dtype=float)
     largest = np.abs(basis.T[:, :2]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
-    slip_scale = np.empty(n)
+    slip_scale, depth = np.empty(n), np.empty(n)
     for nodes, _, law in system.law_groups("friction"):
         slip_scale[nodes] = law.velocity_scale
-    depth = np.empty(n)
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
-    longest = 5.0 * longest_step(system, times)
-    velocity_scale = system.velocity_scale
+    longest = longest_step(system, times)
+    control = Control(
+        displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
+        slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
+        breaks=_breakpoints(system, times), rtol=float(rtol), slip_part=_SLIP_PART,
+        longest=longest, speed_scale=system.velocity_scale, work=int(work))
     acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
-    first = 0.1 * velocity_scale / max(float(acceleration.max()), 1e-300)
-    control = stepping.Control(
-        displacement_scale=system.penetration_scale / largest,
-        memory_scale=system.memory_scales, slip_scale=slip_scale, depth=depth, slow=_SLOW * slip_scale,
-        largest=largest, breaks=np.array([] if breaks is None else breaks, dtype=float), rtol=float(rtol),
-        friction_part=friction_part, longest=longest, velocity_scale=velocity_scale,
-        work=int(work))
-    numbers = np.zeros(stepping.NUMBERS)
-    numbers[stepping.TIME] = times[0]
-    numbers[stepping.STEP] = min(first, 1e-2 * longest)
-    progress = stepping.Progress(
-        numbers, np.zeros(stepping.COUNTS, dtype=np.int64), np.array(state, dtype=float),
-        np.zeros(len(state)), np.zeros(m), np.zeros(len(POWERS) + n), np.zeros(len(POWERS) + n),
-        np.zeros((n, 3, 4)), np.zeros((n, 3 + states)), np.zeros((n, states, 3 + states)))
-    return Run(arrays, np.vstack([arrays.Tx, arrays.Ty]).T.copy(), np.array(times, dtype=float),
-               control, progress, stepping.room_for(m, n, states),
-               np.zeros((len(times), len(state))),
-               np.zeros((len(times), len(POWERS) + n)))
+    first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
+                0.01 * longest)
+    return Run(
+        system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), times, control,
+        progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
+        np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)))
+
+
+def longest_step(system: ContactSystem, times: Array) -> float:
+    """A tenth of the run, a quarter of the shortest period of drive, loads and waves [s].
+
+    The stages of a step meet these at five times; longer steps could miss them.
+    """
+    limits = [(times[-1] - times[0]) / 10.0]
+    given = [motion for motion in system.drive.motions if motion.largest > 0.0]
+    given += [force.signal for force in system.load.forces]
+    limits += [source.shortest_period / 4.0 for source in given
+               if source.shortest_period is not None]
+    wavelength = system.ground.shortest_wavelength
+    speed = system.ground.largest_speed(float(times[0]), float(times[-1]))
+    if wavelength is not None and speed > 0.0:
+        limits.append(wavelength / speed / 4.0)
+    return float(min(limits))
+
+
+def _breakpoints(system: ContactSystem, times: Array) -> Array:
+    given = [*system.drive.motions, *(force.signal for force in system.load.forces), system.ground]
+    start, end = float(times[0]), float(times[-1])
+    return np.array(sorted({time for one in given for time in one.breakpoints(start, end)}),
+                    dtype=float)
 
 
 def finish(run: Run, progress: Callable[[float], None] | None = None, seconds: float = 0.2) -> int:

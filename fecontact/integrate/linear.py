@@ -48,6 +48,14 @@ REDUCED = types.NamedTuple(
     [matrix, matrix, integers, block, matrix, vector, matrix, matrix], Reduced)
 
 
+def reduced_for(modes: int, nodes: int, states: int) -> Reduced:
+    """Zeros for a system of so many modes, contact nodes and internal variables per node."""
+    return Reduced(
+        np.zeros((modes, 2 * modes)), np.zeros((modes, modes)), np.zeros(modes, dtype=np.int64),
+        np.zeros((nodes, states, states)), np.zeros((nodes, states)), np.zeros(modes),
+        np.zeros((4, 2 * nodes)), np.zeros((2 * modes, 2 * nodes)))
+
+
 @inlined
 def factorise(a, pivots):  # type: ignore[no-untyped-def]
     """LU factors of a (k, k) in place, with row interchanges; the diagonal is inverted."""
