@@ -1,0 +1,144 @@
+"""The problems on which time integrators are compared."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact import (
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    ExponentialFriction,
+    Ground,
+    Load,
+    Material,
+    Mesh,
+    ModalBasis,
+    PrescribedForce,
+    RoughSurface,
+)
+from fecontact.laws.signals import Constant
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A system, its start, its output times, and what is compared.
+
+    ``observed`` (k, 2 m) gives the quantities whose errors count from the state; the error is
+    the largest deviation of each over its own largest reference value, the worst of all.
+    """
+
+    name: str
+    system: ContactSystem
+    state: Array
+    times: Array
+    observed: Array
+
+    def error(self, states: Array, reference: Array) -> float:
+        """Error of states (N, 2 m)."""
+        wanted = reference @ self.observed.T
+        found = states @ self.observed.T
+        return float((np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max())
+
+
+FRICTION = ExponentialFriction(0.8, 0.55, 1000.0, 1e6)
+_BELT_MASS, _STOP_MASS = 5.632, 0.092
+
+
+def _basis(w: list[float], damping: list[float], B: list[list[float]],
+           contact: list[list[float]]) -> ModalBasis:
+    T = np.zeros((3, 3, len(w)))
+    T[0, :2], T[1, :2], T[2, :2] = B, contact, contact
+    frequencies = np.array(w)
+    return ModalBasis(frequencies, np.diag(2.0 * np.array(damping) * frequencies), T,
+                      np.zeros((3, 2)), np.ones(1))
+
+
+def _observed(basis: ModalBasis, entries: list[tuple[int, int, int]]) -> Array:
+    """Rows of (point, axis, derivative)."""
+    rows = np.zeros((len(entries), 2, basis.modes))
+    for row, (point, axis, derivative) in zip(rows, entries, strict=True):
+        row[derivative] = basis.T[point, axis]
+    return rows.reshape(len(entries), -1)
+
+
+def impact_oscillator(periods: int = 50, outputs: int = 200) -> Problem:
+    """(a): section 3 at 64.32 rad/s, the rigid mode alone."""
+    w, r = 64.32, 1.0 / np.sqrt(_STOP_MASS)
+    basis = _basis([0.0], [0.0], [[0.0], [r]], [[0.0], [r]])
+    system = ContactSystem(
+        basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
+        drive=Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
+                    angular_frequency=w))
+    times = np.linspace(0.0, periods * 2.0 * np.pi / w, periods * outputs + 1)
+    return Problem("a", system, np.zeros(2), times, _observed(basis, [(0, 1, 0), (0, 1, 1)]))
+
+
+def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Problem:
+    """(b), (b2), (c): section 4 with one, two and three modes."""
+    w, r = 13.8, 1.0 / np.sqrt(_BELT_MASS)
+    elastic = 2.0 * np.pi * 30.0
+    basis = {
+        "b": lambda: _basis([0.0], [0.0], [[r], [0.0]], [[r], [0.0]]),
+        "b2": lambda: _basis([0.0, 0.0], [0.0, 0.0], [[r, 0.0], [0.0, r]], [[r, 0.0], [0.0, r]]),
+        "c": lambda: _basis([0.0, 0.0, elastic], [0.0, 0.0, 0.01],
+                            [[r, 0.0, 0.5 * r], [0.0, r, 0.0]],
+                            [[r, 0.0, -0.5 * r], [0.0, r, 0.0]]),
+    }[name]()
+    normal = PrescribedForce(14.0) if name == "b" else RoughSurface(10e6, 10e-6, 40.0)
+    system = ContactSystem(
+        basis, normal=normal, friction=FRICTION, ground=Ground(speed=1e-3),
+        drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3, angular_frequency=w),
+        load=Load(14.0))
+    times = np.linspace(0.0, periods * 2.0 * np.pi / w, periods * outputs + 1)
+    entries = [(0, 0, 0), (0, 0, 1)] + ([] if name == "b" else [(0, 1, 0)])
+    return Problem(name, system, np.zeros(2 * basis.modes), times, _observed(basis, entries))
+
+
+def _beam_mesh(columns: int = 39, rows: int = 4, length: float = 0.2, height: float = 0.02) -> Mesh:
+    x, y = np.meshgrid(np.linspace(0.0, length, columns + 1), np.linspace(0.0, height, rows + 1))
+    number = np.arange(x.size).reshape(rows + 1, columns + 1)
+    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
+                     axis=-1).reshape(-1, 4)
+    bottom = np.column_stack([number[0, :-1], number[0, 1:]])
+    return Mesh(np.column_stack([x.ravel(), y.ravel()]), cells, {"contact": bottom})
+
+
+def beam(name: str, nodes: int, modes: int, speed: float = 0.01) -> Problem:
+    """(d), (e): a free steel beam on a belt, pulled by a spring at its left end."""
+    body = ElasticBody(_beam_mesh(), Material.named("steel"), 0.01)
+    basis = body.modal_basis(modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
+                             points={"right": (0.2, 0.01)}, damping=0.01)
+    pull = 9.5
+    system = ContactSystem(
+        basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0), friction=FRICTION,
+        ground=Ground(speed=speed), load=Load(14.0),
+        drive=Drive(stiffness_x=5610.0, damping_x=0.768, motion_x=Constant(-pull / 5610.0)))
+    rigid_depth = 14.0 / 0.3e6 + 0.5 * 5.2e-6
+    target = np.zeros((len(basis.T), 2))
+    target[:, 1] = -rigid_depth
+    used = basis.T[:, :2].reshape(-1, modes)[:, :3]
+    state = np.zeros(2 * modes)
+    state[:3] = np.linalg.lstsq(used, target.reshape(-1), rcond=None)[0]
+    end = len(basis.T) - 1
+    observed = _observed(basis, [(0, 0, 0), (0, 0, 1), (0, 1, 0), (end, 1, 0)])
+    return Problem(name, system, state, np.linspace(0.0, 0.1, 2001), observed)
+
+
+PROBLEMS: dict[str, Callable[[], Problem]] = {
+    "a": impact_oscillator,
+    "b": lambda: friction_oscillator("b"),
+    "b2": lambda: friction_oscillator("b2"),
+    "c": lambda: friction_oscillator("c"),
+    "d": lambda: beam("d", 40, 20),
+    "e": lambda: beam("e", 400, 40),
+}
+
+
+def shortened(problem: Problem, part: float) -> Problem:
+    """The first part of a problem."""
+    return replace(problem, times=problem.times[: 1 + int(part * (len(problem.times) - 1))])

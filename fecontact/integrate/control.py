@@ -1,0 +1,161 @@
+"""Running the compiled integrator: tolerances, pieces of a run, interrupts, checkpoints."""
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.contact_energy import POWERS
+from fecontact.integrate import run_arrays, stepping
+from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
+from fecontact.system import ContactSystem
+
+Array = NDArray[np.float64]
+
+# Slip velocities are resolved to this part of their distance from stick. Where friction falls
+# with slip velocity, what is left undetermined there decides when a contact breaks away.
+_SLIP_PART = 0.01
+# Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
+_SLOW = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run of the compiled integrator that can be left and taken up again.
+
+    Attributes
+    ----------
+    status : int
+        ``stepping.RUNNING`` while output times are left, ``FINISHED``, ``MINIMUM_STEP`` or
+        ``NOT_FINITE``.
+    states, work : arrays (N, 2 m + n s), (N, 8 + n)
+        At the output times; rows from ``outputs`` on are not filled yet. Work of the powers
+        :data:`fecontact.contact_energy.POWERS`, then friction work of each node [J].
+    progress : Progress
+        All that is needed to go on.
+    """
+
+    arrays: Any
+    shapes: Array
+    times: Array
+    control: Control
+    progress: Progress
+    room: Room
+    states: Array
+    work: Array
+
+    @property
+    def outputs(self) -> int:
+        """Number of output times passed."""
+        return int(self.progress.counts[run_arrays.OUTPUTS])
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return float(self.progress.numbers[run_arrays.TIME])
+
+    @property
+    def statistics(self) -> dict[str, int]:
+        """Counts of steps, rejected steps, right-hand sides and Jacobians."""
+        counts = self.progress.counts
+        return {"steps": int(counts[run_arrays.STEPS]),
+                "rejected": int(counts[run_arrays.REJECTIONS]),
+                "right_hand_sides": int(counts[run_arrays.RATES]),
+                "jacobians": int(counts[run_arrays.STEPS]) + 1}
+
+    def advance(self, steps: int) -> int:
+        """At most so many steps more; returns the status."""
+        return int(stepping.advance(self.arrays, self.shapes, self.times, self.control,
+                                    self.progress, self.room, steps, self.states, self.work))
+
+
+def start(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float,
+    work: bool = True,
+) -> Run:
+    """A run from ``times[0]``, before its first step.
+
+    Parameters
+    ----------
+    system : ContactSystem
+    state : (2 m + n s,) array
+        y = [q, q', z] at the start.
+    times : (N,) array
+        Output times, ascending [s].
+    rtol : float
+        Error of one step: of each modal displacement relative to its largest value so far, or to
+        the penetration scale of the normal laws where that is more; of modal velocities relative
+        to the largest so far; of internal variables relative to their scale. At nodes with
+        friction without memory slip velocities are resolved to a hundredth of their distance
+        from rest, or of the width of the smoothing.
+    work : bool
+        Whether to integrate the powers.
+    """
+    basis = system.basis
+    m, n, states = basis.modes, basis.contact_nodes, system.memory
+    times = np.array(times, dtype=float)
+    largest = np.abs(basis.T[:, :2]).max(axis=(0, 1))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    slip_scale, depth = np.empty(n), np.empty(n)
+    for nodes, _, law in system.law_groups("friction"):
+        slip_scale[nodes] = law.velocity_scale
+    for nodes, _, law in system.law_groups("normal"):
+        depth[nodes] = law.penetration_scale
+    longest = longest_step(system, times)
+    control = Control(
+        displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
+        slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
+        breaks=_breakpoints(system, times), rtol=float(rtol), slip_part=_SLIP_PART,
+        longest=longest, speed_scale=system.velocity_scale, work=int(work))
+    acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
+    first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
+                0.01 * longest)
+    return Run(
+        system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), times, control,
+        progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
+        np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)))
+
+
+def longest_step(system: ContactSystem, times: Array) -> float:
+    """A tenth of the run, a quarter of the shortest period of drive, loads and waves [s].
+
+    The stages of a step meet these at five times; longer steps could miss them.
+    """
+    limits = [(times[-1] - times[0]) / 10.0]
+    given = [motion for motion in system.drive.motions if motion.largest > 0.0]
+    given += [force.signal for force in system.load.forces]
+    limits += [source.shortest_period / 4.0 for source in given
+               if source.shortest_period is not None]
+    wavelength = system.ground.shortest_wavelength
+    speed = system.ground.largest_speed(float(times[0]), float(times[-1]))
+    if wavelength is not None and speed > 0.0:
+        limits.append(wavelength / speed / 4.0)
+    return float(min(limits))
+
+
+def _breakpoints(system: ContactSystem, times: Array) -> Array:
+    given = [*system.drive.motions, *(force.signal for force in system.load.forces), system.ground]
+    start, end = float(times[0]), float(times[-1])
+    return np.array(sorted({time for one in given for time in one.breakpoints(start, end)}),
+                    dtype=float)
+
+
+def finish(run: Run, progress: Callable[[float], None] | None = None, seconds: float = 0.2) -> int:
+    """Go on to the end, a failure or Ctrl-C, reporting about every ``seconds``; the status."""
+    steps = 1000
+    while True:
+        begin = clock.perf_counter()
+        status = run.advance(steps)
+        if progress is not None:
+            progress(run.time)
+        if status != stepping.RUNNING:
+            return status
+        passed = clock.perf_counter() - begin
+        steps = int(min(max(steps * seconds / max(passed, 1e-9), 100), 10 * steps))

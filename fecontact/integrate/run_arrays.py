@@ -1,0 +1,148 @@
+"""What the compiled integrator works on: limits, the state of a run, room to work in."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.compiled import f8, i8, integers, matrix, vector
+from fecontact.contact_energy import POWERS
+from fecontact.integrate import linear, motion, rodas
+
+Array = NDArray[np.float64]
+
+# Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
+# fail may still lie ahead, else zero.
+TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS = range(7)
+# Entries of Progress.counts.
+STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(6)
+
+
+class Control(NamedTuple):
+    """What limits the steps.
+
+    Attributes
+    ----------
+    displacement_scale : (m,) array
+        Modal displacements below which errors count as if the displacement were this large.
+    memory_scale : (n s,) array
+        Scales of the internal variables.
+    slip_scale, slow, depth : (n,) arrays
+        Width of the smoothing of friction, slip velocity at which slip is about to become stick,
+        penetration at which the normal law changes its character.
+    largest : (m,) array
+        Largest motion of each mode at any point.
+    breaks : (k,) array
+        Times to step on to.
+    rtol, slip_part, longest, speed_scale : float
+        Relative tolerance, part of the distance from stick to which slip velocities are resolved,
+        longest step [s], velocity below which errors count as if the velocity were this large.
+    work : int
+        Whether to integrate the powers.
+    """
+
+    displacement_scale: Array
+    memory_scale: Array
+    slip_scale: Array
+    slow: Array
+    depth: Array
+    largest: Array
+    breaks: Array
+    rtol: float
+    slip_part: float
+    longest: float
+    speed_scale: float
+    work: int
+
+
+CONTROL = types.NamedTuple([vector] * 7 + [f8] * 4 + [i8], Control)
+
+
+class Progress(NamedTuple):
+    """All that a run needs to go on, bit for bit; copies of the arrays are a checkpoint.
+
+    Attributes
+    ----------
+    numbers, counts : arrays
+        See the names of their entries in this module.
+    state, rate : (size,) arrays
+        y and y'.
+    extremes : (m,) array
+        Largest modal displacements so far.
+    work, power : (8 + n,) arrays
+        Work so far and powers, of the system and of each node's friction.
+    gradients : Gradients
+        Derivatives of the node forces.
+    """
+
+    numbers: Array
+    counts: NDArray[np.int64]
+    state: Array
+    rate: Array
+    extremes: Array
+    work: Array
+    power: Array
+    gradients: motion.Gradients
+
+
+PROGRESS = types.NamedTuple(
+    [vector, integers, vector, vector, vector, vector, vector, motion.GRADIENTS], Progress)
+
+
+class Room(NamedTuple):
+    """Room to work in.
+
+    Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
+    what the names say; ``nodes`` (3, 2 n), ``given`` and ``pull`` for what acts at the time of a
+    stage, ``power`` (4, 8 + n) for a quadrature.
+    """
+
+    stages: Array
+    dense: Array
+    stage: Array
+    right: Array
+    base: Array
+    time_rate: Array
+    after: Array
+    rate_after: Array
+    nodes: Array
+    given: Array
+    pull: Array
+    pull_rate: Array
+    power: Array
+    reduced: linear.Reduced
+    scratch: motion.Gradients
+    gradients_after: motion.Gradients
+
+
+ROOM = types.NamedTuple(
+    [matrix] * 2 + [vector] * 6 + [matrix] + [vector] * 3
+    + [matrix, linear.REDUCED, motion.GRADIENTS, motion.GRADIENTS], Room)
+
+
+def gradients_for(nodes: int, states: int) -> motion.Gradients:
+    """Zeros for so many contact nodes with so many internal variables each."""
+    return motion.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
+                            np.zeros((nodes, states, 3 + states)))
+
+
+def room_for(modes: int, nodes: int, states: int) -> Room:
+    """Room for a system of so many modes, contact nodes and internal variables per node."""
+    size = 2 * modes + nodes * states
+    return Room(
+        np.zeros((rodas.STAGES, size)), np.zeros((3, size)), *np.zeros((6, size)),
+        np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
+        np.zeros((4, len(POWERS) + nodes)), linear.reduced_for(modes, nodes, states),
+        gradients_for(nodes, states), gradients_for(nodes, states))
+
+
+def progress_for(state: Array, time: float, step: float, modes: int, nodes: int) -> Progress:
+    """A run that is about to start."""
+    numbers = np.zeros(7)
+    numbers[TIME], numbers[STEP] = time, step
+    size = len(state)
+    return Progress(
+        numbers, np.zeros(6, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
+        np.zeros(modes), np.zeros(len(POWERS) + nodes), np.zeros(len(POWERS) + nodes),
+        gradients_for(nodes, (size - 2 * modes) // nodes))

@@ -1,0 +1,51 @@
+"""Work of the powers along a step, by quadrature over its dense output."""
+
+import numpy as np
+
+from fecontact.contact_energy import powers
+from fecontact.integrate.borrowed import inlined
+from fecontact.integrate import rodas
+
+# Gauss-Lobatto points: both ends and two inside; exact for powers of degree five.
+_INSIDE = 0.5 - 0.5 / np.sqrt(5.0)
+_POINTS = np.array([0.0, _INSIDE, 1.0 - _INSIDE, 1.0])
+
+
+def _lagrange_integral(k: int) -> np.ndarray:
+    """Coefficients of s ... s^4 in the integral from 0 to s of the k-th Lagrange polynomial."""
+    others = np.delete(_POINTS, k)
+    polynomial = np.polynomial.polynomial.polyfromroots(others) / np.prod(_POINTS[k] - others)
+    return np.polynomial.polynomial.polyint(polynomial)[1:]
+
+
+_INTEGRALS = np.array([_lagrange_integral(k) for k in range(4)])
+
+
+@inlined
+def add_up(t, h, latest, s, progress, room):  # type: ignore[no-untyped-def]
+    """Fill ``room.power`` with the powers at the points of a step."""
+    for k in range(len(progress.power)):
+        room.power[0, k] = progress.power[k]
+    for point in range(1, 4):
+        if point < 3:
+            rodas.interpolated(_POINTS[point], progress.state, room.after, room.dense, room.right)
+            state = room.right
+        else:
+            state = room.after
+        powers(min(t + _POINTS[point] * h, latest), state, s, room.power[point, :8],
+               room.power[point, 8:])
+
+
+@inlined
+def work_until(part, h, before, power, out):  # type: ignore[no-untyped-def]
+    """out = work ``before`` the step and in its part, by the cubic through the powers."""
+    w0, w1, w2, w3 = _weight(0, part), _weight(1, part), _weight(2, part), _weight(3, part)
+    for k in range(len(out)):
+        out[k] = before[k] + h * (w0 * power[0, k] + w1 * power[1, k] + w2 * power[2, k]
+                                  + w3 * power[3, k])
+
+
+@inlined
+def _weight(k, part):  # type: ignore[no-untyped-def]
+    c = _INTEGRALS[k]
+    return part * (c[0] + part * (c[1] + part * (c[2] + part * c[3])))
