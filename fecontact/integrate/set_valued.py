@@ -191,7 +191,8 @@ def _problem(
         [np.pad(table, ((0, 0), (0, width - table.shape[1]))) for table in tables]))
     cluster, rows = _clusters(arrays.Tx)
     problem = nodes.Problem(arrays, _static(static_coefficient, n), cluster, rows,
-                            1e-4 * longest, -1.0 if restitution is None else float(restitution))
+                            1e-4 * longest, -1.0 if restitution is None else float(restitution),
+                            nodes.compiled_derivative.address)
     if restitution is not None:
         _require_free_stops(system, groups, problem)
     return problem

@@ -24,7 +24,6 @@ from fecontact.integrate.set_valued_nodes import (
     SLOPE,
     STICK,
     derivative,
-    observe,
     solve,
     speed_rate,
 )
@@ -92,7 +91,6 @@ def decide_clusters(t, Y, p, released, near, status, fresh, closed, w, out):  # 
     those that begin to slip from no slip velocity. Returns how often a force was decided.
     """
     clusters, m = p.rows.shape
-    observe(t, Y, p, w.nodes)
     derivative(t, Y, p, status, closed, w, out)
     candidate, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
     for c in range(clusters):
@@ -220,10 +218,10 @@ def decide_stops(t, Y, p, touched, parting, slow, height, status, closed, fresh,
     for j in range(n):
         touching[j] = touched[j] or closed[j] or parting[j]
         fresh[j] = False
-    observe(t, Y, p, w.nodes)
+    derivative(t, Y, p, status, closed, w, out)
     if _pack(touched, w, PENETRATION):
         _push(p, touched, w, Y, 0)
-    observe(t, Y, p, w.nodes)
+    derivative(t, Y, p, status, closed, w, out)
     before = 0.0
     for i in range(m):
         before += 0.5 * Y[m + i] * Y[m + i]
@@ -240,7 +238,7 @@ def decide_stops(t, Y, p, touched, parting, slow, height, status, closed, fresh,
         before -= 0.5 * Y[m + i] * Y[m + i]
     Y[2 * m + 6] += before
 
-    observe(t, Y, p, w.nodes)
+    derivative(t, Y, p, status, closed, w, out)
     closed[:] = False
     derivative(t, Y, p, status, closed, w, out)
     pressed = np.empty(n)

@@ -16,7 +16,16 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import f8, helper, integers, matrix, vector
+from fecontact.compiled import (
+    compile_law,
+    f8,
+    function_at,
+    helper,
+    i8,
+    integers,
+    matrix,
+    vector,
+)
 from fecontact.contact_kernels import SYSTEM, node_motion
 from fecontact.laws.contract import friction_at, ground_at, normal_at, signal_at
 
@@ -49,7 +58,8 @@ class Problem(NamedTuple):
     ``system`` has unsmoothed friction; ``static`` (n,) is the coefficient that limits stick, below
     zero for the law's own; ``cluster`` (n,) is the cluster of each node, ``rows`` (k, m) are those
     of the clusters; ``tick`` is the time over which the ground's speed is differentiated;
-    ``restitution`` is below zero for compliant contact.
+    ``restitution`` is below zero for compliant contact; ``derivative`` the address of
+    :data:`compiled_derivative`.
     """
 
     system: Any
@@ -58,9 +68,10 @@ class Problem(NamedTuple):
     rows: Array
     tick: float
     restitution: float
+    derivative: int
 
 
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8], Problem)
+PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, i8], Problem)
 
 
 class Workspace(NamedTuple):
@@ -75,6 +86,19 @@ class Workspace(NamedTuple):
     matrix: Array
     right: Array
     index: Integers
+
+
+WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, matrix, vector,
+                              integers], Workspace)
+# Y' is evaluated in many places; behind an address its code is not copied into each of them.
+DERIVATIVE = types.void(f8, vector, PROBLEM, integers, integers, WORKSPACE, vector)
+_derivative_at = function_at(DERIVATIVE)
+
+
+@helper
+def derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
+    """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
+    _derivative_at(p.derivative)(t, Y, p, status, closed, w, out)
 
 
 @helper
@@ -279,8 +303,7 @@ def hold_clusters(t, p, status, w, acceleration):  # type: ignore[no-untyped-def
             acceleration[i] -= p.rows[c, i] * w.right[a]
 
 
-@helper
-def derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
+def _derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
     s = p.system
     n, m = s.Tx.shape
@@ -318,6 +341,10 @@ def derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
                 w.friction[j] = w.total[c] * w.nodes[j, LIMIT] / w.limit[c]
     body_powers(t, Y, s, out[2 * m :])
     contact_powers(t, s, w.nodes, w.friction, p.restitution < 0.0, out[2 * m :])
+
+
+compiled_derivative = compile_law(DERIVATIVE, "derivative(t, Y, p, status, closed, w, out)",
+                                  _derivative)
 
 
 @helper
