@@ -165,10 +165,18 @@ def modes(
 
 
 @app.command(sort_key=4)
-def run(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> int:
+def run(
+    study: StudyFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Folder = None,
+    resume: Annotated[bool, Parameter(
+        negative=(), help="Go on with a run that was interrupted.")] = False,
+) -> int:
     """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
 
-    Ctrl-C stops the run; what was computed until then is written.
+    Ctrl-C stops the run; what was computed until then is written, and --resume goes on from there.
     """
     from fecontact.console import output_folder, progress_bar, waiting
     from fecontact.report import notes, run_table
@@ -179,17 +187,24 @@ def run(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             described.system()
+        checkpoint = folder / f"{described.name}.checkpoint"
+        if not resume:
+            checkpoint.unlink(missing_ok=True)
+        elif not checkpoint.exists():
+            raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
+                             f"exist; run the study without --resume.")
         with progress_bar("Running", t_end, described.simulation.t_start) as progress:
-            trajectory = described.run(progress)
+            trajectory = described.run(progress, checkpoint)
         with waiting("Writing"):
             files = write_run(described, trajectory, folder)
         _show(run_table(trajectory))
         for note in notes(trajectory):
             _say(f"note: {note}")
         _say_written(*files)
-    if trajectory.status.name == "FAILED":
+    ended = trajectory.status.name
+    if ended not in ("FINISHED", "INTERRUPTED"):
         return _complain("the run did not reach its end; what was computed is written.", 1)
-    return INTERRUPTED if trajectory.status.name == "INTERRUPTED" else 0
+    return INTERRUPTED if ended == "INTERRUPTED" else 0
 
 
 @app.command(sort_key=5)

@@ -89,7 +89,8 @@ def notes(trajectory: "Trajectory") -> list[str]:
 
     found = []
     if trajectory.status is not Status.FINISHED:
-        found.append(trajectory.status.value)
+        message = trajectory.statistics.get("message")
+        found.append(trajectory.status.value + (f" {message}" if message else ""))
     slope = trajectory.system.ground.steepest_slope
     if slope > ROUGH_SLOPE:
         found.append(f"The ground's slope reaches {slope:.2f}; above {ROUGH_SLOPE} it is a rough "

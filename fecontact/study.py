@@ -263,8 +263,13 @@ class Study:
                     raise InputError(f"{title}: [{part}]: {message}") from None
             raise InputError(f"{title}: {error}") from None
 
-    def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run the study from ``t_start`` to ``t_end``; ``progress`` is called with the time [s]."""
+    def run(
+        self, progress: Callable[[float], None] | None = None, checkpoint: Path | None = None
+    ) -> Trajectory:
+        """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
+
+        The checkpoint is left out for methods that have none.
+        """
         settings, t_end, system = self.simulation, self.t_end, self.system()
         with located(f"{_title(self.path)}: [output]:"):
             # Found out after a long run, a wrong name would be found out too late.
@@ -273,7 +278,9 @@ class Study:
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=settings.initial, outputs=settings.outputs,
-                            method=settings.method, rtol=settings.rtol, progress=progress)
+                            method=settings.method, rtol=settings.rtol,
+                            restitution=settings.restitution, progress=progress,
+                            checkpoint=checkpoint if settings.method == "Rodas5P" else None)
 
     @cached_property
     def _mesh(self) -> Mesh:

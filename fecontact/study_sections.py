@@ -212,9 +212,11 @@ class SimulationSettings:
     outputs : int
         Number of equally spaced output times, both ends included.
     method : str
-        Integrator.
+        Integrator: 'Rodas5P', compiled; 'Radau', 'BDF', 'LSODA' of scipy; 'set-valued' friction.
     rtol : float
         Relative tolerance.
+    restitution : float, optional
+        For 'set-valued': rigid stops with this coefficient in place of the normal law.
     initial : 'rest', 'sliding' or RigidStart
         Where it starts; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid
         motion.
@@ -223,8 +225,9 @@ class SimulationSettings:
     t_end: float | None = None
     t_start: float = 0.0
     outputs: int = 1001
-    method: str = "Radau"
+    method: str = "Rodas5P"
     rtol: float = 1e-6
+    restitution: float | None = None
     initial: Literal["rest", "sliding"] | RigidStart = "rest"
 
     def __post_init__(self) -> None:

@@ -3,6 +3,7 @@
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 
 from fecontact.contact_energy import POWERS
 from fecontact.integrate import run_arrays, stepping
+from fecontact.integrate.checkpoint import Checkpoint
 from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
+from fecontact.integrate.trajectory import Status
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -112,7 +115,7 @@ def start(
     control = Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
-        breaks=_breakpoints(system, times), rtol=float(rtol), slip_part=_SLIP_PART,
+        breaks=np.array(system.breakpoints(float(times[0]), float(times[-1]))), rtol=float(rtol), slip_part=_SLIP_PART,
         longest=longest, speed_scale=system.velocity_scale, work=int(work))
     acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
     first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
@@ -140,15 +143,14 @@ def longest_step(system: ContactSystem, times: Array) -> float:
     return float(min(limits))
 
 
-def _breakpoints(system: ContactSystem, times: Array) -> Array:
-    given = [*system.drive.motions, *(force.signal for force in system.load.forces), system.ground]
-    start, end = float(times[0]), float(times[-1])
-    return np.array(sorted({time for one in given for time in one.breakpoints(start, end)}),
-                    dtype=float)
+def finish(
+    run: Run, progress: Callable[[float], None] | None = None, seconds: float = 0.2,
+    keep: Callable[[], None] | None = None,
+) -> int:
+    """Go on to the end or a failure, reporting about every ``seconds``; the status.
 
-
-def finish(run: Run, progress: Callable[[float], None] | None = None, seconds: float = 0.2) -> int:
-    """Go on to the end, a failure or Ctrl-C, reporting about every ``seconds``; the status."""
+    ``keep`` is called after every piece of the run.
+    """
     steps = 1000
     while True:
         begin = clock.perf_counter()
@@ -157,5 +159,63 @@ def finish(run: Run, progress: Callable[[float], None] | None = None, seconds: f
             progress(run.time)
         if status != stepping.RUNNING:
             return status
+        if keep is not None:
+            keep()
         passed = clock.perf_counter() - begin
         steps = int(min(max(steps * seconds / max(passed, 1e-9), 100), 10 * steps))
+
+
+def integrate(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Path | None = None,
+) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
+    """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`.
+
+    Returns
+    -------
+    times (k,), states (k, 2 m + n s), work (k, 8 + n), status, statistics
+        If the run ended early, those until then, and the last state that was reached.
+    """
+    begin = clock.perf_counter()
+    run = start(system, state, times, rtol=rtol)
+    kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
+    if kept is not None:
+        kept.read()
+    ended, result = None, stepping.RUNNING
+    try:
+        result = finish(run, progress, keep=None if kept is None else kept.keep)
+    except KeyboardInterrupt:
+        ended = Status.INTERRUPTED
+        if kept is not None:
+            kept.write()
+    statistics: dict[str, Any] = {"method": "Rodas5P", "rtol": rtol, **run.statistics,
+                                  "seconds": clock.perf_counter() - begin}
+    if ended is None:
+        ended = _ENDS[result]
+        if kept is not None:
+            kept.remove()
+    if ended is not Status.FINISHED:
+        statistics["message"] = f"{_place(run, ended)}"
+    done = run.outputs
+    times, states, work = run.times[:done], run.states[:done], run.work[:done]
+    last = run.progress.state
+    if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
+        times = np.append(times, run.time)
+        states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
+    return times, states, work, ended, statistics
+
+
+_ENDS = {stepping.FINISHED: Status.FINISHED, stepping.MINIMUM_STEP: Status.MINIMUM_STEP,
+         stepping.NOT_FINITE: Status.NOT_FINITE}
+
+
+def _place(run: Run, ended: Status) -> str:
+    where = f"It ended at t = {run.time:.9g} s"
+    if ended is Status.MINIMUM_STEP and run.progress.counts[run_arrays.REJECTIONS]:
+        where += f", near contact node {int(run.progress.counts[run_arrays.WORST_NODE])}"
+    return f"{where}."

@@ -2,16 +2,19 @@
 
 from collections.abc import Callable
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.contact_energy import POWERS
 from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.initial import Initial, initial_state
-from fecontact.integrate.scipy_solvers import METHODS, integrate
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system import ContactSystem
+
+METHODS = ("Rodas5P", "Radau", "BDF", "LSODA", "set-valued")
 
 
 def simulate(
@@ -21,8 +24,10 @@ def simulate(
     t_start: float | None = None,
     initial: Initial = "rest",
     outputs: int | ArrayLike = 1001,
-    method: str = "Radau",
+    method: str = "Rodas5P",
     rtol: float = 1e-6,
+    restitution: float | None = None,
+    checkpoint: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Integrate a contact system in time.
@@ -40,13 +45,20 @@ def simulate(
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or the times themselves,
         ascending, the first ``t_start``, the last ``t_end``.
-    method : 'Radau', 'BDF' or 'LSODA'
-        Stiff solver of scipy.
+    method : 'Rodas5P', 'Radau', 'BDF', 'LSODA' or 'set-valued'
+        The compiled integrator; a stiff solver of scipy, as a reference; or friction without
+        smoothing, sticking by constraint.
     rtol : float
-        Relative tolerance; absolute ones follow from it, the roughness height and the width of
-        the friction smoothing.
+        Relative tolerance; absolute ones follow from it, the penetration scale of the normal law
+        and the width of the friction smoothing.
+    restitution : float, optional
+        For 'set-valued' alone: rigid stops with Newton's coefficient of restitution, from 0 to
+        below 1, in place of the normal law.
+    checkpoint : path, optional
+        For 'Rodas5P': a file that keeps a long run every minute and when it is interrupted. If it
+        is there, the run goes on from it, to the same numbers; at the end it is removed.
     progress : callable, optional
-        Called with the time reached [s] after every step.
+        Called with the time reached [s] now and then.
 
     Returns
     -------
@@ -57,10 +69,12 @@ def simulate(
     Raises
     ------
     InputError
-        For values out of range.
+        For values out of range, and a checkpoint of another run.
     AnalysisError
         If there is no equilibrium to start from.
     """
+    if not isinstance(system, ContactSystem):
+        raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")
     if t_start is None:
         t_start = float(initial.time[-1]) if isinstance(initial, Trajectory) else 0.0
     times = _output_times(t_start, t_end, outputs)
@@ -69,12 +83,39 @@ def simulate(
     if method not in METHODS:
         raise InputError(f"method = {method!r} must be one of {choices(METHODS)}"
                          f"{nearest(str(method), METHODS)}.")
+    if restitution is not None and method != "set-valued":
+        raise InputError(f"restitution = {restitution!r} is for method = 'set-valued' alone; a "
+                         f"normal law has its own damping.")
+    if checkpoint is not None and method != "Rodas5P":
+        raise InputError(f"A checkpoint is for method = 'Rodas5P' alone, not '{method}'.")
     state = initial_state(system, initial, t_start)
-    reached, states, work, status, statistics = integrate(
-        system, state, times, method=method, rtol=rtol, progress=progress)
     m = system.basis.modes
-    return Trajectory(system, reached, states[:, :m], states[:, m : 2 * m], work, status,
-                      statistics, memory=states[:, 2 * m :] if system.memory else None)
+    rest: dict[str, Any] = {}
+    if method == "Rodas5P":
+        from fecontact.integrate.control import integrate
+
+        run = integrate(system, state, times, rtol=rtol, progress=progress,
+                        checkpoint=None if checkpoint is None else Path(checkpoint))
+        times, states, work, status, statistics = run
+        rest["node_friction_work"] = work[:, len(POWERS) :]
+        work = work[:, : len(POWERS)]
+    elif method == "set-valued":
+        from fecontact.integrate.set_valued import integrate_set_valued
+
+        found = integrate_set_valued(system, state, times, rtol=rtol, restitution=restitution,
+                                     progress=progress)
+        times, states, work = found.time, found.states, found.work
+        status, statistics = found.status, found.statistics
+        rest = {"node_friction_work": found.node_friction_work,
+                "held_normal_force": found.normal_force,
+                "held_friction_force": found.friction_force}
+    else:
+        from fecontact.integrate import scipy_solvers
+
+        times, states, work, status, statistics = scipy_solvers.integrate(
+            system, state, times, method=method, rtol=rtol, progress=progress)
+    return Trajectory(system, times, states[:, :m], states[:, m : 2 * m], work, status, statistics,
+                      memory=states[:, 2 * m :] if system.memory else None, **rest)
 
 
 def _output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:

@@ -33,7 +33,7 @@ _POWER = -1.0 / rodas.ORDER
 
 
 @inlined
-def _linearise(t, h, latest, s, shapes, control, progress, room):  # type: ignore[no-untyped-def]
+def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):  # type: ignore[no-untyped-def]
     """What a step needs of the derivatives at its start besides the matrices."""
     m = len(control.largest)
     later = min(t + 1e-4 * h, latest)
@@ -44,7 +44,7 @@ def _linearise(t, h, latest, s, shapes, control, progress, room):  # type: ignor
     for i in range(m):
         room.pull_rate[i] = 0.0
     for k in range(len(s.load)):
-        rate = signal_at(s.load[k])(t, s.load_parameters[k])[1]
+        rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
         for i in range(m):
             room.pull_rate[i] += rate * s.load_shapes[k, i]
     motion.set_time_rate(s, shapes, room.given, acceleration, progress.gradients, room.pull_rate,
@@ -189,7 +189,8 @@ def advance(  # type: ignore[no-untyped-def]
         elif target + h > stop:
             target = t + 0.5 * (stop - t)
         if new:
-            motion.set_given(t, s, room.given, room.pull)
+            # Rates just after t: they may jump at a break.
+            motion.set_given(np.nextafter(t, end), s, room.given, room.pull)
             speed = room.given[motion.SPEED]
         limited = False
         if numbers[CAUTIOUS] > 0.0:
@@ -205,7 +206,7 @@ def advance(  # type: ignore[no-untyped-def]
 
         G = 1.0 / (h * rodas.GAMMA)
         if new:
-            _linearise(t, h, latest, s, shapes, control, progress, room)
+            _linearise(t, np.nextafter(t, end), h, latest, s, shapes, control, progress, room)
         if memory:
             linear.eliminate_memory(G, s, progress.gradients, room.reduced)
         if new or memory:
@@ -217,7 +218,7 @@ def advance(  # type: ignore[no-untyped-def]
         error = _error(control, progress, room)
         if error <= 1.0:
             if is_break and target == stop:
-                motion.set_given(stop, s, room.given, room.pull)
+                motion.set_given(np.nextafter(stop, end), s, room.given, room.pull)
             motion.set_rate_and_gradients(room.after, s, shapes, room.given, room.pull, room.nodes,
                                           room.gradients_after, room.rate_after)
             error = _slip_error(error, s, shapes, control, progress, room)

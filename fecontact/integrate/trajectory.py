@@ -21,6 +21,9 @@ class Status(Enum):
 
     FINISHED = "The run reached its end."
     INTERRUPTED = "The run was interrupted; what was computed until then is kept."
+    MINIMUM_STEP = ("The steps of the integrator became too small to go on; what was computed until "
+                    "then is kept.")
+    NOT_FINITE = "The motion grew beyond all numbers; what was computed until then is kept."
     FAILED = "The integrator could not go on; what was computed until then is kept."
 
 
@@ -109,6 +112,9 @@ class Trajectory:
     node_friction_work : (N, n) array or None
         Energy lost by friction at each node [J], where the integrator has kept it; see
         :attr:`friction_work`.
+    held_normal_force, held_friction_force : (N, n) arrays or None
+        Forces of set-valued contact [N], which hold nodes in place and do not follow from the
+        state; None where laws give the forces.
     """
 
     system: ContactSystem
@@ -120,6 +126,8 @@ class Trajectory:
     statistics: dict[str, Any] = field(default_factory=dict)
     memory: Array | None = None
     node_friction_work: Array | None = None
+    held_normal_force: Array | None = None
+    held_friction_force: Array | None = None
 
     @property
     def states(self) -> Array:
@@ -159,7 +167,12 @@ class Trajectory:
 
     @cached_property
     def _contact(self) -> Array:
-        return self.system.contact_history(self.time, self.states)
+        history = self.system.contact_history(self.time, self.states)
+        for column, held in ((kernels.NORMAL_FORCE, self.held_normal_force),
+                             (kernels.FRICTION_FORCE, self.held_friction_force)):
+            if held is not None:
+                history[:, :, column] = held
+        return history
 
     @property
     def normal_force(self) -> Array:

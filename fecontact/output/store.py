@@ -16,7 +16,8 @@ from fecontact.tables import system_from_tables, system_tables
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
 _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
           "work": "J"}
-_OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J"}
+_OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
+             "held_normal_force": "N", "held_friction_force": "N"}
 _CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
             "slip_velocity": "m/s", "contact_state": "0 open, 1 stick, 2 slip"}
 
