@@ -1,55 +1,94 @@
 """The solvers that fecontact's integrator is compared with, each in its fastest form.
 
-All take the package's own compiled right-hand side, and its Jacobian where they accept one.
+All take the right-hand side that the package's integrator itself uses, compiled with everything
+but time and state frozen into it, and the compiled Jacobian where they accept one.
 """
 
-import ctypes
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from integrator_problems import Problem
+from numba import carray, cfunc, njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from fecontact import contact_jacobian, contact_kernels as kernels
+from fecontact import contact_jacobian, contact_kernels
+from fecontact.integrate import motion, run_arrays
+from fecontact.integrate.borrowed import borrowed
 
 Array = NDArray[np.float64]
 Solver = Callable[[float], Array]
 
-DISPLACEMENT = 1e-3
-VELOCITY = 1e-2
-"""Absolute tolerances per rtol of modal displacements and velocities [m sqrt(kg), .../s]."""
+# Absolute tolerances per rtol of modal displacements [m sqrt(kg)] and velocities.
+DISPLACEMENT, VELOCITY = 1e-3, 1e-2
 
 
 def absolute(problem: Problem, rtol: float) -> Array:
-    """Absolute tolerances (2 m,) for the peers that take one per component."""
-    m = problem.system.basis.modes
-    return rtol * np.repeat([DISPLACEMENT, VELOCITY], m)
+    """Absolute tolerances (2 m,)."""
+    return rtol * np.repeat([DISPLACEMENT, VELOCITY], problem.system.basis.modes)
 
 
-def _functions(problem: Problem) -> tuple[Callable[..., Array], Callable[..., Array]]:
-    arrays, size = problem.system.arrays, len(problem.state)
-    rate, matrix = np.empty(size), np.empty((size, size))
+@intrinsic
+def _pointer(typingctx: Any, address: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], cgutils.voidptr_t)
 
-    def rhs(t: float, y: Array) -> Array:
-        kernels.right_hand_side(t, y, arrays, rate)
-        return rate
+    return types.voidptr(address), codegen
 
-    def jacobian(t: float, y: Array) -> Array:
-        contact_jacobian.jacobian(t, y, arrays, matrix)
-        return matrix
 
-    return rhs, jacobian
+def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
+    """Compiled ``rate(t, y, out)`` and ``jacobian(t, y, out)``, and what must outlive them."""
+    arrays = problem.system.arrays
+    n, m = arrays.Tx.shape
+    room = {"shapes": np.vstack([arrays.Tx, arrays.Ty]).T.copy(), "given": np.zeros(motion.GIVEN),
+            "pull": np.zeros(m), "nodes": np.zeros((3, 2 * n))}
+    scratch = run_arrays.gradients_for(n, problem.system.memory)
+    held = {**room, **{f"g{k}": item for k, item in enumerate(scratch)},
+            **{f"s{k}": item for k, item in enumerate(arrays) if isinstance(item, np.ndarray)}}
+    lines = [f"    {name} = carray(pointer({item.ctypes.data}), {item.shape}, "
+             f"{'i8' if item.dtype == np.int64 else 'f8'})" for name, item in held.items()]
+    system = ", ".join(f"s{k}" if isinstance(item, np.ndarray) else str(int(item))
+                       for k, item in enumerate(arrays))
+    source = "\n".join([
+        "def rate(t, y, out):", *lines,
+        f"    s = System({system})",
+        "    set_given(t, s, given, pull)",
+        "    set_rate(borrowed(y), s, shapes, given, pull, nodes, Gradients(g0, g1, g2), "
+        "borrowed(out))",
+        "def jacobian(t, y, out):", *lines,
+        f"    fill(t, y, System({system}), out)",
+    ])
+    space: dict[str, Any] = {
+        "carray": carray, "f8": np.float64, "i8": np.int64, "pointer": _pointer,
+        "borrowed": borrowed, "set_given": motion.set_given, "set_rate": motion.set_rate,
+        "System": contact_kernels.SystemArrays, "Gradients": motion.Gradients,
+        "fill": contact_jacobian.jacobian}
+    exec(source, space)
+    options = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
+    return njit(**options)(space["rate"]), njit(**options)(space["jacobian"]), (held, arrays)
 
 
 def odeint(problem: Problem) -> Solver:
     """LSODA of ODEPACK through scipy's odeint, with Dfun."""
     from scipy.integrate import odeint as run
 
-    rhs, jacobian = _functions(problem)
+    rate, jacobian, held = _frozen(problem)
+    size = len(problem.state)
+    out, matrix = np.empty(size), np.empty((size, size))
+
+    def rhs(t: float, y: Array) -> Array:
+        rate(t, y, out)
+        return out
+
+    def derivative(t: float, y: Array) -> Array:
+        jacobian(t, y, matrix)
+        return matrix
 
     def solve(rtol: float) -> Array:
-        return np.asarray(run(rhs, problem.state, problem.times, Dfun=jacobian, tfirst=True,
+        _ = held
+        return np.asarray(run(rhs, problem.state, problem.times, Dfun=derivative, tfirst=True,
                               rtol=rtol, atol=absolute(problem, rtol), mxstep=10**8))
 
     return solve
@@ -61,14 +100,24 @@ def solve_ivp(method: str) -> Callable[[Problem], Solver]:
     def of(problem: Problem) -> Solver:
         from scipy.integrate import solve_ivp as run
 
-        rhs, jacobian = _functions(problem)
+        rate, jacobian, held = _frozen(problem)
+        size = len(problem.state)
+
+        def rhs(t: float, y: Array) -> Array:
+            out = np.empty(size)
+            rate(t, np.ascontiguousarray(y), out)
+            return out
+
+        def derivative(t: float, y: Array) -> Array:
+            out = np.empty((size, size))
+            jacobian(t, np.ascontiguousarray(y), out)
+            return out
 
         def solve(rtol: float) -> Array:
+            _ = held
             return np.asarray(run(
-                lambda t, y: rhs(t, np.ascontiguousarray(y)).copy(), problem.times[[0, -1]],
-                problem.state, method=method, t_eval=problem.times, rtol=rtol,
-                atol=absolute(problem, rtol),
-                jac=lambda t, y: jacobian(t, np.ascontiguousarray(y)).copy()).y.T)
+                rhs, problem.times[[0, -1]], problem.state, method=method, t_eval=problem.times,
+                rtol=rtol, atol=absolute(problem, rtol), jac=derivative).y.T)
 
         return solve
 
@@ -79,18 +128,23 @@ def cvode(problem: Problem) -> Solver:
     """CVODE (BDF, dense) of scikit-sundae."""
     from sksundae.cvode import CVODE
 
-    arrays = problem.system.arrays
+    rate, jacobian, held = _frozen(problem)
+    size = len(problem.state)
+    state, matrix = np.empty(size), np.empty((size, size))
 
-    def rhs(t: float, y: Array, rate: Array) -> None:
-        kernels.right_hand_side(t, y.copy(), arrays, rate)
+    # CVODE's own arrays are read-only, for which the compiled functions are not made.
+    def rhs(t: float, y: Array, out: Array) -> None:
+        state[:] = y
+        rate(t, state, out)
 
-    def jacobian(t: float, y: Array, rate: Array, out: Array) -> None:
-        matrix = np.empty(out.shape)
-        contact_jacobian.jacobian(t, y.copy(), arrays, matrix)
-        out[:] = matrix
+    def derivative(t: float, y: Array, out: Array, into: Array) -> None:
+        state[:] = y
+        jacobian(t, state, matrix)
+        into[:] = matrix
 
     def solve(rtol: float) -> Array:
-        solver = CVODE(rhs, jacfn=jacobian, method="BDF", rtol=rtol,
+        _ = held
+        solver = CVODE(rhs, jacfn=derivative, method="BDF", rtol=rtol,
                        atol=absolute(problem, rtol), max_num_steps=10**8)
         return np.asarray(solver.solve(problem.times, problem.state).y)
 
@@ -100,49 +154,35 @@ def cvode(problem: Problem) -> Solver:
 def numbalsoda(problem: Problem) -> Solver:
     """LSODA translated to C++, called with a compiled right-hand side; it takes no Jacobian.
 
-    It knows one absolute tolerance only, so velocities are integrated in units of VELOCITY and
-    displacements in units of DISPLACEMENT.
+    It knows one absolute tolerance only: displacements are integrated in units of DISPLACEMENT,
+    velocities in units of VELOCITY.
     """
-    from numba import carray, cfunc, njit
-    from numbalsoda import address_as_void_pointer, lsoda, lsoda_sig
+    from numbalsoda import lsoda, lsoda_sig
 
-    arrays, size = problem.system.arrays, len(problem.state)
-    scale = np.ascontiguousarray(absolute(problem, 1.0))
-    # Addresses, not arrays, are frozen into the callback: kernels take writable arrays.
-    named = {f"a{i}": item for i, item in enumerate(arrays)}
-    lines = [f"    v{i} = carray(pointer({item.ctypes.data}), {item.shape}, f8)"
-             if isinstance(item, np.ndarray) else f"    v{i} = {int(item)}"
-             for i, item in enumerate(arrays)]
-    source = "\n".join([
-        "def rhs(t, u, du, data):",
-        *lines,
-        f"    unit = carray(pointer({scale.ctypes.data}), ({size},), f8)",
-        f"    y = carray(u, ({size},))",
-        f"    out = carray(du, ({size},))",
-        f"    state = carray(pointer(work), ({size},), f8)",
-        f"    for i in range({size}):",
-        "        state[i] = y[i] * unit[i]",
-        f"    kernel(t, state, System({', '.join(f'v{i}' for i in range(len(named)))}), out)",
-        f"    for i in range({size}):",
-        "        out[i] /= unit[i]",
-    ])
-    work = np.empty(size)
-    space: dict[str, Any] = {
-        "carray": carray, "f8": np.float64, "kernel": kernels.right_hand_side,
-        "System": kernels.SystemArrays, "pointer": address_as_void_pointer,
-        "work": work.ctypes.data}
-    exec(source, space)
-    function = cfunc(lsoda_sig)(space["rhs"])
-    address = function.address
-    start = problem.state / scale
-    keep = (function, work, scale, arrays, ctypes)
+    rate, _, held = _frozen(problem)
+    size = len(problem.state)
+    scale, state = np.ascontiguousarray(absolute(problem, 1.0)), np.empty(size)
+    at_scale, at_state = scale.ctypes.data, state.ctypes.data
+
+    @cfunc(lsoda_sig, error_model="numpy")
+    def rhs(t, u, du, data):  # type: ignore[no-untyped-def]
+        unit, y = carray(_pointer(at_scale), (size,), np.float64), carray(
+            _pointer(at_state), (size,), np.float64)
+        scaled, out = carray(u, (size,)), carray(du, (size,))
+        for i in range(size):
+            y[i] = scaled[i] * unit[i]
+        rate(t, y, out)
+        for i in range(size):
+            out[i] /= unit[i]
+
+    address, start = rhs.address, problem.state / scale
 
     @njit
     def run(start: Array, times: Array, rtol: float) -> Any:
         return lsoda(address, start, times, rtol=rtol, atol=rtol, mxstep=100000000)
 
     def solve(rtol: float) -> Array:
-        _ = keep
+        _ = held, rhs, state
         return np.asarray(run(start, problem.times, rtol)[0] * scale)
 
     return solve

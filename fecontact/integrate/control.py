@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.contact_energy import POWERS
+from fecontact.errors import InputError
 from fecontact.integrate import run_arrays, stepping
 from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
 from fecontact.system import ContactSystem
@@ -67,7 +68,7 @@ class Run:
                 "jacobians": int(counts[run_arrays.STEPS]) + 1}
 
     def advance(self, steps: int) -> int:
-        """At most so many steps more; returns the status."""
+        """So many steps more, those that fail included; returns the status."""
         return int(stepping.advance(self.arrays, self.shapes, self.times, self.control,
                                     self.progress, self.room, steps, self.states, self.work))
 
@@ -85,6 +86,7 @@ def start(
     Parameters
     ----------
     system : ContactSystem
+        What moves.
     state : (2 m + n s,) array
         y = [q, q', z] at the start.
     times : (N,) array
@@ -98,6 +100,8 @@ def start(
     work : bool
         Whether to integrate the powers.
     """
+    if not np.isfinite(state).all():
+        raise InputError("The initial state holds values that are not finite.")
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)
@@ -141,10 +145,11 @@ def longest_step(system: ContactSystem, times: Array) -> float:
 
 
 def _breakpoints(system: ContactSystem, times: Array) -> Array:
-    given = [*system.drive.motions, *(force.signal for force in system.load.forces), system.ground]
+    given: list[Any] = [*system.drive.motions,
+                        *(force.signal for force in system.load.forces), system.ground]
     start, end = float(times[0]), float(times[-1])
     return np.array(sorted({time for one in given for time in one.breakpoints(start, end)}),
-                    dtype=float)
+                    dtype=np.float64)
 
 
 def finish(run: Run, progress: Callable[[float], None] | None = None, seconds: float = 0.2) -> int:

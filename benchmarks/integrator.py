@@ -1,0 +1,124 @@
+"""Work and precision of time integrators: fecontact's own against scipy, numbalsoda and CVODE.
+
+Usage: python benchmarks/integrator.py [a b b2 c d e ...] [--quick]
+
+Errors are relative to a reference that is kept in the temporary directory; it is run by the
+package's integrator at rtol = 1e-11, and its distance from LSODA at rtol = 1e-12 is printed. All
+solvers run in this process on one thread, in turns, with the same compiled right-hand side and
+Jacobian; times are medians. numbalsoda and scikit-sundae take part where they can be imported.
+"""
+
+import hashlib
+import itertools
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from integrator_peers import PEERS
+from integrator_problems import PROBLEMS, Problem
+from numpy.typing import NDArray
+
+from fecontact.integrate import control
+
+Array = NDArray[np.float64]
+
+LEVELS = (1e-3, 1e-4, 1e-5, 1e-6)
+TOLERANCES = [10.0**-k for k in np.arange(3.5, 9.01, 0.5)]
+SLOW = ("solve_ivp LSODA", "solve_ivp Radau", "solve_ivp BDF")
+
+
+def own(problem: Problem) -> Callable[[float], Array]:
+    """The package's integrator."""
+
+    def solve(rtol: float) -> Array:
+        run = control.start(problem.system, problem.state, problem.times, rtol=rtol, work=False)
+        run.advance(10**9)
+        return run.states
+
+    return solve
+
+
+def reference(problem: Problem) -> Array:
+    """Reference states (N, 2 m) at the output times."""
+    mark = hashlib.sha256()
+    for item in (*problem.system.arrays[:18], problem.state, problem.times):
+        mark.update(np.ascontiguousarray(item).tobytes())
+    file = Path(tempfile.gettempdir()) / f"fecontact_reference_{mark.hexdigest()[:16]}.npz"
+    if not file.exists():
+        states = own(problem)(1e-11)
+        distance = problem.error(PEERS["odeint"](problem)(1e-12), states)
+        np.savez(file, states=states, distance=distance)
+    stored = np.load(file)
+    print(f"reference: LSODA at rtol = 1e-12 differs by {stored['distance']:.1e}", flush=True)
+    return np.asarray(stored["states"])
+
+
+def measure(problem: Problem, quick: bool) -> None:
+    """Print the table of a problem."""
+    wanted = reference(problem)
+    solvers: dict[str, Callable[[float], Array]] = {"fecontact": own(problem)}
+    for name, of in PEERS.items():
+        if quick and name in SLOW:
+            continue
+        try:
+            solvers[name] = of(problem)
+            solvers[name](1e-3)
+        except ImportError as missing:
+            print(f"{name}: not installed ({missing.name})")
+            solvers.pop(name, None)
+    points: dict[str, list[tuple[float, float, float]]] = {name: [] for name in solvers}
+    for rtol in TOLERANCES:
+        times: dict[str, list[float]] = {name: [] for name in solvers}
+        errors = {}
+        for repeat in range(7):
+            for name, solve in solvers.items():
+                if repeat and (sum(times[name]) > 2.0 or (name in SLOW and rtol < 1e-6)):
+                    continue
+                begin = time.perf_counter()
+                states = solve(rtol)
+                times[name].append(time.perf_counter() - begin)
+                errors[name] = problem.error(states, wanted)
+        for name in solvers:
+            points[name].append((rtol, float(np.median(times[name])), errors[name]))
+    for name, rows in points.items():
+        for rtol, seconds, error in rows:
+            print(f"{problem.name:3s} {name:16s} rtol {rtol:7.1e}  {seconds * 1e3:10.2f} ms  "
+                  f"error {error:.1e}")
+    print(f"{problem.name:3s} ms at error of   " + "".join(f"{level:>22.0e}" for level in LEVELS))
+    ours = [_time_at(points["fecontact"], level) for level in LEVELS]
+    for name, rows in points.items():
+        cells = []
+        for level, best in zip(LEVELS, ours, strict=True):
+            seconds = _time_at(rows, level)
+            cells.append(f"{seconds * 1e3:12.2f} ({seconds / best:6.1f} x)")
+        print(f"{problem.name:3s} {name:16s} " + "".join(cells), flush=True)
+
+
+def _time_at(rows: list[tuple[float, float, float]], level: float) -> float:
+    """Least time in which an error is reached, between measured points on logarithmic axes."""
+    best = np.inf
+    for (_, t0, e0), (_, t1, e1) in itertools.pairwise(rows):
+        if e1 <= level < e0:
+            part = np.log(e0 / level) / np.log(e0 / e1)
+            best = min(best, float(np.exp((1.0 - part) * np.log(t0) + part * np.log(t1))))
+    reached = [t for _, t, e in rows if e <= level]
+    return min(best, *reached) if reached else best
+
+
+def main() -> None:
+    """Measure the problems named on the command line, or all."""
+    if os.environ.get("OPENBLAS_NUM_THREADS") != "1":
+        # Read when numpy is loaded.
+        os.execve(sys.executable, [sys.executable, *sys.argv],
+                  {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"})
+    names = [name for name in sys.argv[1:] if not name.startswith("-")] or list(PROBLEMS)
+    for name in names:
+        measure(PROBLEMS[name](), "--quick" in sys.argv)
+
+
+if __name__ == "__main__":
+    main()
