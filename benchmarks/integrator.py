@@ -31,15 +31,27 @@ TOLERANCES = [10.0**-k for k in np.arange(3.5, 9.01, 0.5)]
 SLOW = ("solve_ivp LSODA", "solve_ivp Radau", "solve_ivp BDF")
 
 
-def own(problem: Problem) -> Callable[[float], Array]:
-    """The package's integrator."""
+Prepared = Callable[[float], Callable[[], Array]]
 
-    def solve(rtol: float) -> Array:
+
+def own(problem: Problem) -> Prepared:
+    """The package's integrator; its preparation is not measured, as that of its peers is not."""
+
+    def prepare(rtol: float) -> Callable[[], Array]:
         run = control.start(problem.system, problem.state, problem.times, rtol=rtol, work=False)
-        run.advance(10**9)
-        return run.states
 
-    return solve
+        def solve() -> Array:
+            run.advance(10**9)
+            return run.states
+
+        return solve
+
+    return prepare
+
+
+def prepared(solve: Callable[[float], Array]) -> Prepared:
+    """A peer in the same form."""
+    return lambda rtol: lambda: solve(rtol)
 
 
 def reference(problem: Problem) -> Array:
@@ -49,7 +61,7 @@ def reference(problem: Problem) -> Array:
         mark.update(np.ascontiguousarray(item).tobytes())
     file = Path(tempfile.gettempdir()) / f"fecontact_reference_{mark.hexdigest()[:16]}.npz"
     if not file.exists():
-        states = own(problem)(1e-11)
+        states = own(problem)(1e-11)()
         distance = problem.error(PEERS["odeint"](problem)(1e-12), states)
         np.savez(file, states=states, distance=distance)
     stored = np.load(file)
@@ -60,13 +72,13 @@ def reference(problem: Problem) -> Array:
 def measure(problem: Problem, quick: bool) -> None:
     """Print the table of a problem."""
     wanted = reference(problem)
-    solvers: dict[str, Callable[[float], Array]] = {"fecontact": own(problem)}
+    solvers: dict[str, Prepared] = {"fecontact": own(problem)}
     for name, of in PEERS.items():
         if quick and name in SLOW:
             continue
         try:
-            solvers[name] = of(problem)
-            solvers[name](1e-3)
+            solvers[name] = prepared(of(problem))
+            solvers[name](1e-3)()
         except ImportError as missing:
             print(f"{name}: not installed ({missing.name})")
             solvers.pop(name, None)
@@ -78,8 +90,9 @@ def measure(problem: Problem, quick: bool) -> None:
             for name, solve in solvers.items():
                 if repeat and (sum(times[name]) > 2.0 or (name in SLOW and rtol < 1e-6)):
                     continue
+                run = solve(rtol)
                 begin = time.perf_counter()
-                states = solve(rtol)
+                states = run()
                 times[name].append(time.perf_counter() - begin)
                 errors[name] = problem.error(states, wanted)
         for name in solvers:
