@@ -8,12 +8,9 @@ solvers run in this process on one thread, in turns, with the same compiled righ
 Jacobian; times are medians. numbalsoda and scikit-sundae take part where they can be imported.
 """
 
-import os
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
 import hashlib
+import itertools
+import os
 import sys
 import tempfile
 import time
@@ -30,19 +27,31 @@ from fecontact.integrate import control
 Array = NDArray[np.float64]
 
 LEVELS = (1e-3, 1e-4, 1e-5, 1e-6)
-TOLERANCES = [10.0**-k for k in np.arange(3.0, 9.01, 0.5)]
+TOLERANCES = [10.0**-k for k in np.arange(3.5, 9.01, 0.5)]
 SLOW = ("solve_ivp LSODA", "solve_ivp Radau", "solve_ivp BDF")
 
 
-def own(problem: Problem) -> Callable[[float], Array]:
-    """The package's integrator."""
+Prepared = Callable[[float], Callable[[], Array]]
 
-    def solve(rtol: float) -> Array:
+
+def own(problem: Problem) -> Prepared:
+    """The package's integrator; its preparation is not measured, as that of its peers is not."""
+
+    def prepare(rtol: float) -> Callable[[], Array]:
         run = control.start(problem.system, problem.state, problem.times, rtol=rtol, work=False)
-        run.advance(10**9)
-        return run.states
 
-    return solve
+        def solve() -> Array:
+            run.advance(10**9)
+            return run.states
+
+        return solve
+
+    return prepare
+
+
+def prepared(solve: Callable[[float], Array]) -> Prepared:
+    """A peer in the same form."""
+    return lambda rtol: lambda: solve(rtol)
 
 
 def reference(problem: Problem) -> Array:
@@ -52,7 +61,7 @@ def reference(problem: Problem) -> Array:
         mark.update(np.ascontiguousarray(item).tobytes())
     file = Path(tempfile.gettempdir()) / f"fecontact_reference_{mark.hexdigest()[:16]}.npz"
     if not file.exists():
-        states = own(problem)(1e-11)
+        states = own(problem)(1e-11)()
         distance = problem.error(PEERS["odeint"](problem)(1e-12), states)
         np.savez(file, states=states, distance=distance)
     stored = np.load(file)
@@ -63,13 +72,13 @@ def reference(problem: Problem) -> Array:
 def measure(problem: Problem, quick: bool) -> None:
     """Print the table of a problem."""
     wanted = reference(problem)
-    solvers: dict[str, Callable[[float], Array]] = {"fecontact": own(problem)}
+    solvers: dict[str, Prepared] = {"fecontact": own(problem)}
     for name, of in PEERS.items():
         if quick and name in SLOW:
             continue
         try:
-            solvers[name] = of(problem)
-            solvers[name](1e-3)
+            solvers[name] = prepared(of(problem))
+            solvers[name](1e-3)()
         except ImportError as missing:
             print(f"{name}: not installed ({missing.name})")
             solvers.pop(name, None)
@@ -79,10 +88,11 @@ def measure(problem: Problem, quick: bool) -> None:
         errors = {}
         for repeat in range(7):
             for name, solve in solvers.items():
-                if repeat and (sum(times[name]) > 2.0 or name in SLOW and rtol < 1e-6):
+                if repeat and (sum(times[name]) > 2.0 or (name in SLOW and rtol < 1e-6)):
                     continue
+                run = solve(rtol)
                 begin = time.perf_counter()
-                states = solve(rtol)
+                states = run()
                 times[name].append(time.perf_counter() - begin)
                 errors[name] = problem.error(states, wanted)
         for name in solvers:
@@ -104,7 +114,7 @@ def measure(problem: Problem, quick: bool) -> None:
 def _time_at(rows: list[tuple[float, float, float]], level: float) -> float:
     """Least time in which an error is reached, between measured points on logarithmic axes."""
     best = np.inf
-    for (_, t0, e0), (_, t1, e1) in zip(rows[:-1], rows[1:], strict=True):
+    for (_, t0, e0), (_, t1, e1) in itertools.pairwise(rows):
         if e1 <= level < e0:
             part = np.log(e0 / level) / np.log(e0 / e1)
             best = min(best, float(np.exp((1.0 - part) * np.log(t0) + part * np.log(t1))))
@@ -114,6 +124,10 @@ def _time_at(rows: list[tuple[float, float, float]], level: float) -> float:
 
 def main() -> None:
     """Measure the problems named on the command line, or all."""
+    if os.environ.get("OPENBLAS_NUM_THREADS") != "1":
+        # Read when numpy is loaded.
+        os.execve(sys.executable, [sys.executable, *sys.argv],
+                  {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"})
     names = [name for name in sys.argv[1:] if not name.startswith("-")] or list(PROBLEMS)
     for name in names:
         measure(PROBLEMS[name](), "--quick" in sys.argv)

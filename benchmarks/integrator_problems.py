@@ -99,7 +99,7 @@ def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Pro
     return Problem(name, system, np.zeros(2 * basis.modes), times, _observed(basis, entries))
 
 
-def _beam_mesh(columns: int = 39, rows: int = 4, length: float = 0.2, height: float = 0.02) -> Mesh:
+def _beam_mesh(columns: int, rows: int = 4, length: float = 0.2, height: float = 0.02) -> Mesh:
     x, y = np.meshgrid(np.linspace(0.0, length, columns + 1), np.linspace(0.0, height, rows + 1))
     number = np.arange(x.size).reshape(rows + 1, columns + 1)
     cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
@@ -108,9 +108,9 @@ def _beam_mesh(columns: int = 39, rows: int = 4, length: float = 0.2, height: fl
     return Mesh(np.column_stack([x.ravel(), y.ravel()]), cells, {"contact": bottom})
 
 
-def beam(name: str, nodes: int, modes: int, speed: float = 0.01) -> Problem:
+def beam(name: str, nodes: int, modes: int, columns: int, speed: float = 0.01) -> Problem:
     """(d), (e): a free steel beam on a belt, pulled by a spring at its left end."""
-    body = ElasticBody(_beam_mesh(), Material.named("steel"), 0.01)
+    body = ElasticBody(_beam_mesh(columns), Material.named("steel"), 0.01)
     basis = body.modal_basis(modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
                              points={"right": (0.2, 0.01)}, damping=0.01)
     pull = 9.5
@@ -134,8 +134,8 @@ PROBLEMS: dict[str, Callable[[], Problem]] = {
     "b": lambda: friction_oscillator("b"),
     "b2": lambda: friction_oscillator("b2"),
     "c": lambda: friction_oscillator("c"),
-    "d": lambda: beam("d", 40, 20),
-    "e": lambda: beam("e", 400, 40),
+    "d": lambda: beam("d", 40, 20, 39),
+    "e": lambda: beam("e", 400, 40, 200),
 }
 
 

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from test_simulate import mass_in_plane, mass_in_y, oscillator
 
 from fecontact.basis import ModalBasis
+from fecontact.errors import InputError
 from fecontact.integrate import control, run_arrays, stepping
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.drive import Drive, Load, PointLoad
@@ -49,7 +50,9 @@ def reference(system, state, times, rtol=1e-12):
 def test_order_on_a_smooth_problem():
     """Closed contact on wavy ground that accelerates, drive and load: all terms in time."""
     system = body(ground=Ground(0.02, 2e-6, 0.01, motion=HarmonicSpeed(0.01, 90.0)),
-                  normal=LinearContact(1e5, 30.0))
+                  normal=LinearContact(1e5, 30.0),
+                  # Without fall: that has a kink where the slip velocity changes sign.
+                  friction=ExponentialFriction(0.6, 0.6, 0.0, 50.0))
     state = np.zeros(system.size)
     state[: system.basis.modes] = np.linalg.lstsq(system.basis.contact_T[:, 1],
                                                   np.full(3, -2e-3), rcond=None)[0]
@@ -57,7 +60,7 @@ def test_order_on_a_smooth_problem():
     wanted = reference(system, state, times)[-1]
     assert system.contact_history(times, np.array([state, wanted]))[..., 0].min() > 0.0
     errors = []
-    for steps in (10, 20, 40):
+    for steps in (80, 160, 320):
         run = control.start(system, state, times, rtol=1e9, work=False)
         longest = times[-1] / steps
         run = control.Run(run.arrays, run.shapes, run.times, run.control._replace(
@@ -67,13 +70,12 @@ def test_order_on_a_smooth_problem():
         assert run.statistics["steps"] == steps
         errors.append(np.abs(run.states[-1] - wanted).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    print(errors, orders)
-    assert orders[-1] == pytest.approx(5.0, abs=0.15)
+    assert orders == pytest.approx(5.0, abs=0.15)
 
 
 @pytest.mark.parametrize("friction", [
     ExponentialFriction(0.6, 0.4, 20.0, 1e4), LuGreFriction(0.6, 0.4, 0.01, 2.0, 1e5, 100.0),
-    JenkinsFriction(0.5, 1e5)])
+    JenkinsFriction()])
 def test_agrees_with_scipy(friction):
     """Contact that opens and closes; friction with and without memory."""
     system = body(friction=friction, normal=RoughSurface(1e5, 2e-5, 30.0))
@@ -105,8 +107,8 @@ def test_drop_on_a_spring():
 def test_period_of_stick_slip():
     """model.md section 4 without excitation: T = 1.264348 s with k_s = 1e6 s/m."""
     system = oscillator()
-    run = run_of(system, np.zeros(4), np.linspace(0.0, 8.0, 80001), 1e-7)
-    late = run.times > 3.0
+    run = run_of(system, np.zeros(4), np.linspace(0.0, 12.0, 120001), 1e-7)
+    late = run.times > 6.0
     x, t = run.states[late, 0], run.times[late]
     level = 0.5 * (x.max() + x.min())
     down = np.flatnonzero((x[:-1] > level) & (x[1:] <= level))
@@ -131,7 +133,7 @@ def test_energy_balance():
 
 def test_continued_runs_are_the_same_bit_for_bit():
     system = body(friction=LuGreFriction(0.6, 0.4, 0.01, 2.0, 1e5, 100.0),
-                  load=Load(40.0, (PointLoad("B", signal=Pulse("triangle", -50.0, 0.01, 0.003)),)))
+                  load=Load(40.0, (PointLoad("B", signal=Pulse("triangle", -50.0, 0.003, 0.01)),)))
     state, times = np.zeros(system.size), np.linspace(0.0, 0.02, 101)
     whole = run_of(system, state, times)
     pieces = control.start(system, state, times, rtol=1e-7)
@@ -156,7 +158,7 @@ def copy_into(target, source):
 @pytest.mark.parametrize("shape", ["half-sine", "rectangle", "triangle"])
 def test_pulses_are_not_missed(shape):
     """A free mass gets the pulse's integral as momentum."""
-    pulse = Pulse(shape, 3.0, 0.7, 1e-5)
+    pulse = Pulse(shape, 3.0, 1e-5, 0.7)
     system = mass_in_plane(load=Load(0.0, (PointLoad("B", "x", signal=pulse),)), gap=1.0)
     run = run_of(system, np.zeros(4), np.array([0.0, 1.0]), 1e-6)
     times = np.linspace(0.7, 0.7 + 1e-5, 100001)
@@ -177,9 +179,15 @@ def test_dense_output_is_as_accurate_as_the_steps():
 
 
 def test_motion_that_grows_beyond_all_numbers_ends_the_run():
-    system = body(normal=PowerContact(1e6, 1.5, 0.0))
+    system = body()
     state = np.zeros(system.size)
-    state[0] = np.nan
+    state[0] = 1e305
     run = control.start(system, state, np.array([0.0, 0.1]), rtol=1e-6)
     assert control.finish(run) == stepping.NOT_FINITE
     assert run.time == 0.0
+
+
+def test_states_that_are_no_numbers_are_refused():
+    system = body()
+    with pytest.raises(InputError, match="not finite"):
+        control.start(system, np.full(system.size, np.nan), np.array([0.0, 0.1]), rtol=1e-6)

@@ -30,8 +30,9 @@ def borrowed(typingctx: Any, array: Any) -> Any:
 
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     if isinstance(kind, types.BaseTuple):
+        members: Any = kind
         items = [_without_owner(context, builder, item, builder.extract_value(value, index))
-                 for index, item in enumerate(kind)]
+                 for index, item in enumerate(members)]
         return context.make_tuple(builder, kind, items)
     if not isinstance(kind, types.Array):
         return value

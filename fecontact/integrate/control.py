@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.contact_energy import POWERS
+from fecontact.errors import InputError
 from fecontact.integrate import run_arrays, stepping
 from fecontact.integrate.checkpoint import Checkpoint
 from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
@@ -70,7 +71,7 @@ class Run:
                 "jacobians": int(counts[run_arrays.STEPS]) + 1}
 
     def advance(self, steps: int) -> int:
-        """At most so many steps more; returns the status."""
+        """So many steps more, those that fail included; returns the status."""
         return int(stepping.advance(self.arrays, self.shapes, self.times, self.control,
                                     self.progress, self.room, steps, self.states, self.work))
 
@@ -88,6 +89,7 @@ def start(
     Parameters
     ----------
     system : ContactSystem
+        What moves.
     state : (2 m + n s,) array
         y = [q, q', z] at the start.
     times : (N,) array
@@ -101,6 +103,8 @@ def start(
     work : bool
         Whether to integrate the powers.
     """
+    if not np.isfinite(state).all():
+        raise InputError("The initial state holds values that are not finite.")
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)

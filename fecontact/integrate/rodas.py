@@ -70,7 +70,7 @@ DENSE = np.array([
 
 @inlined
 def combined(row, factor, base, stages, out):  # type: ignore[no-untyped-def]
-    """out = base + factor * sum_j row_j stages_j over the seven stages that may precede one."""
+    """Out = base + factor * sum_j row_j stages_j over the seven stages that may precede one."""
     a0, a1, a2, a3 = factor * row[0], factor * row[1], factor * row[2], factor * row[3]
     a4, a5, a6 = factor * row[4], factor * row[5], factor * row[6]
     for i in range(len(out)):

@@ -130,8 +130,10 @@ def gradients_for(nodes: int, states: int) -> motion.Gradients:
 def room_for(modes: int, nodes: int, states: int) -> Room:
     """Room for a system of so many modes, contact nodes and internal variables per node."""
     size = 2 * modes + nodes * states
+    stage, right, base, time_rate, after, rate_after = np.zeros((6, size))
     return Room(
-        np.zeros((rodas.STAGES, size)), np.zeros((3, size)), *np.zeros((6, size)),
+        np.zeros((rodas.STAGES, size)), np.zeros((3, size)),
+        stage, right, base, time_rate, after, rate_after,
         np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
         np.zeros((4, len(POWERS) + nodes)), linear.reduced_for(modes, nodes, states),
         gradients_for(nodes, states), gradients_for(nodes, states))

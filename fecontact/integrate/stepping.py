@@ -150,7 +150,7 @@ def advance(  # type: ignore[no-untyped-def]
     held_system, held_shapes, held_times, held_control, held_progress, held_room, most, held_out,
     held_work,
 ):
-    """Go on for at most ``most`` steps, accepted or not; returns how it ended.
+    """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
 
     Fills the rows of ``out`` (N, size) and ``work`` (N, 8 + n) that belong to the output times
     passed. A run that is continued gives the same numbers as one that was not interrupted.
@@ -173,10 +173,12 @@ def advance(  # type: ignore[no-untyped-def]
         for k in range(size):
             out[0, k] = progress.state[k]
         counts[STARTED], counts[OUTPUTS] = 1, 1
-    new, speed = True, 0.0
-    for _ in range(most):
-        if counts[OUTPUTS] == len(times):
+    new, speed, attempts = True, 0.0, 0
+    while counts[OUTPUTS] < len(times):
+        # A step that failed is repeated before the call returns: derivatives are not kept.
+        if new and attempts >= most:
             break
+        attempts += 1
         # The end, or the next break; that is approached from below.
         stop, is_break = end, False
         for k in range(len(control.breaks)):
@@ -192,14 +194,15 @@ def advance(  # type: ignore[no-untyped-def]
             # Rates just after t: they may jump at a break.
             motion.set_given(np.nextafter(t, end), s, room.given, room.pull)
             speed = room.given[motion.SPEED]
-        limited = False
-        if numbers[CAUTIOUS] > 0.0:
-            reach = max(target - t, numbers[CAUTIOUS])
+        limited, caution = False, numbers[CAUTIOUS]
+        if caution > 0.0:
+            reach = max(target - t, caution)
             kink = motion.next_kink(progress.state, progress.rate, s, shapes, progress.gradients,
                                     control.depth, control.slow, speed, room.nodes, reach)
-            if kink < 0.9 * reach:
+            # Nearer ones are left to the error control, lest steps shrink without end.
+            if 1e-3 * caution < kink < 0.9 * reach:
                 # Rather a little too far than too short.
-                target = min(t + max(1.0003 * kink, 1e-3 * (target - t)), stop)
+                target = min(t + 1.0003 * kink, stop)
                 limited = True
             numbers[CAUTIOUS] = 0.0
         h = target - t
@@ -233,7 +236,7 @@ def advance(  # type: ignore[no-untyped-def]
             numbers[REJECTED_LAST] = 1.0
             numbers[CAUTIOUS] = 0.0 if limited else h
             h *= factor
-            if h < smallest:
+            if not h >= smallest:
                 numbers[TIME], numbers[STEP] = t, h
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
@@ -270,7 +273,7 @@ def advance(  # type: ignore[no-untyped-def]
             factor = min(factor, 1.0)
         numbers[LAST_STEP], numbers[LAST_ERROR], numbers[REJECTED_LAST] = h, max(error, 1e-2), 0.0
         if limited:
-            numbers[CAUTIOUS] = h
+            numbers[CAUTIOUS] = caution
         h = min(h * factor, control.longest)
     numbers[TIME], numbers[STEP] = t, h
     return FINISHED if counts[OUTPUTS] == len(times) else RUNNING

@@ -3,8 +3,8 @@
 import numpy as np
 
 from fecontact.contact_energy import powers
-from fecontact.integrate.borrowed import inlined
 from fecontact.integrate import rodas
+from fecontact.integrate.borrowed import inlined
 
 # Gauss-Lobatto points: both ends and two inside; exact for powers of degree five.
 _INSIDE = 0.5 - 0.5 / np.sqrt(5.0)
@@ -38,7 +38,7 @@ def add_up(t, h, latest, s, progress, room):  # type: ignore[no-untyped-def]
 
 @inlined
 def work_until(part, h, before, power, out):  # type: ignore[no-untyped-def]
-    """out = work ``before`` the step and in its part, by the cubic through the powers."""
+    """Out = work ``before`` the step and in its part, by the cubic through the powers."""
     w0, w1, w2, w3 = _weight(0, part), _weight(1, part), _weight(2, part), _weight(3, part)
     for k in range(len(out)):
         out[k] = before[k] + h * (w0 * power[0, k] + w1 * power[1, k] + w2 * power[2, k]
