@@ -158,8 +158,7 @@ def integrate_set_valued(
         "rejected": int(counts[1]), "events": int(counts[2]), "impacts": int(counts[3]),
         "seconds": clock.perf_counter() - begin}
     if outcome > 1:
-        ended = Status.FAILED
-        statistics["message"] = _MESSAGES[outcome]
+        ended = Status.MINIMUM_STEP if outcome == nodes.STUCK else Status.NOT_FINITE
     done = int(counts[4])
     time, states = times[:done], states[:done]
     friction, normal = friction[:done], normal[:done]
@@ -170,9 +169,6 @@ def integrate_set_valued(
     end = 2 * m + efforts
     return SetValuedRun(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(),
                         states[:, end:].copy(), friction, normal, ended, statistics)
-
-
-_MESSAGES = {2: "The shortest step was reached.", 3: "The motion grew beyond all numbers."}
 
 
 def _problem(
@@ -202,7 +198,8 @@ def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
     if law.memory or "smoothing_slope" not in (entry.name for entry in fields(law)):
         raise InputError(f"{type(law).__name__} has no smoothing_slope that could become infinite; "
                          f"set-valued friction needs a law with one, without memory.")
-    return replace(law, smoothing_slope=nodes.STEEP)
+    steep: dict[str, Any] = {"smoothing_slope": nodes.STEEP}
+    return replace(law, **steep)
 
 
 def _clusters(Tx: Array) -> tuple[NDArray[np.int64], Array]:

@@ -63,9 +63,11 @@ def smoothing_cost(
     Parameters
     ----------
     system : ContactSystem
+        With friction laws that have a ``smoothing_slope``.
     t_end : float
         End of both runs [s]; some periods of the motion.
-    initial : as for :func:`fecontact.integrate.simulate.simulate`
+    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m,) array
+        Where both start; see :func:`fecontact.integrate.initial.initial_state`.
     outputs : int
         Number of times at which the runs are compared, at least 20.
     rtol : float

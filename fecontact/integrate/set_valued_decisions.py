@@ -38,21 +38,21 @@ def hold_velocity(p, held, w, Y):  # type: ignore[no-untyped-def]
     count = 0
     for c in range(clusters):
         if held[c]:
-            w.index[count] = c
+            w.indices[count] = c
             count += 1
     if count == 0:
         return
     for a in range(count):
-        w.right[a] = w.slip[w.index[a]]
+        w.right[a] = w.slip[w.indices[a]]
         for b in range(count):
             total = 0.0
             for i in range(m):
-                total += p.rows[w.index[a], i] * p.rows[w.index[b], i]
+                total += p.rows[w.indices[a], i] * p.rows[w.indices[b], i]
             w.matrix[a, b] = total
     solve(w.matrix, w.right, count)
     for a in range(count):
         for i in range(m):
-            Y[m + i] -= p.rows[w.index[a], i] * w.right[a]
+            Y[m + i] -= p.rows[w.indices[a], i] * w.right[a]
 
 
 @helper
@@ -179,19 +179,19 @@ def _push(p, touching, w, Y, first):  # type: ignore[no-untyped-def]
     count = 0
     for j in range(n):
         if touching[j]:
-            w.index[count] = j
+            w.indices[count] = j
             count += 1
     for a in range(count):
-        j = w.index[a]
+        j = w.indices[a]
         for b in range(count):
             total = 0.0
             for i in range(m):
-                total += (s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]) * s.Ty[w.index[b], i]
+                total += (s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]) * s.Ty[w.indices[b], i]
             w.matrix[a, b] = total
     solve(w.matrix, w.right, count)
     for a in range(count):
         for i in range(m):
-            Y[first + i] += s.Ty[w.index[a], i] * w.right[a]
+            Y[first + i] += s.Ty[w.indices[a], i] * w.right[a]
 
 
 @helper
@@ -205,12 +205,13 @@ def _pack(touching, w, column):  # type: ignore[no-untyped-def]
 
 
 @helper
-def decide_stops(t, Y, p, touched, parting, slow, height, status, closed, fresh, w, out):  # type: ignore[no-untyped-def]
+def decide_stops(t, Y, p, touched, parting, slow, height, brief, status, closed, fresh, w, out):  # type: ignore[no-untyped-def]
     """Impacts of the ``touched`` nodes, then which stops stay closed.
 
     ``parting`` nodes were closed and lift off. After the impact, stops whose penetration rate is
-    below ``slow``, or whose rebound is lower than the rounding of the ``height`` [m], close if a
-    force presses them. Returns the longest flight that a rebound may take [s], infinite if none.
+    below ``slow``, or whose rebound is lower than the rounding of the ``height`` [m] or shorter
+    than the time ``brief`` [s], close if a force presses them. Returns the longest flight that a
+    rebound may take [s], infinite if none.
     """
     s = p.system
     n, m = s.Tx.shape
@@ -250,7 +251,7 @@ def decide_stops(t, Y, p, touched, parting, slow, height, status, closed, fresh,
         pressed[j] = w.nodes[j, CURVED] - slope * ground
         for i in range(m):
             pressed[j] -= (s.Ty[j, i] - slope * s.Tx[j, i]) * out[m + i]
-        blurred = 30.0 * math.sqrt(2.2e-16 * height * abs(pressed[j]))
+        blurred = 30.0 * math.sqrt(2.2e-16 * height * abs(pressed[j])) + brief * abs(pressed[j])
         resting[j] = (touching[j] and not parting[j]
                       and abs(w.nodes[j, RATE]) <= max(slow, blurred))
     falling = pressed.copy()

@@ -48,8 +48,9 @@ SAMPLES = 4
 
 @kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
                  integers, vector, i8, matrix, matrix, matrix))
-def run_events(clock, times, stops, p, rtol, longest, floor, Y, status, closed, counts, largest,
-               limit, states, friction, normal):  # type: ignore[no-untyped-def]
+def run_events(  # type: ignore[no-untyped-def]
+        clock, times, stops, p, rtol, longest, floor, Y, status, closed, counts, largest,
+        limit, states, friction, normal):
     """Go on for at most ``limit`` steps, up to the last of ``times``.
 
     ``clock`` is the time reached and the length of the next step; ``stops`` ascending times at
@@ -80,11 +81,11 @@ def run_events(clock, times, stops, p, rtol, longest, floor, Y, status, closed, 
         if rigid:
             height = 0.0
             for j in range(n):
-                touched[j] = w.nodes[j, PENETRATION] > 0.0
+                touched[j] = w.nodes[j, PENETRATION] >= 0.0
                 height = max(height, abs(w.nodes[j, PENETRATION]))
                 largest[1] = max(largest[1], abs(w.nodes[j, RATE]))
-            decide_stops(t, Y, p, touched, parting, 1e-9 * largest[1], height, status, closed,
-                         fresh[clusters:], w, rate)
+            decide_stops(t, Y, p, touched, parting, 1e-9 * largest[1], height,
+                         1e-9 * longest, status, closed, fresh[clusters:], w, rate)
         else:
             for c in range(clusters):
                 largest[0] = max(largest[0], abs(w.slip[c]))
@@ -226,7 +227,7 @@ def run_events(clock, times, stops, p, rtol, longest, floor, Y, status, closed, 
                 if touched[j]:
                     counts[IMPACTS] += 1
             flight = decide_stops(t, Y, p, touched, parting, 0.01 * rtol * largest[1], height,
-                                  status, closed, fresh[clusters:], w, slopes[0])
+                                  1e-9 * longest, status, closed, fresh[clusters:], w, slopes[0])
             h = min(h, max(0.5 * flight, tiny))
         else:
             for c in range(clusters):

@@ -85,7 +85,7 @@ class Workspace(NamedTuple):
     slip: Array
     matrix: Array
     right: Array
-    index: Integers
+    indices: Integers
 
 
 WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, matrix, vector,
@@ -249,13 +249,13 @@ def hold_stops(t, p, closed, w, acceleration):  # type: ignore[no-untyped-def]
     count = 0
     for j in range(n):
         if closed[j]:
-            w.index[count] = j
+            w.indices[count] = j
             count += 1
     if count == 0:
         return
     ground = speed_rate(t, p)
     for a in range(count):
-        j = w.index[a]
+        j = w.indices[a]
         slope = w.nodes[j, SLOPE]
         w.right[a] = w.nodes[j, CURVED] - slope * ground
         for i in range(m):
@@ -263,11 +263,11 @@ def hold_stops(t, p, closed, w, acceleration):  # type: ignore[no-untyped-def]
         for b in range(count):
             total = 0.0
             for i in range(m):
-                total += (s.Ty[j, i] - slope * s.Tx[j, i]) * s.Ty[w.index[b], i]
+                total += (s.Ty[j, i] - slope * s.Tx[j, i]) * s.Ty[w.indices[b], i]
             w.matrix[a, b] = total
     solve(w.matrix, w.right, count)
     for a in range(count):
-        j = w.index[a]
+        j = w.indices[a]
         w.nodes[j, FORCE] = w.right[a]
         for i in range(m):
             acceleration[i] += s.Ty[j, i] * w.right[a]
@@ -280,24 +280,24 @@ def hold_clusters(t, p, status, w, acceleration):  # type: ignore[no-untyped-def
     count = 0
     for c in range(clusters):
         if status[c] == STICK:
-            w.index[count] = c
+            w.indices[count] = c
             count += 1
     if count == 0:
         return
     ground = speed_rate(t, p)
     for a in range(count):
-        c = w.index[a]
+        c = w.indices[a]
         w.right[a] = -ground
         for i in range(m):
             w.right[a] += p.rows[c, i] * acceleration[i]
         for b in range(count):
             total = 0.0
             for i in range(m):
-                total += p.rows[c, i] * p.rows[w.index[b], i]
+                total += p.rows[c, i] * p.rows[w.indices[b], i]
             w.matrix[a, b] = total
     solve(w.matrix, w.right, count)
     for a in range(count):
-        c = w.index[a]
+        c = w.indices[a]
         w.total[c] = w.right[a]
         for i in range(m):
             acceleration[i] -= p.rows[c, i] * w.right[a]

@@ -68,8 +68,8 @@ KEPT, HESITANT, FREE = range(3)
 
 
 @helper
-def _linearise(t, Y, g, p, grip, multiplier, side, turning, force, gradients, active,
-               balance):  # type: ignore[no-untyped-def]
+def _linearise(  # type: ignore[no-untyped-def]
+        t, Y, g, p, grip, multiplier, side, turning, force, gradients, active, balance):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
     Adds ``Ty F - Tx R`` to ``balance`` (m,), fills ``force`` (n,) with R, ``active`` (2, n, m)
@@ -138,8 +138,9 @@ def _linearise(t, Y, g, p, grip, multiplier, side, turning, force, gradients, ac
 
 
 @helper
-def _residual(t, g, start, known, Y, p, grip, multiplier, side, turning, force, room, balance,
-              residual):  # type: ignore[no-untyped-def]
+def _residual(  # type: ignore[no-untyped-def]
+        t, g, start, known, Y, p, grip, multiplier, side, turning, force, room, balance,
+        residual):
     """What is left of the equations of a stage, with places and contact at the velocities in Y."""
     m = len(start)
     for i in range(m):
@@ -153,8 +154,9 @@ def _residual(t, g, start, known, Y, p, grip, multiplier, side, turning, force, 
 
 
 @helper
-def _stage(t, g, start, known, Y, p, grip, multiplier, side, force, room, linear, system_matrix,
-           floor, rtol, finest):  # type: ignore[no-untyped-def]
+def _stage(  # type: ignore[no-untyped-def]
+        t, g, start, known, Y, p, grip, multiplier, side, force, room, linear,
+        system_matrix, floor, rtol, finest):
     """Solve one stage for the velocities, Y[m : 2 m]; returns whether that succeeded.
 
     ``start`` and ``known`` (m,) are Q_e and V_e, ``linear`` is 1 + g C + g^2 K. With given normal
@@ -212,8 +214,9 @@ def _stage(t, g, start, known, Y, p, grip, multiplier, side, force, room, linear
 
 
 @helper
-def _output(row, time, t, h, Y, before, after, new, p, old_force, force, w, states, friction,
-            normal):  # type: ignore[no-untyped-def]
+def _output(  # type: ignore[no-untyped-def]
+        row, time, t, h, Y, before, after, new, p, old_force, force, w, states, friction,
+        normal):
     """State at an output time within a step, by cubics through both ends."""
     m = p.system.Tx.shape[1]
     x = (time - t) / h
@@ -235,8 +238,9 @@ def _output(row, time, t, h, Y, before, after, new, p, old_force, force, w, stat
 
 @kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
                  integers, vector, i8, matrix, matrix, matrix))
-def run_steps(clock, times, stops, p, rtol, longest, floor, Y, status, closed, counts, carried,
-              limit, states, friction, normal):  # type: ignore[no-untyped-def]
+def run_steps(  # type: ignore[no-untyped-def]
+        clock, times, stops, p, rtol, longest, floor, Y, status, closed, counts, carried,
+        limit, states, friction, normal):
     """Go on for at most ``limit`` steps, up to the last of ``times``.
 
     Arguments as for :func:`fecontact.integrate.set_valued_events.run_events`; ``carried`` is the

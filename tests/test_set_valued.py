@@ -1,0 +1,277 @@
+"""Set-valued friction and rigid stops against closed forms and published values."""
+
+import numpy as np
+import pytest
+
+from fecontact.basis import ModalBasis
+from fecontact.errors import InputError
+from fecontact.integrate.set_valued import integrate_set_valued
+from fecontact.integrate.set_valued_cost import smoothing_cost
+from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.laws.drive import Drive, Load
+from fecontact.laws.friction import ConstantFriction, ExponentialFriction, HyperbolicFriction
+from fecontact.laws.ground import Ground
+from fecontact.laws.memory import LuGreFriction
+from fecontact.laws.normal import RoughSurface
+from fecontact.statics import static_equilibrium
+from fecontact.system import ContactSystem
+
+BOTH = pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
+    ("events", 1e-11, 1e-11), ("stepping", 1e-6, 2e-6)])
+
+
+def block(mass=1.0, spring=1.0, nodes=1, **parts):
+    """A mass that moves along the ground and up and down, on some nodes at one place."""
+    row = np.zeros((3, 2))
+    row[0, 0] = row[1, 1] = 1.0
+    basis = ModalBasis.from_matrices(
+        mass * np.eye(2), np.diag([spring, 0.0]),
+        {"contact": np.repeat(row[None], nodes, axis=0), "B": row, "C": row})
+    return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-4, 0.0), **parts})
+
+
+def start(system, x, x_rate=0.0):
+    T = system.basis.T[2, :2]
+    return np.concatenate([static_equilibrium(system) + np.linalg.solve(T, [x, 0.0]),
+                           np.linalg.solve(T, [x_rate, 0.0])])
+
+
+def along(system, run):
+    """Displacement and velocity along the ground of contact node 0."""
+    m = system.basis.modes
+    return run.states[:, :m] @ system.basis.T[2, 0], run.states[:, m:] @ system.basis.T[2, 0]
+
+
+def imbalance(system, run):
+    m = system.basis.modes
+    return Trajectory(system, run.time, run.states[:, :m], run.states[:, m:],
+                      run.work).energies.imbalance
+
+
+def period(system, run, place):
+    """Times between passages of a place while it sticks to the ground, where x is V t + const."""
+    x, rate = along(system, run)
+    V = system.ground.speed
+    resting = np.abs(rate - V) < 1e-7 * V
+    passing = np.flatnonzero(resting[:-1] & resting[1:] & (x[:-1] < place) & (x[1:] >= place))
+    return np.diff(run.time[passing] + (place - x[passing]) / V)
+
+
+@BOTH
+@pytest.mark.parametrize("nodes", [1, 3])
+def test_coulomb_decay(nodes, scheme, rtol, tolerance):
+    """Code_Aster SDND100; equal nodes share the force in proportion to their limits."""
+    system = block(1.0, 1e4, nodes, friction=ConstantFriction(0.5), load=Load(2.0))
+    times = np.pi / 100.0 * np.arange(7)
+    run = integrate_set_valued(system, start(system, 0.85e-3), times, rtol=rtol, scheme=scheme)
+    assert run.status is Status.FINISHED
+    x, rate = along(system, run)
+    assert x == pytest.approx(1e-3 * np.array([0.85, -0.65, 0.45, -0.25, 0.05, 0.05, 0.05]),
+                              abs=tolerance * 1e-3)
+    assert rate[-1] == pytest.approx(0.0, abs=1e-12)
+    # Stuck: friction is what the spring wants, not what it could be.
+    assert run.friction_force[-1] == pytest.approx(-0.5 / nodes, rel=5e-5)
+    assert run.work[-1, 7] == pytest.approx(0.5e4 * (0.85e-3**2 - 0.05e-3**2), rel=1e-5)
+    assert run.node_friction_work[-1] == pytest.approx(run.work[-1, 7] / nodes, rel=1e-9)
+    assert imbalance(system, run) < max(1e3 * tolerance * 1e-3, 1e-9)
+
+
+@BOTH
+def test_belt_with_falling_friction(scheme, rtol, tolerance):
+    """Leine's oscillator."""
+    system = block(friction=HyperbolicFriction(1.0, 0.0, 1.0 / 3.0), load=Load(1.0),
+                   ground=Ground(speed=0.2))
+    run = integrate_set_valued(system, start(system, 0.5, 0.2), np.linspace(0.0, 40.0, 8001),
+                               rtol=rtol, scheme=scheme)
+    assert period(system, run, 0.5) == pytest.approx(
+        12.0010312948, rel=1e-9 if scheme == "events" else 1e-4)
+    assert along(system, run)[0].max() == pytest.approx(1.1339446764, rel=1e-5)
+    assert imbalance(system, run) < 1e-5
+
+
+def test_belt_with_a_jump_from_static_to_kinetic_friction():
+    system = block(friction=ConstantFriction(0.5), load=Load(1.0), ground=Ground(speed=0.2))
+    run = integrate_set_valued(system, start(system, 0.5, 0.2), np.linspace(0.0, 40.0, 40001),
+                               rtol=1e-11, static_coefficient=1.0)
+    # Stick for 1 / V; slip back to where the circle about x = 1/2 has the speed V again.
+    exact = 5.0 + 2.0 * np.pi - 2.0 * np.arctan(2.5)
+    assert exact == pytest.approx(8.902605414, abs=1e-8)
+    assert period(system, run, 0.5) == pytest.approx(exact, rel=1e-9)
+    assert along(system, run)[0].max() == pytest.approx(1.038516481, abs=1e-7)
+    assert imbalance(system, run) < 1e-9
+
+
+def section_4(amplitude=0.0, **friction):
+    row = np.zeros((3, 2))
+    row[0, 0] = row[1, 1] = 1.0
+    basis = ModalBasis.from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
+                                     {"contact": row[None], "B": row, "C": row})
+    return ContactSystem(
+        basis, normal=RoughSurface(10e6, 10e-6, 40.0), load=Load(14.0),
+        friction=ExponentialFriction(0.8, 0.55, 1000.0, **friction), ground=Ground(speed=1e-3),
+        drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=amplitude,
+                    angular_frequency=13.8))
+
+
+def test_friction_oscillator_without_excitation():
+    system = section_4()
+    run = integrate_set_valued(system, start(system, 0.0), np.linspace(0.0, 8.0, 8001), rtol=1e-10)
+    assert period(system, run, 1.5e-3) == pytest.approx(1.361213293, rel=1e-9)
+    x, rate = along(system, run)
+    late = run.time > 4.0
+    assert x[late].min() == pytest.approx(0.74580e-3, abs=2e-8)
+    assert x[late].max() == pytest.approx(2.00476e-3, abs=1e-8)
+    resting = np.abs(rate - 1e-3) < 1e-12
+    begin = np.flatnonzero(~resting[:-1] & resting[1:]) + 1
+    end = np.flatnonzero(resting[:-1] & ~resting[1:])
+    leaving = run.time[end] + (1.9962980e-3 - x[end]) / 1e-3
+    for row in begin[1:]:
+        arriving = run.time[row] - (x[row] - 0.7462635e-3) / 1e-3
+        slip = arriving - leaving[leaving < arriving][-1]
+        # The places of leaving and arriving are given to 5e-11 m.
+        assert slip == pytest.approx(0.1111787754, abs=1e-7)
+
+
+def den_hartog(beta, ratio, periods, **options):
+    """Coulomb friction beta against a force cos(w t), both over the spring's stiffness."""
+    system = block(friction=ConstantFriction(beta), load=Load(1.0),
+                   drive=Drive(stiffness_x=0.5, amplitude_x=2.0, angular_frequency=ratio),
+                   spring=0.5)
+    times = np.linspace(0.0, periods * 2.0 * np.pi / ratio, 400 * periods + 1)
+    run = integrate_set_valued(system, start(system, 0.0), times, **options)
+    x, rate = along(system, run)
+    return x[-801:], rate[-801:]
+
+
+@pytest.mark.parametrize(("ratio", "beta", "amplitude", "periods"), [
+    (0.8, 0.2, 2.7114152554, 120), (0.8, 0.4, 2.5017878810, 80), (0.9, 0.4, 4.6203419164, 120),
+    (1.25, 0.4, 1.4800496969, 120), (1.5, 0.2, 0.7659416862, 200), (1.5, 0.6, 0.4, 100)])
+def test_den_hartog(ratio, beta, amplitude, periods):
+    x, _ = den_hartog(beta, ratio, periods, rtol=1e-9)
+    assert 0.5 * np.ptp(x) == pytest.approx(amplitude, rel=2e-4)
+
+
+@pytest.mark.parametrize(("ratio", "limit"), [(0.8, 0.8174063857), (1.5, 0.6465790873)])
+def test_den_hartog_stops(ratio, limit):
+    for beta, stops in ((limit - 0.004, False), (limit + 0.004, True)):
+        _, rate = den_hartog(beta, ratio, 150, rtol=1e-9)
+        assert (np.abs(rate) < 1e-12).any() == stops
+
+
+@BOTH
+def test_two_independent_nodes_against_two_single_masses(scheme, rtol, tolerance):
+    """Uncoupled masses on one belt, sticking and slipping each for itself."""
+    single = [block(mass, spring, friction=ConstantFriction(0.5), load=Load(2.0),
+                    ground=Ground(speed=0.02)) for mass, spring in ((1.0, 100.0), (2.0, 300.0))]
+    rows = np.zeros((2, 3, 4))
+    rows[0, 0, 0] = rows[0, 1, 1] = rows[1, 0, 2] = rows[1, 1, 3] = 1.0
+    basis = ModalBasis.from_matrices(np.diag([1.0, 1.0, 2.0, 2.0]),
+                                     np.diag([100.0, 0.0, 300.0, 0.0]),
+                                     {"contact": rows, "C": rows[0] + rows[1]})
+    both = ContactSystem(basis, normal=RoughSurface((1e5, 1e5), 1e-4, 0.0), load=Load(2.0),
+                         friction=ConstantFriction(0.5), ground=Ground(speed=0.02))
+    times = np.linspace(0.0, 2.0, 401)
+    expected = np.array([along(one, integrate_set_valued(one, start(one, 0.03), times,
+                                                         rtol=1e-11))[0] for one in single])
+    T = basis.T[2:, :2].reshape(4, 4)
+    depth = [(one.basis.T[2, :2] @ static_equilibrium(one))[1] for one in single]
+    state = np.concatenate([np.linalg.solve(T, [0.03, depth[0], 0.03, depth[1]]), np.zeros(4)])
+    run = integrate_set_valued(both, state, times, rtol=rtol, scheme=scheme)
+    found = (run.states[:, :4] @ basis.T[2:, 0].T).T
+    assert np.abs(found - expected).max() < (1e-9 if scheme == "events" else 1e-3) * 0.03
+
+
+@pytest.mark.parametrize(("scheme", "longest", "order"), [("events", 0.6, 8), ("stepping", 0.1, 3)])
+def test_order_while_nothing_changes(scheme, longest, order):
+    """Sliding all the time under a driven spring; linear, with a closed form."""
+    system = block(friction=ConstantFriction(0.5), load=Load(1.0), ground=Ground(speed=50.0),
+                   spring=0.5, drive=Drive(stiffness_x=0.5, amplitude_x=1.0, angular_frequency=2.0))
+    end, errors = 12.0, []
+    state = start(system, 0.5)
+    for part in (1.0, 0.5, 0.25):
+        run = integrate_set_valued(system, state, np.array([0.0, end]), rtol=1e-2, scheme=scheme,
+                                   longest=part * longest)
+        # x'' + x = 1/2 + sin(2 t) / 2 from x = 1/2 at rest.
+        errors.append(abs(along(system, run)[0][-1]
+                          - (0.5 + np.sin(end) / 3.0 - np.sin(2.0 * end) / 6.0)))
+    found = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert found[-1] == pytest.approx(order, abs=0.5)
+
+
+def ball(**parts):
+    row = np.array([[0.0], [1.0], [0.0]])
+    return ContactSystem(ModalBasis.from_matrices([[1.0]], [[0.0]],
+                                                  {"contact": row[None], "C": row}), **parts)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.6, 0.9])
+def test_bouncing_ball(restitution):
+    """From a height of 1 m with g = 10 m/s^2, until it rests after infinitely many impacts."""
+    times = np.linspace(0.0, 10.0, 5001)
+    system = ball(load=Load(10.0))
+    run = integrate_set_valued(system, np.array([1.0, 0.0]), times, rtol=1e-10,
+                               restitution=restitution)
+    assert run.status is Status.FINISHED
+    height = 1.0 - 5.0 * times**2
+    moment, speed = np.sqrt(0.2), restitution * 10.0 * np.sqrt(0.2)
+    for _ in range(400):
+        since = times - moment
+        height = np.where(since > 0.0, speed * since - 5.0 * since**2, height)
+        moment, speed = moment + 0.2 * speed, restitution * speed
+    assert moment == pytest.approx(np.sqrt(0.2) * (1 + restitution) / (1 - restitution), rel=1e-9)
+    height[times >= moment] = 0.0
+    assert run.states[:, 0] == pytest.approx(height, abs=1e-11)
+    assert run.states[-1] == pytest.approx(0.0, abs=1e-15)
+    assert run.normal_force[-1] == pytest.approx(10.0, rel=1e-12)
+    assert run.work[-1, 3] == pytest.approx(10.0, rel=1e-12)
+    assert run.work[-1, 6] == pytest.approx(10.0, rel=1e-9)
+
+
+def test_mass_lifted_off_a_rigid_stop():
+    """A load a sin(w t) - F lifts it where a sin(w t) = F; until then the stop holds it."""
+    row = np.array([[0.0], [1.0], [0.0]])
+    basis = ModalBasis.from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
+    system = ContactSystem(basis, load=Load(1.0), drive=Drive(
+        stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5))
+    times = np.linspace(0.0, 2.0, 201)
+    run = integrate_set_valued(system, np.zeros(2), times, rtol=1e-10, restitution=0.5)
+    leaving = np.pi / 3.0
+    resting = times < leaving
+    assert run.normal_force[resting, 0] == pytest.approx(
+        1.0 - 2.0 * np.sin(0.5 * times[resting]), abs=1e-10)
+    # y'' + 2 y = 2 sin(t / 2) - 1 from rest at the moment of leaving.
+    amplitude, since, w = 2.0 / 1.75, times[~resting] - leaving, np.sqrt(2.0)
+    particular = amplitude * np.sin(0.5 * times[~resting]) - 0.5
+    y = (particular - (amplitude * 0.5 - 0.5) * np.cos(w * since)
+         - 0.5 * amplitude * np.cos(0.5 * leaving) / w * np.sin(w * since))
+    assert run.states[~resting, 0] == pytest.approx(y, abs=1e-9)
+
+
+def test_cost_of_smoothing():
+    system = section_4(0.5e-3)
+    period = 2.0 * np.pi / 13.8
+    cost = smoothing_cost(system, 20.0 * period, outputs=4001)
+    assert cost.break_away == pytest.approx(0.8, rel=1e-9)
+    assert cost.break_away_smoothed == pytest.approx(0.7775, abs=5e-4)
+    assert cost.component == "x of B"
+    assert 0.2 < cost.orbit_difference < 2.0
+    assert "0.8 F_N" in cost.sentence
+    finer = smoothing_cost(section_4(0.5e-3, smoothing_slope=1e8), 20.0 * period, outputs=4001)
+    assert finer.orbit_difference < 0.1 * cost.orbit_difference
+
+
+@pytest.mark.parametrize(("options", "message"), [
+    ({"restitution": 1.0}, r"restitution = 1\.0"), ({"restitution": "hard"}, "= 'hard'"),
+    ({"static_coefficient": -1.0}, "static_coefficient"), ({"scheme": "event"}, "mean 'events'"),
+    ({"static_coefficient": (1.0, 2.0)}, "1 contact nodes"), ({"restitution": 0.5}, "friction"),
+])
+def test_options_are_checked(options, message):
+    system = block(load=Load(1.0))
+    with pytest.raises(InputError, match=message):
+        integrate_set_valued(system, start(system, 0.0), np.linspace(0.0, 1.0, 3), **options)
+
+
+def test_friction_with_memory_has_no_set_valued_limit():
+    system = block(friction=LuGreFriction())
+    with pytest.raises(InputError, match="LuGreFriction has no smoothing_slope"):
+        integrate_set_valued(system, np.zeros(4), np.linspace(0.0, 1.0, 3))
