@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from fecontact.contact_energy import POWERS
 from fecontact.errors import InputError, choices, nearest
-from fecontact.integrate import set_valued_nodes as nodes
+from fecontact.integrate import set_valued_problem as kinds
 from fecontact.integrate.scipy_solvers import longest_step
+from fecontact.integrate.set_valued_nodes import compiled_derivative
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.contract import FrictionLaw
 from fecontact.system import ContactSystem
@@ -138,7 +139,7 @@ def integrate_set_valued(
     Y = np.concatenate([state, np.zeros(efforts + n)])
     states = np.empty((len(times), len(Y)))
     friction, normal = np.empty((len(times), n)), np.empty((len(times), n))
-    status = np.where(np.any(problem.rows != 0.0, axis=1), nodes.OPEN, nodes.FIXED)
+    status = np.where(np.any(problem.rows != 0.0, axis=1), kinds.OPEN, kinds.FIXED)
     closed, counts = np.zeros(n, dtype=np.int64), np.zeros(6, dtype=np.int64)
     reached = np.array([times[0], 0.01 * longest])
     carried = np.zeros(3 + n)
@@ -158,7 +159,7 @@ def integrate_set_valued(
         "rejected": int(counts[1]), "events": int(counts[2]), "impacts": int(counts[3]),
         "seconds": clock.perf_counter() - begin}
     if outcome > 1:
-        ended = Status.MINIMUM_STEP if outcome == nodes.STUCK else Status.NOT_FINITE
+        ended = Status.MINIMUM_STEP if outcome == kinds.STUCK else Status.NOT_FINITE
     done = int(counts[4])
     time, states = times[:done], states[:done]
     friction, normal = friction[:done], normal[:done]
@@ -176,7 +177,7 @@ def _problem(
     restitution: float | None,
     static_coefficient: float | Sequence[float] | None,
     longest: float,
-) -> nodes.Problem:
+) -> kinds.Problem:
     n = system.basis.contact_nodes
     if restitution is not None and not (isinstance(restitution, Real) and 0.0 <= restitution < 1.0):
         raise InputError(f"restitution = {restitution!r} must be a number from 0 to below 1.")
@@ -186,9 +187,9 @@ def _problem(
     arrays = system.arrays._replace(friction_parameters=np.vstack(
         [np.pad(table, ((0, 0), (0, width - table.shape[1]))) for table in tables]))
     cluster, rows = _clusters(arrays.Tx)
-    problem = nodes.Problem(arrays, _static(static_coefficient, n), cluster, rows,
+    problem = kinds.Problem(arrays, _static(static_coefficient, n), cluster, rows,
                             1e-4 * longest, -1.0 if restitution is None else float(restitution),
-                            nodes.compiled_derivative.address)
+                            compiled_derivative.address)
     if restitution is not None:
         _require_free_stops(system, groups, problem)
     return problem
@@ -198,7 +199,7 @@ def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
     if law.memory or "smoothing_slope" not in (entry.name for entry in fields(law)):
         raise InputError(f"{type(law).__name__} has no smoothing_slope that could become infinite; "
                          f"set-valued friction needs a law with one, without memory.")
-    steep: dict[str, Any] = {"smoothing_slope": nodes.STEEP}
+    steep: dict[str, Any] = {"smoothing_slope": kinds.STEEP}
     return replace(law, **steep)
 
 
@@ -234,10 +235,10 @@ def _static(given: Any, n: int) -> Array:
 
 
 def _require_free_stops(
-    system: ContactSystem, groups: list[tuple[FrictionLaw, Array]], problem: nodes.Problem
+    system: ContactSystem, groups: list[tuple[FrictionLaw, Array]], problem: kinds.Problem
 ) -> None:
     limits = np.concatenate([
-        [law.kernel.python(nodes.CREEP, 1.0, row)[0] for row in law.table(share)]
+        [law.kernel.python(kinds.CREEP, 1.0, row)[0] for row in law.table(share)]
         for law, share in groups])
     rubbing = np.any(problem.system.Tx != 0.0, axis=1) & (
         (limits != 0.0) | (problem.static > 0.0))
@@ -252,7 +253,7 @@ def _require_free_stops(
                          f"modes.")
 
 
-def _chosen(problem: nodes.Problem, scheme: str) -> str:
+def _chosen(problem: kinds.Problem, scheme: str) -> str:
     if scheme not in SCHEMES:
         raise InputError(f"scheme = {scheme!r} must be one of {choices(SCHEMES)}"
                          f"{nearest(str(scheme), SCHEMES)}.")

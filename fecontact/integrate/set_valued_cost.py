@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fecontact.errors import InputError
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.set_valued import integrate_set_valued
-from fecontact.integrate.set_valued_nodes import CREEP, STEEP
+from fecontact.integrate.set_valued_problem import CREEP, STEEP
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.friction_curve import coefficient, largest_coefficient

@@ -15,7 +15,8 @@ import math
 import numpy as np
 
 from fecontact.compiled import helper
-from fecontact.integrate.set_valued_nodes import (
+from fecontact.integrate.set_valued_nodes import derivative, solve, speed_rate
+from fecontact.integrate.set_valued_problem import (
     CURVED,
     FIXED,
     OPEN,
@@ -23,9 +24,6 @@ from fecontact.integrate.set_valued_nodes import (
     RATE,
     SLOPE,
     STICK,
-    derivative,
-    solve,
-    speed_rate,
 )
 
 SWEEPS = 20000

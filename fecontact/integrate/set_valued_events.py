@@ -12,7 +12,8 @@ from numba import types
 
 from fecontact.compiled import f8, i8, integers, kernel, matrix, vector
 from fecontact.integrate.set_valued_decisions import decide_clusters, decide_stops, hold_velocity
-from fecontact.integrate.set_valued_nodes import (
+from fecontact.integrate.set_valued_nodes import derivative, margins
+from fecontact.integrate.set_valued_problem import (
     DIVERGED,
     EVENTS,
     FINISHED,
@@ -28,8 +29,6 @@ from fecontact.integrate.set_valued_nodes import (
     STEPS,
     STICK,
     STUCK,
-    derivative,
-    margins,
     workspace,
 )
 from fecontact.integrate.set_valued_steps import (

@@ -10,86 +10,37 @@ Sticking clusters have ``a_c = 0``, which gives their ``R_c``; each node takes a
 proportion to its limit. The state of these kernels is Y = [q, q', work, friction work per node].
 """
 
-from typing import Any, NamedTuple
-
-import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.compiled import (
     compile_law,
     f8,
     function_at,
     helper,
-    i8,
     integers,
-    matrix,
     vector,
 )
-from fecontact.contact_kernels import SYSTEM, node_motion
+from fecontact.contact_kernels import node_motion
+from fecontact.integrate.set_valued_problem import (
+    CREEP,
+    CURVED,
+    EFFORTS,
+    FIXED,
+    FORCE,
+    GROUND_RATE,
+    LIMIT,
+    OPEN,
+    PENETRATION,
+    PRESSING,
+    PROBLEM,
+    RATE,
+    SLIP,
+    SLOPE,
+    STICK,
+    WORKSPACE,
+)
 from fecontact.laws.contract import friction_at, ground_at, normal_at, signal_at
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-# Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
-# curve of the coefficient has not begun to change.
-STEEP, CREEP = 1e36, 1e-18
-
-# Columns of `Workspace.nodes`.
-FORCE, PRESSING, PENETRATION, RATE, SLIP, GROUND_RATE, SLOPE, CURVED, LIMIT = range(9)
-NODE_COLUMNS = 9
-
-# Status of a cluster; a slipping one has the sign of its slip velocity, +1 or -1.
-OPEN, STICK, FIXED = 0, 2, 3
-
-EFFORTS = 8
-
-# What a run returns: steps used up, end reached, step too short, numbers not finite.
-GOING_ON, FINISHED, STUCK, DIVERGED = range(4)
-
-# Entries of a run's ``counts``: what it has done, outputs written, whether it has begun.
-STEPS, REJECTED, EVENTS, IMPACTS, OUTPUTS, STARTED = range(6)
-
-
-class Problem(NamedTuple):
-    """A system with set-valued friction, as the kernels see it.
-
-    ``system`` has unsmoothed friction; ``static`` (n,) is the coefficient that limits stick, below
-    zero for the law's own; ``cluster`` (n,) is the cluster of each node, ``rows`` (k, m) are those
-    of the clusters; ``tick`` is the time over which the ground's speed is differentiated;
-    ``restitution`` is below zero for compliant contact; ``derivative`` the address of
-    :data:`compiled_derivative`.
-    """
-
-    system: Any
-    static: Array
-    cluster: Integers
-    rows: Array
-    tick: float
-    restitution: float
-    derivative: int
-
-
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, i8], Problem)
-
-
-class Workspace(NamedTuple):
-    """Results per node and per cluster of the last evaluation, and room for small systems."""
-
-    nodes: Array
-    friction: Array
-    total: Array
-    limit: Array
-    pressing: Array
-    slip: Array
-    matrix: Array
-    right: Array
-    indices: Integers
-
-
-WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, matrix, vector,
-                              integers], Workspace)
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
 DERIVATIVE = types.void(f8, vector, PROBLEM, integers, integers, WORKSPACE, vector)
 _derivative_at = function_at(DERIVATIVE)
@@ -99,16 +50,6 @@ _derivative_at = function_at(DERIVATIVE)
 def derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
     _derivative_at(p.derivative)(t, Y, p, status, closed, w, out)
-
-
-@helper
-def workspace(p):  # type: ignore[no-untyped-def]
-    """Room for a problem."""
-    n, k = len(p.cluster), len(p.rows)
-    size = max(n, k)
-    return Workspace(np.zeros((n, NODE_COLUMNS)), np.zeros(n), np.zeros(k), np.zeros(k),
-                     np.zeros(k), np.zeros(k), np.zeros((size, size)), np.zeros(size),
-                     np.zeros(size, np.int64))
 
 
 @helper
@@ -237,8 +178,8 @@ def observe(t, Y, p, nodes):  # type: ignore[no-untyped-def]
 @helper
 def slipping_force(j, slip, sign, pressing, s):  # type: ignore[no-untyped-def]
     """R of node j that slips with the given sign, also where its slip velocity is still zero."""
-    speed = max(sign * slip, CREEP)
-    return friction_at(s.friction[j])(sign * speed, pressing, s.friction_parameters[j])[0]
+    v = sign * max(sign * slip, CREEP)
+    return friction_at(s.friction[j])(v, pressing, s.friction_parameters[j])[0]
 
 
 @helper
