@@ -35,15 +35,15 @@ class LogarithmicFriction(fc.FrictionLaw):
 
     kernel: ClassVar = _logarithmic
 
-    coefficient: float = 0.1
-    rate_effect: float = 0.01
-    reference_velocity: float = 1e-4
-    smoothing_slope: float = 1e4
+    coefficient: fc.PerNode = 0.1
+    rate_effect: fc.PerNode = 0.01
+    reference_velocity: fc.PerNode = 1e-4
+    smoothing_slope: fc.PerNode = 1e4
 
     @property
     def velocity_scale(self) -> float:
         """Slip velocity over which the force rises [m/s]."""
-        return 1.0 / self.smoothing_slope
+        return 1.0 / float(np.max(self.smoothing_slope))
 
 
 def main() -> None:

@@ -10,7 +10,14 @@ from .geometry import Beam, Block, Pendulum, generate
 from .integrate.initial import RigidStart
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
-from .laws.contract import FrictionLaw, NormalLaw, friction_law, memory_friction_law, normal_law
+from .laws.contract import (
+    FrictionLaw,
+    NormalLaw,
+    PerNode,
+    friction_law,
+    memory_friction_law,
+    normal_law,
+)
 from .laws.drive import Drive, Load, PointLoad
 from .laws.friction import (
     ConstantFriction,
@@ -99,6 +106,7 @@ __all__ = [
     "ParabolicSurface",
     "Patch",
     "Pendulum",
+    "PerNode",
     "PointLoad",
     "PowerContact",
     "PowerLawContact",

@@ -42,10 +42,11 @@ def _package_stamp() -> str:
     return stamp.hexdigest()
 
 
-def _stamp(compiled: Any) -> None:
+def _stamp(compiled: Any, module: str = "") -> None:
+    """Key stored code by the package's sources, and by the module name that it refers to."""
     stored = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if stored is not None and hasattr(stored, "_source_stamp"):
-        stored._source_stamp = (stored._source_stamp, _package_stamp())
+        stored._source_stamp = (stored._source_stamp, _package_stamp(), module)
 
 
 def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -139,7 +140,7 @@ class CompiledLaw:
         # Functions typed into a console have no file beside which they could be stored.
         if Path(inspect.getfile(function)).is_file():
             law.enable_caching()
-            _stamp(law)
+            _stamp(law, function.__module__)
         try:
             law.compile()
         except (NumbaError, TypeError) as error:

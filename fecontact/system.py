@@ -89,8 +89,8 @@ class ContactSystem:
         for group in given:
             if group not in names:
                 raise InputError(f"ContactSystem: {name} has a law for the contact group "
-                                 f"'{group}'{nearest(group, names)}, but the groups of the basis "
-                                 f"are: {choices(names)}.")
+                                 f"{group!r}{nearest(str(group), names)}, but the groups of "
+                                 f"the basis are: {choices(names)}.")
         missing = [group for group in names if group not in given]
         if missing:
             raise InputError(f"ContactSystem: {name} lacks a law for the contact "
@@ -312,6 +312,8 @@ def _outer_name(system: ContactSystem, name: str) -> str:
     if kind not in ("normal", "friction") or not isinstance(getattr(system, kind), Mapping):
         return name
     group, _, last = rest.partition(".")
+    if group not in getattr(system, kind):
+        return name
     return f"contact.{group}.{kind}.{last}" if last else f"contact.{group}.{kind}"
 
 

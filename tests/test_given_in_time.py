@@ -99,9 +99,8 @@ def test_friction_varies_along_the_ground():
     law = fc.ConstantFriction(friction_coefficient=0.4, smoothing_slope=1e6)
     system = point(normal=fc.PrescribedForce(10.0), friction=law,
                    ground=fc.Ground(speed=0.1, friction_variation=variation))
-    history = []
-    for t in np.linspace(0.0, 0.1, 21):
-        history.append(system.contact_history(np.array([t]), np.zeros((1, 2)))[0, 0, 1])
+    history = [system.contact_history(np.array([t]), np.zeros((1, 2)))[0, 0, 1]
+               for t in np.linspace(0.0, 0.1, 21)]
     places = -0.1 * np.linspace(0.0, 0.1, 21)
     wanted = -4.0 * (1.0 + 0.5 * np.sin(2.0 * np.pi * places / 0.01))
     assert history == pytest.approx(wanted, rel=1e-5)

@@ -129,6 +129,7 @@ def f(v, F, p):
 @dataclass(frozen=True)
 class Law(FrictionLaw):
     kernel: ClassVar = f
+    velocity_scale: ClassVar = 1e-6
 """
     (tmp_path / "bad.py").write_text("class Law(:\n")
     (tmp_path / "other.py").write_text(good)
@@ -286,3 +287,74 @@ def test_example_in_the_documentation_is_the_example():
     for line in block.split("```")[0].splitlines():
         if line.strip() and not line.startswith("    def "):
             assert line in example, line
+
+
+MEMORY_LAW = """
+from dataclasses import dataclass
+from typing import ClassVar
+import fecontact as fc
+
+@fc.memory_friction_law
+def f(v, F, z, p, force, rates):
+    force[0] = F * 1e5 * z[0]
+    force[1] = 0.0
+    force[2] = 1e5 * z[0]
+    force[3] = F * 1e5
+    rates[0, 0] = v - 2e5 * abs(v) * z[0]
+    rates[0, 1] = 1.0 - 2e5 * z[0] * (1.0 if v >= 0.0 else -1.0)
+    rates[0, 2] = 0.0
+    rates[0, 3] = -2e5 * abs(v)
+
+@dataclass(frozen=True)
+class Mine(fc.FrictionLaw):
+    kernel: ClassVar = f
+    memory: ClassVar = 1
+    velocity_scale: ClassVar = 1e-5
+"""
+
+
+def test_own_law_with_memory_runs_is_kept_and_read(tmp_path):
+    (tmp_path / "own.py").write_text(MEMORY_LAW)
+    path = tmp_path / "study.toml"
+    path.write_text(f'{HEAD}\n[friction]\nlaw = "own.py:Mine"\n[load]\nnormal = 10.0\n[ground]\n'
+                    f'speed = 0.01\n[drive]\nstiffness_x = 1e4\n')
+    system = Study.read(path).system()
+    assert (system.friction.stick_velocity(5) == 1e-4).all()
+    run = fc.simulate(system, 2e-3, outputs=21)
+    assert run.status is fc.Status.FINISHED
+    assert set(run.contact_state.ravel().tolist()) <= {0, 1, 2}
+    fc.write_case(tmp_path / "a.vtkhdf", run)
+    again = fc.read_case(tmp_path / "a.vtkhdf").trajectory
+    assert (again.friction_force == run.friction_force).all()
+    # A copy elsewhere compiles for itself, also beside the stored code of the first one.
+    import shutil
+
+    shutil.copytree(tmp_path, tmp_path / "copy")
+    assert fc.simulate(Study.read(tmp_path / "copy" / "study.toml").system(), 1e-4).time[-1] == 1e-4
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ("    memory: ClassVar = 1\n", "", "memory = 0 must be the number of internal variables"),
+    ("memory: ClassVar = 1", "memory: ClassVar = -1", "memory = -1 must be"),
+    ("velocity_scale: ClassVar = 1e-5", "velocity_scale: ClassVar = 0.0", "velocity_scale = 0.0"),
+    ("    velocity_scale: ClassVar = 1e-5\n", "", "velocity_scale = None must be a finite number"),
+    ("@fc.memory_friction_law\n", "", "needs kernel: ClassVar = a function"),
+    ("@fc.memory_friction_law", "@fc.normal_law", "needs kernel: ClassVar = a function"),
+])
+def test_incomplete_own_laws_are_refused(old, new, message, tmp_path):
+    assert old in MEMORY_LAW
+    text = MEMORY_LAW.replace(old, new).replace(
+        "-> F", "") if "normal" not in new else MEMORY_LAW.replace(old, new)
+    (tmp_path / "own.py").write_text(text)
+    path = tmp_path / "study.toml"
+    path.write_text(f'{HEAD}\n[friction]\nlaw = "own.py:Mine"\n')
+    with pytest.raises(fc.FecontactError, match=message):
+        Study.read(path).system()
+
+
+def test_lists_per_node_are_counted_rightly():
+    with pytest.raises(fc.FecontactError, match="stiffness has 3, roughness_height has 2"):
+        fc.RoughSurface((1e6,) * 3, (1e-6,) * 2).node_count()
+    basis = Study.from_toml(HEAD).basis()
+    with pytest.raises(fc.FecontactError, match="3 values for 5 contact nodes"):
+        fc.ContactSystem(basis, normal=fc.RoughSurface((1e6,) * 3))

@@ -14,6 +14,7 @@ from fecontact.errors import InputError
 from fecontact.integrate import run_arrays, stepping
 from fecontact.integrate.checkpoint import Checkpoint
 from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
+from fecontact.integrate.scipy_solvers import energy_scale
 from fecontact.integrate.trajectory import Status
 from fecontact.system import ContactSystem
 
@@ -101,7 +102,8 @@ def start(
         friction without memory slip velocities are resolved to a hundredth of their distance
         from rest, or of the width of the smoothing.
     work : bool
-        Whether to integrate the powers.
+        Whether to integrate the powers. Their error of one step is kept below ``rtol`` of the
+        largest energy so far, so that the energy balance closes.
     """
     if not np.isfinite(state).all():
         raise InputError("The initial state holds values that are not finite.")
@@ -116,12 +118,17 @@ def start(
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
     longest = longest_step(system, times)
+    with np.errstate(over="ignore", invalid="ignore"):
+        energy = energy_scale(system, state)
     control = Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
-        breaks=np.array(system.breakpoints(float(times[0]), float(times[-1]))), rtol=float(rtol), slip_part=_SLIP_PART,
-        longest=longest, speed_scale=system.velocity_scale, work=int(work))
-    acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
+        breaks=np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
+        speed_scale=system.velocity_scale, energy_scale=energy,
+        work=int(work))
+    with np.errstate(over="ignore", invalid="ignore"):
+        acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
     first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * longest)
     return Run(
@@ -155,7 +162,7 @@ def finish(
 
     ``keep`` is called after every piece of the run.
     """
-    steps = 1000
+    steps = 200
     while True:
         begin = clock.perf_counter()
         status = run.advance(steps)

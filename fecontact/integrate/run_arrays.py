@@ -13,8 +13,8 @@ from fecontact.integrate import linear, motion, rodas
 Array = NDArray[np.float64]
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
-# fail may still lie ahead, else zero.
-TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS = range(7)
+# fail may still lie ahead, else zero. ENERGY is the largest energy or work so far.
+TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS, ENERGY = range(8)
 # Entries of Progress.counts.
 STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(6)
 
@@ -35,9 +35,9 @@ class Control(NamedTuple):
         Largest motion of each mode at any point.
     breaks : (k,) array
         Times to step on to.
-    rtol, slip_part, longest, speed_scale : float
+    rtol, slip_part, longest, speed_scale, energy_scale : float
         Relative tolerance, part of the distance from stick to which slip velocities are resolved,
-        longest step [s], velocity below which errors count as if the velocity were this large.
+        longest step [s], velocity and energy below which errors count as if they were this large.
     work : int
         Whether to integrate the powers.
     """
@@ -53,10 +53,11 @@ class Control(NamedTuple):
     slip_part: float
     longest: float
     speed_scale: float
+    energy_scale: float
     work: int
 
 
-CONTROL = types.NamedTuple([vector] * 7 + [f8] * 4 + [i8], Control)
+CONTROL = types.NamedTuple([vector] * 7 + [f8] * 5 + [i8], Control)
 
 
 class Progress(NamedTuple):
@@ -141,7 +142,7 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
 
 def progress_for(state: Array, time: float, step: float, modes: int, nodes: int) -> Progress:
     """A run that is about to start."""
-    numbers = np.zeros(7)
+    numbers = np.zeros(8)
     numbers[TIME], numbers[STEP] = time, step
     size = len(state)
     return Progress(

@@ -58,7 +58,7 @@ def integrate(
         return out
 
     begin = clock.perf_counter()
-    energy = 0.01 * rtol * _energy_scale(system, state)
+    energy = 0.01 * rtol * energy_scale(system, state)
     tolerance = np.concatenate([absolute_tolerances(system, rtol), np.full(extra, energy)])
     ends = [*system.breakpoints(float(times[0]), float(times[-1])), float(times[-1])]
 
@@ -134,7 +134,7 @@ def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
                            rtol * system.memory_scales])
 
 
-def _energy_scale(system: ContactSystem, state: Array) -> float:
+def energy_scale(system: ContactSystem, state: Array) -> float:
     """Energy at the start, of the drive's springs and of the load over the roughness [J]."""
     m, drive = system.basis.modes, system.drive
     q, rate = state[:m], state[m : 2 * m]

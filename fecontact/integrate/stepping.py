@@ -10,6 +10,7 @@ from fecontact.integrate import linear, motion, rodas, run_arrays
 from fecontact.integrate.borrowed import borrowed, inlined
 from fecontact.integrate.run_arrays import (
     CAUTIOUS,
+    ENERGY,
     LAST_ERROR,
     LAST_STEP,
     OUTPUTS,
@@ -23,7 +24,7 @@ from fecontact.integrate.run_arrays import (
     TIME,
     WORST_NODE,
 )
-from fecontact.integrate.work import add_up, work_until
+from fecontact.integrate.work import add_up, work_error, work_until
 from fecontact.laws.contract import signal_at
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE = range(4)
@@ -127,6 +128,20 @@ def _slip_error(error, s, shapes, control, progress, room):  # type: ignore[no-u
 
 
 @inlined
+def _energy(control, progress, room):  # type: ignore[no-untyped-def]
+    """The largest of kinetic energy, work of a power and the energy scale so far [J]."""
+    m = len(control.largest)
+    kinetic = 0.0
+    for i in range(m):
+        kinetic += 0.5 * room.after[m + i] ** 2
+    energy = max(max(progress.numbers[ENERGY], kinetic), control.energy_scale)
+    for k in range(8):
+        energy = max(energy, abs(progress.work[k]))
+    progress.numbers[ENERGY] = energy
+    return energy
+
+
+@inlined
 def _go_on(progress, room):  # type: ignore[no-untyped-def]
     """Make the end of the step the state of the run."""
     for k in range(len(progress.state)):
@@ -225,6 +240,11 @@ def advance(  # type: ignore[no-untyped-def]
             motion.set_rate_and_gradients(room.after, s, shapes, room.given, room.pull, room.nodes,
                                           room.gradients_after, room.rate_after)
             error = _slip_error(error, s, shapes, control, progress, room)
+            if control.work and error <= 1.0:
+                rodas.dense_coefficients(room.stages, room.dense)
+                add_up(t, h, latest, s, progress, room)
+                error = max(error, work_error(h, room.power) / (
+                    control.rtol * _energy(control, progress, room)))
 
         factor = _LARGEST_FACTOR
         if error > 1e-6:
@@ -241,9 +261,6 @@ def advance(  # type: ignore[no-untyped-def]
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
 
-        if control.work:
-            rodas.dense_coefficients(room.stages, room.dense)
-            add_up(t, h, latest, s, progress, room)
         row = counts[OUTPUTS]
         if times[row] <= target:
             if not control.work:

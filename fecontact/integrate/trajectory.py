@@ -21,8 +21,8 @@ class Status(Enum):
 
     FINISHED = "The run reached its end."
     INTERRUPTED = "The run was interrupted; what was computed until then is kept."
-    MINIMUM_STEP = ("The steps of the integrator became too small to go on; what was computed until "
-                    "then is kept.")
+    MINIMUM_STEP = ("The steps of the integrator became too small to go on; what was computed "
+                    "until then is kept.")
     NOT_FINITE = "The motion grew beyond all numbers; what was computed until then is kept."
     FAILED = "The integrator could not go on; what was computed until then is kept."
 

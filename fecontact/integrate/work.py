@@ -21,6 +21,29 @@ def _lagrange_integral(k: int) -> np.ndarray:
 _INTEGRALS = np.array([_lagrange_integral(k) for k in range(4)])
 
 
+def _third_difference() -> np.ndarray:
+    """Weights of the integral of the cubic through four powers less that of a parabola."""
+    divided = np.array([1.0 / np.prod(_POINTS[k] - np.delete(_POINTS, k)) for k in range(4)])
+    left = np.polynomial.polynomial.polyint(
+        np.polynomial.polynomial.polyfromroots([0.0, _INSIDE, 1.0]))
+    return divided * float(np.abs(np.polynomial.polynomial.polyval(1.0, left)))
+
+
+_DIFFERENCE = _third_difference()
+
+
+@inlined
+def work_error(h, power):  # type: ignore[no-untyped-def]
+    """Estimated error of the work of the system's powers in a step, the largest of them [J]."""
+    largest = 0.0
+    for k in range(8):
+        difference = 0.0
+        for point in range(4):
+            difference += _DIFFERENCE[point] * power[point, k]
+        largest = max(largest, abs(difference))
+    return h * largest
+
+
 @inlined
 def add_up(t, h, latest, s, progress, room):  # type: ignore[no-untyped-def]
     """Fill ``room.power`` with the powers at the points of a step."""

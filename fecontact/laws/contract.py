@@ -57,17 +57,21 @@ memory_at = function_at(MEMORY)
 ground_at = function_at(GROUND)
 signal_at = function_at(SIGNAL)
 
+NORMAL_FORM = "f(u, v, p) -> F, dF/du, dF/dv"
+FRICTION_FORM = "f(v, F, p) -> R, dR/dv, dR/dF"
+MEMORY_FORM = "f(v, F, z, p, force, rates)"
+
 PerNode = float | tuple[float, ...]
 
 
 def normal_law(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(u, v, p) -> F, dF/du, dF/dv``."""
-    return compile_law(NORMAL, "f(u, v, p) -> F, dF/du, dF/dv", function)
+    return compile_law(NORMAL, NORMAL_FORM, function)
 
 
 def friction_law(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(v, F, p) -> R, dR/dv, dR/dF``."""
-    return compile_law(FRICTION, "f(v, F, p) -> R, dR/dv, dR/dF", function)
+    return compile_law(FRICTION, FRICTION_FORM, function)
 
 
 def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
@@ -77,7 +81,7 @@ def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
 
 def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``f(v, F, z, p, force, rates)`` that fills force and rates."""
-    return compile_law(MEMORY, "f(v, F, z, p, force, rates)", function)
+    return compile_law(MEMORY, MEMORY_FORM, function)
 
 
 def signal(function: Callable[..., Any]) -> CompiledLaw:
@@ -91,6 +95,8 @@ class NodeLaw:
 
     kernel: ClassVar[CompiledLaw]
     extensive: ClassVar[frozenset[str]] = frozenset()
+    # Parameters whose lists are not one value per node.
+    shared_fields: ClassVar[frozenset[str]] = frozenset()
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
@@ -109,10 +115,30 @@ class NodeLaw:
             if array.dtype.kind not in "iuf" or array.ndim > 1 or not array.size:
                 raise InputError(f"{self._title(entry.name)} = {given!r} must be a number or a "
                                  f"list of numbers, one per contact node.")
+            if array.ndim and entry.type in (float, "float"):
+                raise InputError(f"{self._title(entry.name)} = {given!r} must be a number; only "
+                                 f"parameters annotated as PerNode take one per contact node.")
             value = tuple(float(item) for item in array) if array.ndim else float(array)
             if not np.isfinite(value).all():
                 raise InputError(f"{self._title(entry.name)} = {value!r} must be finite.")
             object.__setattr__(self, entry.name, value)
+
+    def node_count(self) -> int | None:
+        """Number of contact nodes for which parameters are given one by one; None if for none.
+
+        Raises
+        ------
+        InputError
+            If two parameters have different numbers of values.
+        """
+        sizes = {entry.name: len(value) for entry in fields(self)
+                 if entry.name not in self.shared_fields
+                 and isinstance(value := getattr(self, entry.name), tuple)}
+        if len(set(sizes.values())) > 1:
+            listed = ", ".join(f"{name} has {size}" for name, size in sizes.items())
+            raise InputError(f"{type(self).__name__}: parameters given per contact node need as "
+                             f"many values each, but {listed}.")
+        return next(iter(sizes.values()), None)
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters (n, k) of n nodes; ``share`` (n,) is each node's part of the face."""
@@ -186,10 +212,12 @@ class FrictionLaw(NodeLaw):
         """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
 
         It is where the friction force is largest for a given normal force; where it has no
-        maximum, ten times :attr:`velocity_scale`.
+        maximum, and for laws with memory, ten times :attr:`velocity_scale`.
         """
         from fecontact.laws.friction_curve import stick_velocity
 
+        if self.memory:
+            return np.full(nodes, 10.0 * self.velocity_scale)
         return stick_velocity(self, nodes)
 
     def sticks(

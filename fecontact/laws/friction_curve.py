@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from fecontact.compiled import f8, i8, kernel, matrix, vector
+from fecontact.errors import InputError
 from fecontact.laws.contract import FrictionLaw, friction_at
 
 Array = NDArray[np.float64]
@@ -131,6 +132,9 @@ def _curve(law: FrictionLaw, velocity: Array | float, F: float, column: int) -> 
 
 
 def _sampled(law: FrictionLaw, v: Array, F: float, row: Array) -> Array:
+    if law.memory:
+        raise InputError(f"{type(law).__name__} has memory: its force is not a curve over slip "
+                         f"velocity.")
     out = np.empty((v.size, 2))
     _sample(law.kernel.address, np.array(v), F, row, out)
     return out

@@ -5,9 +5,12 @@ from functools import lru_cache
 import numpy as np
 from numba import types
 
-from fecontact.compiled import i8, kernel, matrix, vector
+from fecontact.compiled import CompiledLaw, i8, kernel, matrix, vector
 from fecontact.errors import InputError
 from fecontact.laws.contract import (
+    FRICTION_FORM,
+    MEMORY_FORM,
+    NORMAL_FORM,
     FrictionLaw,
     NormalLaw,
     friction_at,
@@ -52,13 +55,31 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
     The message says what it returned, and where.
     """
     name = type(law).__name__
-    if not hasattr(type(law), "kernel"):
-        raise InputError(f"{name} has no 'kernel'; give it one, kernel: ClassVar = a function "
-                         f"compiled by normal_law or friction_law.")
-    values = [np.atleast_1d(value) for value in vars(law).values() if not isinstance(value, str)]
-    nodes = max((len(value) for value in values), default=1)
+    normal = isinstance(law, NormalLaw)
+    forms = {"normal_law": NORMAL_FORM} if normal else {
+        "friction_law": FRICTION_FORM, "memory_friction_law": MEMORY_FORM}
+    function = getattr(type(law), "kernel", None)
+    if not isinstance(function, CompiledLaw) or function.form not in forms.values():
+        raise InputError(f"{name} needs kernel: ClassVar = a function "
+                         f"{' or '.join(forms.values())} decorated with {' or '.join(forms)}.")
+    if isinstance(law, FrictionLaw):
+        states = law.memory
+        if isinstance(states, bool) or not isinstance(states, int) or (
+                states < 0) or (states > 0) != (function.form == MEMORY_FORM):
+            raise InputError(f"{name}: memory = {states!r} must be the number of internal "
+                             f"variables, a whole number, above zero exactly for kernels of "
+                             f"memory_friction_law.")
+    what = "penetration_scale" if normal else "velocity_scale"
+    try:
+        scale = getattr(law, what)
+    except NotImplementedError:
+        scale = None
+    if not isinstance(scale, float | int) or not 0.0 < scale < np.inf:
+        raise InputError(f"{name}: {what} = {scale!r} must be a finite number above zero; define "
+                         f"it as a property of the law.")
+    nodes = law.node_count() or 1
     row = law.table(np.full(nodes, 1.0 / nodes))[0]
-    address = law.kernel.address
+    address = function.address
     if isinstance(law, NormalLaw):
         names, places = "u, v", _NORMAL_PLACES
         out = np.empty((len(places), 3))
