@@ -22,18 +22,22 @@ def laws_table() -> Any:
 def law_help(name: str) -> str:
     """The documentation of the laws of a name, and how they stand in a study file.
 
+    The name is that in study files or that of the class; capitals do not matter.
+
     Raises
     ------
     InputError
         If there is no such law, with those that there are.
     """
-    found = [(kind, names[name]) for kind, names in law_names().items() if name in names]
+    laws = [(kind, law, cls) for kind, names in law_names().items() for law, cls in names.items()]
+    found = [(kind, law, cls) for kind, law, cls in laws
+             if name.lower() in (law, cls.__name__.lower())]
     if not found:
-        known = {law for names in law_names().values() for law in names}
+        known = {law for _, law, _ in laws}
         raise InputError(f"There is no law '{name}'{nearest(name, known)}; there are: "
                          f"{choices(known)}.")
-    return "\n\n".join(f"{inspect.getdoc(cls)}\n\nIn a study file:\n\n{_example(kind, name, cls)}"
-                       for kind, cls in found)
+    return "\n\n".join(f"{inspect.getdoc(cls)}\n\nIn a study file:\n\n{_example(kind, law, cls)}"
+                       for kind, law, cls in found)
 
 
 def _example(kind: type, name: str, cls: type) -> str:
@@ -42,10 +46,17 @@ def _example(kind: type, name: str, cls: type) -> str:
         default = entry.default_factory() if callable(entry.default_factory) else entry.default
         if default is MISSING:
             lines.append(f"    {entry.name} =")
-        elif default is not None:
+        elif default is None or default == ():
+            lines.append(f"    # {entry.name} = {_hint(str(entry.type))}")
+        else:
             shown = list(default) if isinstance(default, tuple) else default
             lines.append(f"    {entry.name} = {json.dumps(shown)}")
     return "\n".join(lines)
+
+
+def _hint(annotation: str) -> str:
+    """What the value of an optional key looks like."""
+    return "[...]" if "tuple" in annotation else '"..."' if "str" in annotation else "..."
 
 
 def _title(kind: type) -> str:

@@ -85,13 +85,15 @@ class Drive:
     def frequency_hz(self) -> float:
         """Frequency of the excitation [Hz]; zero where it has none.
 
-        That of the harmonic motion, or else the lower one of the motions that are given.
+        That of a harmonic motion with an amplitude, or else the lower one of the motions that are
+        given; where none is given, w_E / (2 pi).
         """
-        given = [motion.frequency_hz for motion in (self.motion_x, self.motion_y)
-                 if motion is not None and motion.frequency_hz is not None]
-        if self.angular_frequency > 0.0 or not given:
+        given = [motion for motion in (self.motion_x, self.motion_y) if motion is not None]
+        harmonic = self.angular_frequency > 0.0 and (self.amplitude_x or self.amplitude_y)
+        if harmonic or not given:
             return self.angular_frequency / (2.0 * math.pi)
-        return min(given)
+        return min((motion.frequency_hz for motion in given if motion.frequency_hz is not None),
+                   default=0.0)
 
 
 @dataclass(frozen=True)

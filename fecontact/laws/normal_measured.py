@@ -1,9 +1,8 @@
 """Rough surface with the bearing-area curve of a measured profile."""
 
 import math
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from fecontact.errors import InputError, require_positive
 from fecontact.laws.contract import PerNode, normal_law
 from fecontact.laws.normal import RoughSurface
+from fecontact.laws.records import read_columns
 
 _INTERVALS, _HEAD, _KNOT = 64, 3, 3
 _HALF = np.linspace(0.0, 1.0, _INTERVALS // 2 + 1) ** 2 / 2.0
@@ -77,8 +77,10 @@ class MeasuredSurface(RoughSurface):
     depths : sequence
         s of these values, growing from 0 to 1; at equal steps by default.
     file : str, optional
-        A file of heights in m, see :meth:`from_file`, which gives ``bearing``, ``depths``
-        and ``roughness_height``. It is read once; afterwards ``file`` is None.
+        A file of heights, see :meth:`from_file`, instead of ``bearing``, ``depths`` and
+        ``roughness_height``, which it gives. It is read once; afterwards ``file`` is None.
+    scale : float
+        Factor from the file's heights to m, positive; 1 once it is read.
 
     Raises
     ------
@@ -87,20 +89,20 @@ class MeasuredSurface(RoughSurface):
     """
 
     kernel: ClassVar = _measured
+    shared_fields: ClassVar = frozenset({"bearing", "depths", "file"})
 
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
     file: str | None = None
+    scale: float = 1.0
 
     def __post_init__(self) -> None:
+        require_positive("MeasuredSurface", scale=self.scale)
         if self.file is not None:
-            if self.bearing != _UNIFORM:
-                raise InputError(f"MeasuredSurface: file = {self.file!r} cannot stand beside "
-                                 f"bearing; give one of them.")
-            measured = type(self).from_file(self.file)
-            for name in ("bearing", "depths", "roughness_height"):
-                object.__setattr__(self, name, getattr(measured, name))
-            object.__setattr__(self, "file", None)
+            self._read(self.file)
+        elif self.scale != 1.0:
+            raise InputError(f"MeasuredSurface: scale = {self.scale!r} has no effect without "
+                             f"file; leave it out.")
         for name, value in vars(self._bed).items():
             object.__setattr__(self, name, value)
         h = _numbers(self.bearing, "bearing")
@@ -114,6 +116,19 @@ class MeasuredSurface(RoughSurface):
                              f"bearing has, growing from 0 to 1.")
         object.__setattr__(self, "bearing", tuple(h.tolist()))
         object.__setattr__(self, "depths", tuple(s.tolist()))
+
+    def _read(self, file: str) -> None:
+        defaults = {entry.name: entry.default for entry in fields(self)}
+        given = ("bearing", "depths", "roughness_height")
+        for name in given:
+            if not np.array_equal(getattr(self, name), defaults[name]):  # type: ignore[arg-type]
+                raise InputError(f"MeasuredSurface: file = {file!r} cannot stand beside {name}, "
+                                 f"which it gives; leave one of them out.")
+        measured = MeasuredSurface.from_file(file, scale=self.scale)
+        for name in given:
+            object.__setattr__(self, name, getattr(measured, name))
+        object.__setattr__(self, "file", None)
+        object.__setattr__(self, "scale", 1.0)
 
     @property
     def _bed(self) -> "_Bed":
@@ -178,10 +193,11 @@ class MeasuredSurface(RoughSurface):
         Parameters
         ----------
         file : path
-            One column of heights, or two columns of abscissae and heights, separated by blanks,
-            commas or semicolons; ``#`` starts a comment.
+            Text or CSV with one column of heights, or two of abscissae and heights, separated by
+            semicolons, tabs, commas or blanks; lines before the first of just these numbers are a
+            header, ``#`` starts a comment. A decimal comma needs semicolons, tabs or quotes.
         scale : float
-            Factor from the file's unit of length to m.
+            Factor from the file's heights to m; the unit of the abscissae does not matter.
         **options
             See :meth:`from_heights`.
 
@@ -191,12 +207,14 @@ class MeasuredSurface(RoughSurface):
             For a file that cannot be read, with the line that is wrong.
         """
         require_positive("MeasuredSurface", scale=scale)
-        columns = scale * _columns(Path(file)).T
+        columns = read_columns("MeasuredSurface", file, ("abscissa", "height"),
+                               first_optional=True)
+        heights = scale * columns[-1]
         try:
-            return cls.from_heights(columns[-1], None if len(columns) == 1 else columns[0],
-                                    **options)
+            return cls.from_heights(heights, None if len(columns) == 1 else columns[0], **options)
         except InputError as error:
-            raise InputError(f"{file}: {str(error).removeprefix('MeasuredSurface: ')}") from None
+            raise InputError(f"MeasuredSurface: file = '{file}': "
+                             f"{str(error).removeprefix('MeasuredSurface: ')}") from None
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters (n, 3 + 3 k): c, R_Z, beta c, and f, h, h' at k depths."""
@@ -243,28 +261,3 @@ def _numbers(given: Any, name: str) -> NDArray[np.float64]:
 
 def _shown(values: NDArray[np.float64]) -> str:
     return str(values.tolist()) if len(values) <= 8 else f"[{values[0]}, ..., {values[-1]}]"
-
-
-def _columns(file: Path) -> NDArray[np.float64]:
-    """Rows of one or two numbers."""
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(f"{file}: the profile cannot be read: {reason}.") from None
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        words = [word for word in re.split(r"[\s,;]+", line.partition("#")[0]) if word]
-        if not words:
-            continue
-        try:
-            row = [float(word) for word in words]
-        except ValueError:
-            row = []
-        if len(row) not in (1, 2) or (rows and len(row) != len(rows[0])):
-            raise InputError(f"{file}: line {number}, {line.strip()!r}, must be a height, or an "
-                             f"abscissa and a height, like the lines before it.")
-        rows.append(row)
-    if not rows:
-        raise InputError(f"{file}: there are no heights in the file.")
-    return np.array(rows)

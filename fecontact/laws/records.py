@@ -46,6 +46,22 @@ def require_growing(owner: str, name: str, values: tuple[float, ...]) -> None:
                          f"repeated ones.")
 
 
+def require_resolved(owner: str, first: str, x: Array, second: str, y: Array) -> None:
+    """Raise :class:`InputError` where curves through the points would leave the floating range.
+
+    That is unless x grows by at least 1e-60 from point to point, and both are within 1e60.
+    """
+    for shown, value in ((first, float(x[0])), (first, float(x[-1])),
+                         (second, float(y[np.argmax(np.abs(y))]))):
+        if not abs(value) <= 1e60:
+            raise InputError(f"{owner}: {shown} reaches {value:g}; its values must be within "
+                             f"-1e60 to 1e60.")
+    steps = np.diff(x)
+    if not steps.min() >= 1e-60:
+        raise InputError(f"{owner}: {first} has points {steps.min():g} apart; their distances "
+                         f"must be at least 1e-60.")
+
+
 def require_closed(owner: str, name: str, values: tuple[float, ...]) -> tuple[float, ...]:
     """The values with the last equal to the first, which they must be but for rounding."""
     if abs(values[-1] - values[0]) > 1e-9 * np.ptp(values):
@@ -70,8 +86,6 @@ def read_or_given(
         if np.size(x) or np.size(y):
             raise InputError(f"{owner}: file = {file!r} cannot stand beside {first} and {second}; "
                              f"give the file or the two lists.")
-        if not isinstance(file, str):
-            raise InputError(f"{owner}: file = {file!r} must be the name of a file.")
         x, y = (tuple(column.tolist()) for column in read_columns(owner, file, (first, second)))
         owner = f"{owner}: file = '{file}'"
     x, y = numbers(owner, first, x, least), numbers(owner, second, y)
@@ -82,44 +96,63 @@ def read_or_given(
     return x, y
 
 
-def read_columns(owner: str, file: str, names: tuple[str, str]) -> tuple[Array, Array]:
-    """Two columns of numbers from a text or CSV file.
+def read_columns(
+    owner: str, file: str | Path, names: tuple[str, ...], *, first_optional: bool = False
+) -> tuple[Array, ...]:
+    """Columns of numbers from a text or CSV file, one for each name.
 
     Columns are separated by semicolons, tabs, commas or blanks; where semicolons or tabs
-    separate them, a comma in a number is a decimal comma. Lines without any number at the
-    beginning are a header; ``#`` starts a comment.
+    separate them, or a number is quoted, a comma in it is a decimal comma. Lines before the first
+    that holds just the numbers are a header; ``#`` starts a comment. Text that is not UTF-8 is
+    taken as Latin-1. With ``first_optional`` the file may lack the first column in all lines.
 
     Raises
     ------
     InputError
         For a file that cannot be read, with the line that is wrong.
     """
-    try:
-        lines = Path(file).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not a text file"
-        raise InputError(f"{owner}: file = '{file}' cannot be read: {reason}.") from None
-    rows: list[tuple[float, float]] = []
+    lines = _text(owner, file).splitlines()
+    widths = {len(names), len(names) - first_optional}
+    wanted = f"{' and '.join(names)}{f', or {names[-1]} alone' * first_optional}"
+    rows: list[list[float]] = []
     for number, line in enumerate(lines, start=1):
         words = _words(line.partition("#")[0].strip())
-        values = [_number(word) for word in words]
-        if not words or (not rows and all(value is None for value in values)):
+        values = [value for word in words if (value := _number(word)) is not None]
+        if not words or (not rows and (len(values) < len(words) or len(words) not in widths)):
             continue
-        if len(values) != 2 or None in values or not np.isfinite(np.array(values, float)).all():
-            found = (f"has {len(values)} column{'s' * (len(values) != 1)}" if len(values) != 2
-                     else "has a value that is no finite number")
+        widths = {len(rows[0])} if rows else widths
+        if len(words) not in widths or len(values) < len(words) or not np.isfinite(values).all():
+            found = (f"has {len(words)} column{'s' * (len(words) != 1)}"
+                     if len(words) not in widths else "has a value that is no finite number")
             raise InputError(f"{owner}: file = '{file}', line {number}, {_short(line.strip())}, "
-                             f"{found}; each line must hold two numbers, {names[0]} and "
-                             f"{names[1]}.")
-        rows.append((values[0], values[1]))  # type: ignore[arg-type]
+                             f"{found}; each line must hold {wanted}, like the first.")
+        rows.append(values)
     if not rows:
-        raise InputError(f"{owner}: file = '{file}' holds no numbers; each line must hold two, "
-                         f"{names[0]} and {names[1]}.")
-    first, second = np.array(rows).T
-    return first, second
+        first = next((line.strip() for line in lines if line.strip()), None)
+        shown = "" if first is None else f"; it begins with {_short(first)}"
+        raise InputError(f"{owner}: file = '{file}' has no line of just the numbers {wanted}"
+                         f"{shown}.")
+    return tuple(np.array(rows).T)
+
+
+def _text(owner: str, file: str | Path) -> str:
+    if not isinstance(file, str | Path):
+        raise InputError(f"{owner}: file = {file!r} must be the name of a file.")
+    try:
+        content = Path(file).read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{owner}: file = '{file}' cannot be read: {reason}.") from None
+    if b"\0" in content:
+        raise InputError(f"{owner}: file = '{file}' cannot be read: it is not a text file.")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def _words(line: str) -> list[str]:
+    line = re.sub(r'"([^"]*)"', lambda quoted: quoted[1].replace(",", "."), line)
     for separator in (";", "\t"):
         if separator in line:
             words = line.rstrip(separator).split(separator)
@@ -129,7 +162,7 @@ def _words(line: str) -> list[str]:
 
 def _number(word: str) -> float | None:
     try:
-        return float(word)
+        return None if "_" in word else float(word)
     except ValueError:
         return None
 

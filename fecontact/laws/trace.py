@@ -16,7 +16,7 @@ from fecontact.laws.piecewise import (
     piecewise_parameters,
 )
 from fecontact.laws.profile_base import Profile
-from fecontact.laws.records import read_or_given, require_closed
+from fecontact.laws.records import read_or_given, require_closed, require_resolved
 
 Array = NDArray[np.float64]
 
@@ -42,8 +42,8 @@ class Trace(Profile):
     heights : (N,) sequence
         Heights there, positive out of the ground; of a periodic trace the last is the first.
     file : str, optional
-        A text or CSV file with two columns, abscissae and heights, instead of both; lines without
-        numbers at its beginning are a header. It is read once; afterwards ``file`` is None.
+        A text or CSV file with two columns, abscissae and heights, instead of both; lines before
+        the first of two numbers are a header. It is read once; afterwards ``file`` is None.
     periodic : bool
         Whether the trace is repeated.
     remove_mean : bool
@@ -80,12 +80,22 @@ class Trace(Profile):
             y = require_closed("Trace", "heights", y)
         for name, value in (("abscissa", x), ("heights", y), ("file", None)):
             object.__setattr__(self, name, value)
+        places, heights = self._points
+        require_resolved("Trace", f"abscissa times abscissa_scale = {self.abscissa_scale:g}",
+                         places, f"heights times scale = {self.scale:g}", heights)
+
+    @property
+    def _points(self) -> tuple[Array, Array]:
+        """Places and heights in the unit of length of the system."""
+        with np.errstate(over="ignore"):
+            return (self.abscissa_scale * np.array(self.abscissa),
+                    self.scale * np.array(self.heights))
 
     @cached_property
     def _curve(self) -> Any:
         from scipy.interpolate import CubicSpline, PPoly
 
-        x, y = self.abscissa_scale * np.array(self.abscissa), self.scale * np.array(self.heights)
+        x, y = self._points
         spline = CubicSpline(x, y, bc_type="periodic" if self.periodic else "natural")
         if self.remove_mean:
             spline.c[3] -= float(spline.integrate(x[0], x[-1])) / (x[-1] - x[0])

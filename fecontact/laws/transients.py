@@ -17,7 +17,7 @@ from fecontact.laws.piecewise import (
     piecewise,
     piecewise_parameters,
 )
-from fecontact.laws.records import read_or_given, require_closed
+from fecontact.laws.records import read_or_given, require_closed, require_resolved
 from fecontact.laws.signal_base import Signal, between, require_one_of
 
 Array = NDArray[np.float64]
@@ -148,8 +148,8 @@ class Tabulated(Signal):
     values : (N,) sequence
         Values at these times; to be repeated, the last must be the first.
     file : str, optional
-        A text or CSV file with two columns, times and values, instead of both; lines without
-        numbers at its beginning are a header. It is read once; afterwards ``file`` is None.
+        A text or CSV file with two columns, times and values, instead of both; lines before the
+        first of two numbers are a header. It is read once; afterwards ``file`` is None.
     interpolation : 'linear' or 'cubic'
     outside : 'hold' or 'repeat'
     scale : float
@@ -179,6 +179,9 @@ class Tabulated(Signal):
                                       least=3 if self.interpolation == "cubic" else 2)
         if self.outside == "repeat":
             values = require_closed(owner, "values", values)
+        with np.errstate(over="ignore"):
+            require_resolved(owner, "times", np.array(times), f"values times scale = "
+                             f"{self.scale:g}", self.scale * np.array(values))
         for name, value in (("times", times), ("values", values), ("file", None)):
             object.__setattr__(self, name, value)
 

@@ -164,6 +164,11 @@ def test_motions_of_the_drive():
     assert drive.motions == (shake, Harmonic(1e-4, 6.0))
     assert drive.frequency_hz == pytest.approx(6.0 / (2.0 * math.pi))
     assert Drive(motion_x=shake).frequency_hz == 0.0
+    # An angular frequency without an amplitude moves nothing beside a given motion.
+    assert Drive(motion_x=shake, angular_frequency=6.0).frequency_hz == 0.0
+    assert Drive(motion_y=Harmonic(1.0, 3.0), angular_frequency=6.0).frequency_hz == pytest.approx(
+        3.0 / (2.0 * math.pi))
+    assert Drive(angular_frequency=6.0).frequency_hz == pytest.approx(6.0 / (2.0 * math.pi))
     assert Drive(motion_y=Harmonics((1.0, 1.0), (3.0, 6.0))).frequency_hz == pytest.approx(
         3.0 / (2.0 * math.pi))
 

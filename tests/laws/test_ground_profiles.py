@@ -245,9 +245,13 @@ def test_seeds_reproduce():
     ("x [m],y [m]\n0,1\n1,2\n2.5,-0.3\n", (0, 1, 2.5), (1, 2, -0.3)),
     ("\ufeffWeg;Höhe\nmm;um\n0,0;1\n1;2,0\n2,5;-0,3;\n", (0, 1, 2.5), (1, 2, -0.3)),
     ("# a trace\n\n0\t1,0\n1\t2 # here\n2,5\t-0,3", (0, 1, 2.5), (1, 2, -0.3)),
+    ("Made 2024\nx 1 y 2\n7\n1 2 3\n0 1\n1 2\n2.5 -0.3\n", (0, 1, 2.5), (1, 2, -0.3)),
+    ('"x","y"\r\n"0","1"\r\n"1","2,0"\r\n"2,5","-0.3"\r\n', (0, 1, 2.5), (1, 2, -0.3)),
 ])
-def test_traces_from_files(tmp_path, monkeypatch, content, x, y):
-    (tmp_path / "trace.csv").write_text(content, encoding="utf-8")
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_traces_from_files(tmp_path, monkeypatch, content, x, y, encoding):
+    content = content if encoding == "utf-8" else content.removeprefix("\ufeff")
+    (tmp_path / "trace.csv").write_bytes(content.encode(encoding))
     monkeypatch.chdir(tmp_path)
     for file in ("trace.csv", str(tmp_path / "trace.csv")):
         trace = Trace(file=file)
@@ -260,11 +264,15 @@ def test_traces_from_files(tmp_path, monkeypatch, content, x, y):
     ("0 1\n1 2\n1 3\n", r"abscissa\[2\] = 1 must be larger than the value before it, 1; sort"),
     ("0 1\n1 nan\n2 3\n", "line 2, '1 nan', has a value that is no finite number; each line must"),
     ("0 1\n1 2x\n2 3\n", "line 2, '1 2x', has a value that is no finite number"),
-    ("a b\n1\n2\n", "line 2, '1', has 1 column; each line must hold two numbers, abscissa and h"),
-    ("0 1 2\n", "line 1, '0 1 2', has 3 columns"),
+    ("a b\n1\n2\n", "has no line of just the numbers abscissa and heights; it begins with 'a b'"),
+    ("a b\n0 1\n1\n2\n", "line 3, '1', has 1 column; each line must hold abscissa and heights"),
+    ("0 1\n1 2 3\n", "line 2, '1 2 3', has 3 columns"),
+    ("0 1\n1 2\nend\n", "line 3, 'end', has 1 column"),
+    ("nan 1\n1 2\n", "line 1, 'nan 1', has a value that is no finite number"),
+    ("0 1 2\n", "no line of just the numbers abscissa and heights; it begins with '0 1 2'"),
     ("0 1\n1 2\n", "abscissa has 2 values; at least 3 are needed"),
-    ("only words\n", "holds no numbers; each line must hold two, abscissa and heights"),
-    ("", "holds no numbers"),
+    ("only words\n", "has no line of just the numbers abscissa and heights; it begins"),
+    ("", r"has no line of just the numbers abscissa and heights\.$"),
 ])
 def test_bad_files(tmp_path, content, message):
     path = tmp_path / "bad.txt"
@@ -280,9 +288,19 @@ def test_files_that_cannot_be_read(tmp_path):
         Trace(file="none.csv")
     with pytest.raises(InputError, match="cannot be read"):
         Trace(file=str(tmp_path))
-    (tmp_path / "picture").write_bytes(b"\x89PNG\xff\xfe")
+    (tmp_path / "picture").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
     with pytest.raises(InputError, match="cannot be read: it is not a text file"):
         Trace(file=str(tmp_path / "picture"))
+
+
+def test_smallest_and_largest_traces_have_curves():
+    for scale in (1e-60, 1e59):
+        for periodic in (False, True):
+            trace = Trace((0, 1, 2, 4), (0, 1, 2, 0), periodic=periodic, scale=scale,
+                          abscissa_scale=scale)
+            assert np.isfinite(trace.parameters()).all()
+            assert trace.height([scale]) == pytest.approx([scale], rel=1e-12)
+            assert trace.shortest_wavelength > 0.0
 
 
 @pytest.mark.parametrize(("make", "message"), [
@@ -302,6 +320,11 @@ def test_files_that_cannot_be_read(tmp_path):
     (lambda: Trace(), "abscissa has 0 values; at least 3"),
     (lambda: Trace((0, 1, 2), (0, 1, 2), periodic=True), "begins with 0 and ends with 2; add"),
     (lambda: Trace((0, 1, 2), (0, 1, 2), abscissa_scale=0.0), "Trace: abscissa_scale"),
+    (lambda: Trace((0, 1, 2), (0, 1, 2), abscissa_scale=1e-300),
+     "abscissa_scale = 1e-300 has points 1e-300 apart; their distances must be at least 1e-60"),
+    (lambda: Trace((0, 1, 1 + 1e-15), (0, 1, 2), abscissa_scale=5e-324), "points 0 apart"),
+    (lambda: Trace((0, 1, 2), (0, 1, 2), abscissa_scale=1.7e308), "1.7e\\+308 reaches inf; its"),
+    (lambda: Trace((0, 1, 2), (0, 1, -20), scale=1e308), r"scale = 1e\+308 reaches -inf; its va"),
     (lambda: Trace((0, 1, 2), (0, 1, 2), periodic="yes"), "periodic = 'yes' must be true or fal"),
     (lambda: Trace(file=3), "file = 3 must be the name of a file"),
     (lambda: RandomRoughness(-1.0, 0.5, 0.1, 0.01, 1.0), "RandomRoughness: rms_height"),

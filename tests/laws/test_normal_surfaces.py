@@ -1,6 +1,7 @@
 """Rough surfaces: forces against the density of heights, curves of measured profiles."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -130,23 +131,70 @@ def test_files(tmp_path):
     scaled = MeasuredSurface.from_file(two, scale=1e-6)
     assert scaled.bearing == pytest.approx(expected.bearing, rel=1e-9, abs=1e-12)
     assert scaled.roughness_height == pytest.approx(expected.roughness_height, rel=1e-12)
+    given = MeasuredSurface(2e6, file=str(two), scale=1e-6)
+    assert given == MeasuredSurface.from_file(two, scale=1e-6, stiffness=2e6)
+    assert (given.file, given.scale) == (None, 1.0)
+    assert replace(given, damping=1.0).bearing == given.bearing
+
+
+@pytest.mark.parametrize("content", [
+    "x [mm];Höhe [µm]\r\n0,0;1,0\r\n1,0;3,5\r\n3,0;0,0\r\n",
+    "x\tz\n0\t1\n1\t3,5\n3\t0\n", '"x","z"\n"0","1"\n"1","3.5"\n"3","0"\n',
+])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
+def test_files_of_other_programs(tmp_path, content, encoding):
+    file = tmp_path / "trace.csv"
+    file.write_bytes(content.encode(encoding))
+    expected = MeasuredSurface.from_heights([1e-6, 3.5e-6, 0.0], [0.0, 1.0, 3.0])
+    found = MeasuredSurface(file=str(file), scale=1e-6)
+    assert found.bearing == pytest.approx(expected.bearing, rel=1e-12)
+    assert found.roughness_height == pytest.approx(3.5e-6, rel=1e-12)
+
+
+def test_header_of_one_column(tmp_path):
+    file = tmp_path / "trace.txt"
+    file.write_text("height / um of 2024\n1\n3.5\n0\n")
+    assert MeasuredSurface.from_file(file, scale=1e-6) == MeasuredSurface.from_heights(
+        1e-6 * np.array([1.0, 3.5, 0.0]))
+
+
+@pytest.mark.parametrize(("values", "message"), [
+    ({"bearing": (0.0, 0.2, 1.0)}, "'x.txt' cannot stand beside bearing, which it gives"),
+    ({"bearing": ((0.0,), (0.2, 1.0))}, "cannot stand beside bearing"),
+    ({"depths": (0.0, 0.2, 1.0)}, "cannot stand beside depths"),
+    ({"roughness_height": 1e-6}, "cannot stand beside roughness_height"),
+    ({"roughness_height": (1e-6, 2e-6)}, "cannot stand beside roughness_height"),
+    ({"scale": 0.0}, r"MeasuredSurface: scale = 0\.0 must be"),
+    ({"file": None, "scale": 1e-6}, "scale = 1e-06 has no effect without file"),
+    ({"file": 3}, "file = 3 must be the name of a file"),
+])
+def test_what_a_file_does_not_stand_beside(values, message):
+    with pytest.raises(InputError, match=message):
+        MeasuredSurface(**{"file": "x.txt", **values})
+
+
+def test_number_of_nodes_is_not_that_of_the_curve():
+    curve = {"bearing": (0.0, 0.2, 0.4, 1.0), "depths": (0.0, 0.3, 0.4, 1.0)}
+    assert MeasuredSurface(**curve).node_count() is None
+    assert MeasuredSurface((1e6, 2e6), **curve).node_count() == 2
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    ("1.0\n2.0\nhigh\n", "line 3, 'high', must be a height"),
-    ("1.0\n2.0 3.0\n", "line 2, '2.0 3.0', must be a height"),
-    ("1 2 3\n", "line 1"), ("# nothing\n", "no heights"),
+    ("1.0\n2.0\nhigh\n", "line 3, 'high', has a value that is no finite number"),
+    ("1.0\n2.0 3.0\n", "line 2, '2.0 3.0', has 2 columns; each line must hold"),
+    ("1 2 3\n", "numbers abscissa and height, or height alone; it begins with '1 2 3'"),
+    ("# nothing\n", "has no line of just the numbers"),
     ("0 1\n1 2\n1 3\n", r"abscissa\[2\] = 1 must be larger than the value before it, 1"),
     ("1\n1\n1\n", "all heights are 1"), ("1\n2\n", "2 values; a profile needs at least three"),
-    ("1\nnan\n2\n", r"heights\[1\] = nan must be finite"),
+    ("1\nnan\n2\n", "line 2, 'nan', has a value that is no finite number"),
 ])
 def test_files_that_are_no_profile(tmp_path, text, message):
     file = tmp_path / "trace.txt"
     file.write_text(text)
-    with pytest.raises(InputError, match=rf"trace\.txt: .*{message}"):
+    with pytest.raises(InputError, match=rf"^MeasuredSurface: file = '.*trace\.txt'.*{message}"):
         MeasuredSurface(file=str(file))
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match=r"none\.txt: the profile cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"none\.txt' cannot be read: No such file"):
         MeasuredSurface.from_file(tmp_path / "none.txt")
