@@ -53,6 +53,8 @@ $(BIN)/python:
 $(READY): pyproject.toml | $(BIN)/python
 	@echo "Installing fecontact and what it needs"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@echo "Compiling its kernels"
+	@$(BIN)/python -c 'import fecontact.integrate.control, fecontact.mesh_io, fecontact.study'
 	@touch $@
 
 $(SYSTEM): .ci/system-libraries fecontact/system_libraries.py | $(BIN)/python

@@ -187,6 +187,8 @@ def run(
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             described.system()
+        with waiting("Compiling, once after an installation"):
+            from fecontact.integrate import control  # noqa: F401
         checkpoint = folder / f"{described.name}.checkpoint"
         if not resume:
             checkpoint.unlink(missing_ok=True)

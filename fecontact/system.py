@@ -80,7 +80,8 @@ class ContactSystem:
                                      f"must be a {law.__name__}.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
         for part in (self.law_groups("normal"), self.law_groups("friction")):
-            for _, _, one in part:
+            for _, share, one in part:
+                one.table(share)
                 require_sound(one)
         _ = self.arrays
 

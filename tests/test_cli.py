@@ -227,8 +227,8 @@ def test_errors_that_should_not_happen_are_said_in_one_sentence(cli, study, monk
 def test_a_run_that_fails_is_written_and_reported(cli, study, monkeypatch):
     whole = Study.run
 
-    def stopped(self, progress=None):
-        trajectory = whole(self, progress)
+    def stopped(self, progress=None, checkpoint=None):
+        trajectory = whole(self, progress, checkpoint)
         object.__setattr__(trajectory, "status", Status.FAILED)
         return trajectory
 

@@ -45,6 +45,6 @@ def test_a_load_on_one_node_drifts_by_the_same_amount_with_every_refinement():
 
 def test_motion_converges_too():
     coarse, fine = (row(size, nodes, moving=True) for size, nodes in ((0.01, 10), (0.005, 20)))
-    assert coarse.slipped == pytest.approx(fine.slipped, rel=1e-4)
+    assert coarse.slipped == pytest.approx(fine.slipped, rel=1e-3)
     assert coarse.stick_share == pytest.approx(fine.stick_share, abs=0.04)
     assert 0.3 < fine.stick_share < 0.7
