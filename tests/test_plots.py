@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
+from fecontact import contact_kernels as kernels
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
@@ -95,6 +96,80 @@ def test_contact_map_of_one_node_and_few_times(times):
     upper, lower = contact_map_figure(short).axes[:2]
     assert mesh_values(upper).shape == mesh_values(lower).shape == (1, times)
     assert upper.get_ylabel() == "contact node"
+
+
+def placed(x_mm, length_mm, groups=()):
+    """A run whose contact nodes have the given places and tributary lengths [mm]."""
+    body = basis(contact_nodes=len(x_mm))
+    positions = body.positions.copy()
+    positions[2:, 0] = 1e-3 * np.asarray(x_mm)
+    return run(replace(body, positions=positions, tributary=1e-3 * np.asarray(length_mm),
+                       groups=groups), times=41)
+
+
+def bands(trajectory):
+    """Ends [mm] of the coloured rows of both maps and, in that order, the pressures shown."""
+    found = []
+    for axis in contact_map_figure(trajectory).axes[:2]:
+        assert axis.get_ylabel() == "contact position x [mm]"
+        mesh = axis.collections[0]
+        edges = mesh.get_coordinates()[:, 0, 1]
+        values = np.ma.asarray(mesh.get_array())
+        shown = ~np.ma.getmaskarray(values).any(axis=1)
+        assert np.ma.getmaskarray(values)[~shown].all()
+        found.append((np.column_stack([edges[:-1], edges[1:]])[shown], values[shown].data))
+    np.testing.assert_array_equal(found[0][0], found[1][0])
+    return found[0]
+
+
+def test_contact_map_leaves_places_without_contact_face_blank():
+    # Faces at 0 to 50 and 150 to 200 mm, the right one given first.
+    trajectory = placed([162.5, 187.5, 10.0, 35.0], [25.0, 25.0, 20.0, 30.0],
+                        (("right", 2), ("left", 2)))
+    ends, pressure = bands(trajectory)
+    np.testing.assert_allclose(ends, [[0, 20], [20, 50], [150, 175], [175, 200]], atol=1e-9)
+    np.testing.assert_allclose(pressure, trajectory.pressure.T[[2, 3, 0, 1]])
+
+
+@pytest.mark.parametrize(("x", "length", "groups", "ends"), [
+    # One group in two parts, whose gap is as wide as a band.
+    ([5, 15, 35, 45], [10, 10, 10, 10], (), [[0, 10], [10, 20], [30, 40], [40, 50]]),
+    # A gap narrower than a band between groups, and nodes from right to left.
+    ([45, 35, 20, 10], [10, 10, 10, 10], (("a", 2), ("b", 2)),
+     [[5, 15], [15, 25], [30, 40], [40, 50]]),
+    # An inclined face, along which x grows less than the length.
+    ([5, 14, 23], [10, 10, 10], (), [[0, 9.5], [9.5, 18.5], [18.5, 28]]),
+    # One node each.
+    ([25, 175], [50, 50], (("a", 1), ("b", 1)), [[0, 50], [150, 200]]),
+    # Displacement nodes of linear elements of 10, 20 and 10 mm, with nodes on the ends.
+    ([0, 10, 30, 40], [5, 15, 15, 5], (), [[0, 5], [5, 20], [20, 35], [35, 40]]),
+    # Those of quadratic elements of 60 mm; two groups touch at 60 mm, where each has a node.
+    ([0, 30, 60, 60, 90, 120], [10, 40, 10, 10, 40, 10], (("a", 3), ("b", 3)),
+     [[0, 10], [10, 50], [50, 60], [60, 70], [70, 110], [110, 120]]),
+])
+def test_bands_of_the_contact_map_are_as_wide_as_tributary_lengths(x, length, groups, ends):
+    found, _ = bands(placed(x, length, groups))
+    np.testing.assert_allclose(found, ends, atol=1e-9)
+
+
+def test_contact_map_goes_by_numbers_where_nodes_share_a_place():
+    upper = contact_map_figure(placed([50, 50, 80], [10, 10, 10])).axes[0]
+    assert upper.get_ylabel() == "contact node"
+    assert mesh_values(upper).shape == (3, 41)
+
+
+def test_contact_map_without_friction_shows_contact():
+    trajectory = run(times=41)
+    contact = trajectory._contact.copy()
+    contact[:, :, kernels.FRICTION_FORCE] = 0.0
+    smooth = replace(trajectory)
+    smooth.__dict__["_contact"] = contact
+    assert (smooth.contact_state == 2).any()
+    figure = contact_map_figure(smooth)
+    names = [text.get_text() for axis in figure.axes if axis.get_ylabel() == "state"
+             for text in axis.get_yticklabels()]
+    assert names == ["open", "contact"]
+    np.testing.assert_array_equal(mesh_values(figure.axes[1]), smooth.normal_force.T != 0.0)
 
 
 def test_energies_leave_out_what_is_zero():

@@ -19,7 +19,8 @@ Point = str | int | tuple[float, float]
 
 # Colours that people with colour-blindness tell apart (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
-STATES = (("open", "#f2f0ec"), ("stick", "#0072b2"), ("slip", "#e69f00"))
+STATES = (("open", "#e3e0da"), ("stick", "#0072b2"), ("slip", "#e69f00"))
+STATES_WITHOUT_FRICTION = (STATES[0], ("contact", "#009e73"))
 _AXES = ("x", "y")
 
 _LINE_BINS = 2000  # each drawn by its lowest and highest value
@@ -105,7 +106,11 @@ def phase_figure(trajectory: Trajectory, point: Point = "B", axis: str = "x") ->
 
 
 def contact_map_figure(trajectory: Trajectory) -> "Figure":
-    """Pressure and state of the contact nodes over time and position."""
+    """Pressure and state of the contact nodes over time and position.
+
+    The band of a node is as wide as its tributary length; places without contact face stay blank.
+    In a run without any friction force the states are 'open' and 'contact'.
+    """
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     figure = new_figure(10.0, 6.2)
@@ -113,23 +118,25 @@ def contact_map_figure(trajectory: Trajectory) -> "Figure":
     starts = np.unique(np.linspace(0, len(trajectory.time), _MAP_COLUMNS + 1).astype(int))[:-1]
     edges = _time_edges(trajectory.time, starts)
     time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
-    places, place_label = _place_edges(trajectory)
+    places, nodes, place_label = _place_edges(trajectory)
 
     pressure = np.maximum.reduceat(trajectory.pressure, starts, axis=0)
     factor, pressure_symbol = suitable_unit(float(pressure.max()), "N/m")
-    image = upper.pcolormesh(edges / time_unit, places, pressure.T / factor, cmap="viridis",
-                             vmin=0.0, vmax=float(pressure.max()) / factor or 1.0)
+    image = upper.pcolormesh(edges / time_unit, places, _rows(pressure / factor, nodes),
+                             cmap="viridis", vmin=0.0, vmax=float(pressure.max()) / factor or 1.0)
     figure.colorbar(image, ax=upper, label=f"contact pressure [{pressure_symbol}]", pad=0.01)
 
-    counts = np.stack([np.add.reduceat((trajectory.contact_state == k).astype(np.int32), starts,
-                                       axis=0) for k in range(3)])
+    states = STATES if trajectory.friction_force.any() else STATES_WITHOUT_FRICTION
+    state = np.minimum(trajectory.contact_state, len(states) - 1)
+    counts = np.stack([np.add.reduceat((state == k).astype(np.int32), starts, axis=0)
+                       for k in range(len(states))])
     # A column of several times shows contact if there was any, as the pressure above it does.
     counts[0] *= counts[1:].sum(axis=0) == 0
-    image = lower.pcolormesh(edges / time_unit, places, counts.argmax(axis=0).T,
-                             cmap=ListedColormap([colour for _, colour in STATES]),
-                             norm=BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3))
-    bar = figure.colorbar(image, ax=lower, label="state", pad=0.01, ticks=[0, 1, 2])
-    bar.ax.set_yticklabels([name for name, _ in STATES])
+    image = lower.pcolormesh(edges / time_unit, places, _rows(counts.argmax(axis=0), nodes),
+                             cmap=ListedColormap([colour for _, colour in states]),
+                             norm=BoundaryNorm(np.arange(len(states) + 1) - 0.5, len(states)))
+    bar = figure.colorbar(image, ax=lower, label="state", pad=0.01, ticks=range(len(states)))
+    bar.ax.set_yticklabels([name for name, _ in states])
     bar.ax.tick_params(length=0)
     figure.align_ylabels([upper, lower])
     lower.set_xlabel(f"time [{symbol}]")
@@ -226,14 +233,55 @@ def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:
     return np.concatenate([time[:1], between, time[-1:]])
 
 
-def _place_edges(trajectory: Trajectory) -> tuple[Array, str]:
-    """Borders (n + 1,) between the contact nodes along the face, and the label of their axis."""
+def _place_edges(trajectory: Trajectory) -> tuple[Array, NDArray[np.intp], str]:
+    """Borders (k + 1,) of the rows of the map, their nodes (k,), and the label of their axis.
+
+    The node of a row without contact face is -1.
+    """
+    basis = trajectory.system.basis
+    x, n = basis.contact_x, basis.contact_nodes
+    low, high = _bands(trajectory)
+    order = np.argsort(low + high, kind="stable")
+    low, high, x = low[order], high[order], x[order]
+    tiny = 1e-6 * float(high.max() - low.min())
+    overlap = high[:-1] > low[1:] + tiny
+    middle = 0.5 * (x[:-1] + x[1:])
+    high[:-1] = np.where(overlap, middle, high[:-1])
+    low[1:] = np.where(overlap, middle, low[1:])
+    # Nodes one above the other have no band each.
+    if n == 1 or (overlap & (np.diff(x) <= tiny)).any():
+        return np.arange(n + 1, dtype=np.float64) - 0.5, np.arange(n), "contact node"
+    apart = np.flatnonzero(low[1:] > high[:-1] + tiny) + 1
+    edges = np.insert(np.append(low, high[-1]), apart, high[apart - 1])
+    factor, symbol = suitable_unit(float(np.ptp(edges)), "m")
+    return edges / factor, np.insert(order, apart, -1), f"contact position x [{symbol}]"
+
+
+def _bands(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Lower and upper ends (n,) of the tributary lengths along the face [m].
+
+    They lie centred about the nodes, but follow one another from end to end of a part whose
+    outer nodes lie on its ends, as they do where the displacement nodes are the contact nodes.
+    """
     basis = trajectory.system.basis
     x, length = basis.contact_x, basis.tributary
-    if len(x) == 1 or not (np.diff(x) > 0.0).all():
-        return np.arange(len(x) + 1, dtype=np.float64) - 0.5, "contact node"
-    between = 0.5 * (x[1:] + x[:-1])
-    first, last = x[0] - 0.5 * length[0], x[-1] + 0.5 * length[-1]
-    edges: Array = np.array([first, *between, last], dtype=float)
-    factor, symbol = suitable_unit(float(np.ptp(edges)), "m")
-    return edges / factor, f"contact position x [{symbol}]"
+    low, high = x - 0.5 * length, x + 0.5 * length
+    first = 0
+    for _, count in basis.groups:
+        group = first + np.argsort(x[first : first + count], kind="stable")
+        first += count
+        reach = length[group]
+        apart = np.diff(x[group]) > (1.0 + 1e-6) * (reach[1:] + reach[:-1])
+        for part in np.split(group, np.flatnonzero(apart) + 1):
+            ends = x[part[0]] + np.append(0.0, np.cumsum(length[part]))
+            beyond = abs(ends[-1] - x[part[-1]])
+            inside = np.minimum(x[part] - ends[:-1], ends[1:] - x[part])[1:-1]
+            if beyond < 0.05 * length[part].min() and (inside > 0.05 * length[part][1:-1]).all():
+                low[part], high[part] = ends[:-1], ends[1:]
+    return low, high
+
+
+def _rows(values: NDArray[Any], nodes: NDArray[np.intp]) -> "np.ma.MaskedArray[Any, Any]":
+    """Values (k, T) of the rows of the map from those of the nodes (T, n)."""
+    return np.ma.masked_where(np.repeat(nodes[:, None] < 0, len(values), axis=1),
+                              values.T[nodes])

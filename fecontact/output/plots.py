@@ -78,7 +78,9 @@ def plot_contact_map(trajectory: Trajectory, path: str | Path) -> Path:
     """Plot pressure [N/m] and state of the contact nodes over time and position.
 
     In runs with more output times than columns of the picture, a column shows the largest
-    pressure and the most frequent state of its times.
+    pressure and the most frequent state of its times. The band of a node is as wide as its
+    tributary length; places without contact face stay blank. States are open, stick and slip, or
+    open and contact if all friction forces of the run are zero.
 
     Parameters
     ----------
