@@ -184,11 +184,11 @@ def run(
 
     described = read_study(study, set_)
     t_end = described.t_end
+    with waiting("Compiling, once after an installation"):
+        from fecontact.integrate import control  # noqa: F401
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             described.system()
-        with waiting("Compiling, once after an installation"):
-            from fecontact.integrate import control  # noqa: F401
         checkpoint = folder / f"{described.name}.checkpoint"
         if not resume:
             checkpoint.unlink(missing_ok=True)

@@ -268,7 +268,7 @@ def test_ctrl_c_writes_what_was_computed(study, tmp_path):
     deadline = time.monotonic() + 90
     while not (tmp_path / "results").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
-    time.sleep(1.5)
+    time.sleep(5.0)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
@@ -276,6 +276,36 @@ def test_ctrl_c_writes_what_was_computed(study, tmp_path):
     case = read_case(tmp_path / "results/tiny.vtkhdf")
     assert case.trajectory.status is Status.INTERRUPTED
     assert 0.0 < case.trajectory.time[-1] < 1000.0
+
+
+def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
+    from fecontact.integrate.control import Run
+
+    longer = ("--set", "simulation.t_end=0.05", "--set", "simulation.outputs=101")
+    assert cli("run", study, "--resume")[0] == 1
+    assert cli("run", study, *longer, "--output", tmp_path / "whole")[0] == 0
+    whole = read_case(tmp_path / "whole" / "tiny.vtkhdf").trajectory
+    advance, calls = Run.advance, []
+
+    def interrupted(self, steps):
+        calls.append(steps)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return advance(self, 100)
+
+    monkeypatch.setattr(Run, "advance", interrupted)
+    code, out, _ = cli("run", study, *longer)
+    assert code == 130
+    assert "interrupted" in out
+    part = read_case("results/tiny.vtkhdf").trajectory
+    assert 0.0 < part.time[-1] < 0.05
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert cli("run", study, *longer, "--resume")[0] == 0
+    resumed = read_case("results/tiny.vtkhdf").trajectory
+    assert (resumed.states == whole.states).all()
+    assert (resumed.friction_work == whole.friction_work).all()
+    assert not (tmp_path / "results" / "tiny.checkpoint").exists()
 
 
 def test_help_comes_at_once_and_version_is_said():

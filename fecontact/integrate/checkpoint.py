@@ -55,8 +55,10 @@ class Checkpoint:
                     raise InputError(f"{self.path} is the checkpoint of another run (other system, "
                                      f"start, output times or tolerance); remove it or name "
                                      f"another file.")
-                for index, item in enumerate(self._parts()):
+                for index, item in enumerate(_leaves(self.run.progress)):
                     item[...] = stored[f"part{index}"]
+                for name in ("states", "work"):
+                    getattr(self.run, name)[: self.run.outputs] = stored[name]
         except (OSError, KeyError, BadZipFile, EOFError) as error:
             raise InputError(f"{self.path} is not a checkpoint of fecontact "
                              f"({error}).") from None
@@ -75,8 +77,11 @@ class Checkpoint:
         part = self.path.with_name(f"{self.path.name}.part")
         try:
             with open(part, "wb") as file:
-                np.savez(file, mark=self.mark, **{
-                    f"part{index}": item for index, item in enumerate(self._parts())})
+                done = self.run.outputs
+                np.savez(file, mark=self.mark, states=self.run.states[:done],
+                         work=self.run.work[:done], **{
+                             f"part{index}": item
+                             for index, item in enumerate(_leaves(self.run.progress))})
             os.replace(part, self.path)
         except OSError as error:
             raise InputError(f"The checkpoint {self.path} cannot be written: "
@@ -86,9 +91,6 @@ class Checkpoint:
     def remove(self) -> None:
         """Remove the file: the run has ended."""
         self.path.unlink(missing_ok=True)
-
-    def _parts(self) -> list[Any]:
-        return [*_leaves(self.run.progress), self.run.states, self.run.work]
 
 
 def _leaves(arrays: Any) -> list[Any]:
