@@ -15,8 +15,8 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from fecontact import contact_jacobian, contact_kernels
+from fecontact.compiled import borrowed
 from fecontact.integrate import motion, run_arrays
-from fecontact.integrate.borrowed import borrowed
 
 Array = NDArray[np.float64]
 Solver = Callable[[float], Array]

@@ -20,8 +20,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import block, integers, matrix, vector
-from fecontact.integrate.borrowed import inlined
+from fecontact.compiled import block, helper, integers, matrix, vector
 from fecontact.integrate.motion import project
 
 Array = NDArray[np.float64]
@@ -56,7 +55,7 @@ def reduced_for(modes: int, nodes: int, states: int) -> Reduced:
         np.zeros((4, 2 * nodes)), np.zeros((2 * modes, 2 * nodes)))
 
 
-@inlined
+@helper
 def factorise(a, pivots):  # type: ignore[no-untyped-def]
     """LU factors of a (k, k) in place, with row interchanges; the diagonal is inverted."""
     size = len(pivots)
@@ -77,7 +76,7 @@ def factorise(a, pivots):  # type: ignore[no-untyped-def]
                 a[i, c] -= factor * a[k, c]
 
 
-@inlined
+@helper
 def back_substitute(a, pivots, x):  # type: ignore[no-untyped-def]
     """Solve in place with the factors of :func:`factorise`."""
     size = len(pivots)
@@ -96,7 +95,7 @@ def back_substitute(a, pivots, x):  # type: ignore[no-untyped-def]
         x[i] = total * a[i, i]
 
 
-@inlined
+@helper
 def eliminate_memory(G, s, g, w):  # type: ignore[no-untyped-def]
     """Fill the inverse and the weights of the nodes, by Gauss-Jordan elimination."""
     n, states = w.weights.shape
@@ -125,7 +124,7 @@ def eliminate_memory(G, s, g, w):  # type: ignore[no-untyped-def]
             w.weights[j, k] = total
 
 
-@inlined
+@helper
 def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
     """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
     m, rows = shapes.shape
@@ -174,7 +173,7 @@ def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
             w.J[i, m + k] -= s.damping[i, k]
 
 
-@inlined
+@helper
 def factorise_step(G, w):  # type: ignore[no-untyped-def]
     """Factorise G^2 - G Jv - Jq."""
     m = len(w.pivots)
@@ -185,7 +184,7 @@ def factorise_step(G, w):  # type: ignore[no-untyped-def]
     factorise(w.factors, w.pivots)
 
 
-@inlined
+@helper
 def solve_stage(G, s, shapes, g, w, r, motion, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, 2 n) is room to work in."""
     m, rows = shapes.shape

@@ -12,14 +12,10 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
-from fecontact.compiled import block, matrix
-from fecontact.integrate.borrowed import inlined
+from fecontact.compiled import block, helper, matrix
 from fecontact.laws.contract import normal_at, signal_at
 
 Array = NDArray[np.float64]
-
-_node_forces = inlined(kernels.node_forces.py_func)
-_node_gradients = inlined(kernels.node_gradients.py_func)
 
 # Entries of what is given in time: drive x and y, travel and speed of the ground, and their rates.
 DRIVE_X, DRIVE_Y, TRAVEL, SPEED, DRIVE_X_RATE, DRIVE_Y_RATE = range(6)
@@ -41,7 +37,7 @@ class Gradients(NamedTuple):
 GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
 
 
-@inlined
+@helper
 def set_given(t, s, given, pull):  # type: ignore[no-untyped-def]
     """Fill ``given`` (6,) with what is given at time t, and ``pull`` (m,) with its modal force."""
     for axis in range(2):
@@ -59,7 +55,7 @@ def set_given(t, s, given, pull):  # type: ignore[no-untyped-def]
             pull[i] += value * s.load_shapes[k, i]
 
 
-@inlined
+@helper
 def project(shapes, y, places, speeds):  # type: ignore[no-untyped-def]
     """Fill displacements and velocities (2 n,), all x, then all y, of the contact nodes."""
     m, rows = shapes.shape
@@ -80,7 +76,7 @@ def project(shapes, y, places, speeds):  # type: ignore[no-untyped-def]
         i += 1
 
 
-@inlined
+@helper
 def gather(y, s, shapes, pull, forces, rate):  # type: ignore[no-untyped-def]
     """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -R, then all F."""
     m, rows = shapes.shape
@@ -94,7 +90,7 @@ def gather(y, s, shapes, pull, forces, rate):  # type: ignore[no-untyped-def]
         rate[m + i] = total
 
 
-@inlined
+@helper
 def set_rate(y, s, shapes, given, pull, w, small, rate):  # type: ignore[no-untyped-def]
     """Fill ``rate`` (size,) with y'. ``w`` (3, 2 n) and ``small`` are room to work in."""
     m, rows = shapes.shape
@@ -105,7 +101,7 @@ def set_rate(y, s, shapes, given, pull, w, small, rate):  # type: ignore[no-unty
     force, rates = small.force[0], small.rates[0]
     for j in range(n):
         first = 2 * m + j * states
-        F, R, _, _, _, _ = _node_forces(
+        F, R, _, _, _, _ = kernels.node_forces(
             j, places[j], places[n + j], speeds[j], speeds[n + j],
             y[first : first + s.memory[j]], given[TRAVEL], given[SPEED], s, force, rates)
         forces[j] = -R
@@ -115,7 +111,7 @@ def set_rate(y, s, shapes, given, pull, w, small, rate):  # type: ignore[no-unty
     gather(y, s, shapes, pull, forces, rate)
 
 
-@inlined
+@helper
 def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):  # type: ignore[no-untyped-def]
     """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
     m, rows = shapes.shape
@@ -125,7 +121,7 @@ def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):  # type: ig
     project(shapes, y, places, speeds)
     for j in range(n):
         first = 2 * m + j * states
-        F, R = _node_gradients(
+        F, R = kernels.node_gradients(
             j, places[j], places[n + j], speeds[j], speeds[n + j],
             y[first : first + s.memory[j]], given[TRAVEL], given[SPEED], s,
             out.force[j], out.rates[j], out.partial[j])
@@ -136,7 +132,7 @@ def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):  # type: ig
     gather(y, s, shapes, pull, forces, rate)
 
 
-@inlined
+@helper
 def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` (size,) with df/dt at a fixed state.
 
@@ -166,7 +162,7 @@ def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):  # 
         out[m + i] = total
 
 
-@inlined
+@helper
 def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):  # type: ignore[no-untyped-def]
     """Time until the forces of a node change their character, or ``within`` if later.
 
@@ -200,7 +196,7 @@ def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):  # type: ig
     return first
 
 
-@inlined
+@helper
 def _crossing(u, v, a, within):  # type: ignore[no-untyped-def]
     """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
     if u * v > 0.0 and u * a >= 0.0:

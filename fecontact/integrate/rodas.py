@@ -15,7 +15,7 @@ numerical benchmarks within the Julia Differential Equations package, BIT 63 (20
 
 import numpy as np
 
-from fecontact.integrate.borrowed import inlined
+from fecontact.compiled import helper
 
 STAGES = 8
 ORDER = 5
@@ -68,7 +68,7 @@ DENSE = np.array([
 ])
 
 
-@inlined
+@helper
 def combined(row, factor, base, stages, out):  # type: ignore[no-untyped-def]
     """Out = base + factor * sum_j row_j stages_j over the seven stages that may precede one."""
     a0, a1, a2, a3 = factor * row[0], factor * row[1], factor * row[2], factor * row[3]
@@ -78,7 +78,7 @@ def combined(row, factor, base, stages, out):  # type: ignore[no-untyped-def]
                   + a3 * stages[3, i] + a4 * stages[4, i] + a5 * stages[5, i] + a6 * stages[6, i])
 
 
-@inlined
+@helper
 def dense_coefficients(stages, out):  # type: ignore[no-untyped-def]
     """Fill out (3, size) with the coefficients k_1, k_2, k_3 of the interpolant."""
     for row in range(3):
@@ -89,7 +89,7 @@ def dense_coefficients(stages, out):  # type: ignore[no-untyped-def]
             out[row, i] = total
 
 
-@inlined
+@helper
 def interpolated(s, before, after, dense, out):  # type: ignore[no-untyped-def]
     """Fill out with the state at the part s of the step."""
     for i in range(len(out)):

@@ -3,11 +3,10 @@
 import numpy as np
 from numba import types
 
-from fecontact.compiled import i8, kernel, matrix, vector
+from fecontact.compiled import borrowed, helper, i8, kernel, matrix, vector
 from fecontact.contact_energy import powers
 from fecontact.contact_kernels import SYSTEM
 from fecontact.integrate import linear, motion, rodas, run_arrays
-from fecontact.integrate.borrowed import borrowed, inlined
 from fecontact.integrate.run_arrays import (
     CAUTIOUS,
     ENERGY,
@@ -33,7 +32,7 @@ _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
 _POWER = -1.0 / rodas.ORDER
 
 
-@inlined
+@helper
 def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):  # type: ignore[no-untyped-def]
     """What a step needs of the derivatives at its start besides the matrices."""
     m = len(control.largest)
@@ -56,7 +55,7 @@ def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):  # ty
         progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE], speed)
 
 
-@inlined
+@helper
 def _stages(t, h, latest, G, s, shapes, progress, room):  # type: ignore[no-untyped-def]
     """All stages of a step, and its end in ``room.after``."""
     size = len(progress.state)
@@ -85,7 +84,7 @@ def _stages(t, h, latest, G, s, shapes, progress, room):  # type: ignore[no-unty
         room.after[k] = room.stage[k] + room.stages[rodas.STAGES - 1, k]
 
 
-@inlined
+@helper
 def _error(control, progress, room):  # type: ignore[no-untyped-def]
     """Error of a step as a multiple of what is allowed, of modes and internal variables."""
     m = len(control.largest)
@@ -105,7 +104,7 @@ def _error(control, progress, room):  # type: ignore[no-untyped-def]
     return error / control.rtol
 
 
-@inlined
+@helper
 def _slip_error(error, s, shapes, control, progress, room):  # type: ignore[no-untyped-def]
     """The larger of the error and that of the slip velocities at the end of the step.
 
@@ -127,7 +126,7 @@ def _slip_error(error, s, shapes, control, progress, room):  # type: ignore[no-u
     return error
 
 
-@inlined
+@helper
 def _energy(control, progress, room):  # type: ignore[no-untyped-def]
     """The largest of kinetic energy, work of a power and the energy scale so far [J]."""
     m = len(control.largest)
@@ -141,7 +140,7 @@ def _energy(control, progress, room):  # type: ignore[no-untyped-def]
     return energy
 
 
-@inlined
+@helper
 def _go_on(progress, room):  # type: ignore[no-untyped-def]
     """Make the end of the step the state of the run."""
     for k in range(len(progress.state)):

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from fecontact.compiled import helper
 from fecontact.contact_energy import powers
 from fecontact.integrate import rodas
-from fecontact.integrate.borrowed import inlined
 
 # Gauss-Lobatto points: both ends and two inside; exact for powers of degree five.
 _INSIDE = 0.5 - 0.5 / np.sqrt(5.0)
@@ -32,7 +32,7 @@ def _third_difference() -> np.ndarray:
 _DIFFERENCE = _third_difference()
 
 
-@inlined
+@helper
 def work_error(h, power):  # type: ignore[no-untyped-def]
     """Estimated error of the work of the system's powers in a step, the largest of them [J]."""
     largest = 0.0
@@ -44,7 +44,7 @@ def work_error(h, power):  # type: ignore[no-untyped-def]
     return h * largest
 
 
-@inlined
+@helper
 def add_up(t, h, latest, s, progress, room):  # type: ignore[no-untyped-def]
     """Fill ``room.power`` with the powers at the points of a step."""
     for k in range(len(progress.power)):
@@ -59,7 +59,7 @@ def add_up(t, h, latest, s, progress, room):  # type: ignore[no-untyped-def]
                room.power[point, 8:])
 
 
-@inlined
+@helper
 def work_until(part, h, before, power, out):  # type: ignore[no-untyped-def]
     """Out = work ``before`` the step and in its part, by the cubic through the powers."""
     w0, w1, w2, w3 = _weight(0, part), _weight(1, part), _weight(2, part), _weight(3, part)
@@ -68,7 +68,7 @@ def work_until(part, h, before, power, out):  # type: ignore[no-untyped-def]
                                   + w3 * power[3, k])
 
 
-@inlined
+@helper
 def _weight(k, part):  # type: ignore[no-untyped-def]
     c = _INTEGRALS[k]
     return part * (c[0] + part * (c[1] + part * (c[2] + part * c[3])))
