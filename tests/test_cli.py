@@ -261,8 +261,8 @@ def command(*tokens, **options):
 
 def test_ctrl_c_writes_what_was_computed(study, tmp_path):
     process = subprocess.Popen(
-        [sys.executable, "-m", "fecontact", "run", str(study), "--set", "simulation.t_end=1000",
-         "--set", "simulation.outputs=10000001", "--set", "ground.amplitude=1e-5"],
+        [sys.executable, "-m", "fecontact", "run", str(study), "--set", "simulation.t_end=1e5",
+         "--set", "simulation.outputs=100001", "--set", "ground.amplitude=1e-5"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     # The folder is made when everything is loaded; the run begins right after.
     deadline = time.monotonic() + 90
@@ -275,7 +275,7 @@ def test_ctrl_c_writes_what_was_computed(study, tmp_path):
     assert "The run was interrupted" in out
     case = read_case(tmp_path / "results/tiny.vtkhdf")
     assert case.trajectory.status is Status.INTERRUPTED
-    assert 0.0 < case.trajectory.time[-1] < 1000.0
+    assert 0.0 < case.trajectory.time[-1] < 1e5
 
 
 def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
