@@ -7,6 +7,7 @@ spent in converting function objects when the kernel is called from Python.
 
 import hashlib
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -32,29 +33,51 @@ integers = types.Array(i8, 1, "C")
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
 
 
+_PACKAGE = Path(__file__).parent
+_IMPORT = re.compile(r"^\s*(?:from|import)\s+(fecontact[\w.]*)"
+                     r"(?:\s+import\s+(\([^)]*\)|[^\n]*))?", re.MULTILINE)
+
+
 @cache
-def _package_stamp() -> str:
-    """A mark that changes with any source of the package."""
+def _imported(path: Path) -> frozenset[Path]:
+    """Files of the package that a file imports."""
+    found = set()
+    for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        place = _PACKAGE.joinpath(*module.split(".")[1:])
+        for part in (place, *(place / name for name in re.findall(r"\w+", names))):
+            found |= {file for file in (part.with_suffix(".py"), part / "__init__.py")
+                      if file.is_file()}
+    return frozenset(found)
+
+
+@cache
+def _source_stamp(path: Path) -> str:
+    """A mark that changes with any source of the package that a file's kernels may call."""
+    reached, ahead = set(), {path}
+    while ahead:
+        reached |= ahead
+        ahead = set().union(*(_imported(file) for file in ahead)) - reached
     stamp = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        info = path.stat()
-        stamp.update(f"{path.name}:{info.st_size}:{info.st_mtime_ns};".encode())
+    for file in sorted(reached):
+        info = file.stat()
+        stamp.update(f"{file.name}:{info.st_size}:{info.st_mtime_ns};".encode())
     return stamp.hexdigest()
 
 
-def _stamp(compiled: Any, module: str = "") -> None:
-    """Key stored code by the package's sources, and by the module name that it refers to."""
+def _stamp(compiled: Any, function: Callable[..., Any], module: str = "") -> None:
+    """Key stored code by the sources it is made from, and by the module name it refers to."""
     stored = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if stored is not None and hasattr(stored, "_source_stamp"):
-        stored._source_stamp = (stored._source_stamp, _package_stamp(), module)
+        stored._source_stamp = (stored._source_stamp,
+                                _source_stamp(Path(inspect.getfile(function))), module)
 
 
 def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function for one signature and keep the result on disk.
 
     Floating-point sums may be reordered (so that they vectorise), but NaN and infinity keep
-    their meaning. The stored code is renewed when any source of the package changes: numba by
-    itself looks only at the file of the function, not at the functions that it calls.
+    their meaning. The stored code is renewed when the file of the function changes, or any that it
+    imports from the package: numba by itself looks only at the first.
     """
 
     def compile_(function: Callable[..., Any]) -> Any:
@@ -63,7 +86,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
             "fastmath": _FASTMATH, **options,
         }
         dispatcher = njit(**settings)(function)
-        _stamp(dispatcher)
+        _stamp(dispatcher, function)
         dispatcher.compile(signature)
         dispatcher.disable_compile()
         return dispatcher
@@ -140,7 +163,7 @@ class CompiledLaw:
         # Functions typed into a console have no file beside which they could be stored.
         if Path(inspect.getfile(function)).is_file():
             law.enable_caching()
-            _stamp(law, function.__module__)
+            _stamp(law, function, function.__module__)
         try:
             law.compile()
         except (NumbaError, TypeError) as error:
