@@ -8,7 +8,9 @@ from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
 from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
+from .integrate.sensitivity import Sensitivity, sensitivity
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.contract import (
@@ -69,9 +71,11 @@ __all__ = [
     "BoucWenFriction",
     "Constant",
     "ConstantFriction",
+    "ContactEvents",
     "ContactState",
     "ContactSystem",
     "CosineSurface",
+    "Crossing",
     "Crown",
     "CubicFriction",
     "DahlFriction",
@@ -79,6 +83,8 @@ __all__ = [
     "ElasticBody",
     "Energies",
     "Ensemble",
+    "Event",
+    "Events",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -121,6 +127,7 @@ __all__ = [
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sensitivity",
     "Sine",
     "SpeedRamp",
     "Status",
@@ -131,6 +138,7 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "ensemble",
+    "event",
     "export_pvd",
     "forcing_period",
     "friction_law",
@@ -150,6 +158,7 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
+    "sensitivity",
     "simulate",
     "static_equilibrium",
     "strobe",
