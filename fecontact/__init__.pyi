@@ -11,6 +11,7 @@ from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
 from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
 from .integrate.sensitivity import Sensitivity, sensitivity
+from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.contract import (
@@ -129,6 +130,7 @@ __all__ = [
     "RoughSurface",
     "Sensitivity",
     "Sine",
+    "SmoothingCost",
     "SpeedRamp",
     "Status",
     "Study",
@@ -160,6 +162,7 @@ __all__ = [
     "rows_from_dofs",
     "sensitivity",
     "simulate",
+    "smoothing_cost",
     "static_equilibrium",
     "strobe",
     "write_case",
