@@ -1,4 +1,4 @@
-"""The command line ``fecontact``: commands are plain functions, listed in :mod:`fecontact.cli.app`."""
+"""The command line ``fecontact``: commands are plain functions, listed in ``app.COMMANDS``."""
 
 from fecontact.cli.entry import execute, main
 
