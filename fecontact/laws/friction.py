@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from fecontact.laws import friction_kernels
-from fecontact.laws.contract import PerNode
+from fecontact.laws.contract import NotNegative, PerNode, Positive
 from fecontact.laws.friction_base import MemorylessFriction, SmoothedFriction, require_at_least
 
 Smoothing = Literal["arctan", "tanh", "square-root"]
@@ -52,17 +52,12 @@ class ExponentialFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.exponential
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    decay: PerNode = 1000.0
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    decay: NotNegative = 1000.0
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "decay", "viscous_coefficient")
 
 
 @dataclass(frozen=True)
@@ -103,18 +98,12 @@ class GaussianFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.gaussian
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    stribeck_velocity: PerNode = 1e-3
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    stribeck_velocity: Positive = 1e-3
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "viscous_coefficient")
-        self.require("above zero", lambda x: x > 0, "stribeck_velocity")
 
 
 @dataclass(frozen=True)
@@ -155,18 +144,12 @@ class HyperbolicFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.hyperbolic
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    stribeck_velocity: PerNode = 1e-3
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    stribeck_velocity: Positive = 1e-3
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "viscous_coefficient")
-        self.require("above zero", lambda x: x > 0, "stribeck_velocity")
 
 
 @dataclass(frozen=True)
@@ -194,15 +177,10 @@ class ConstantFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.constant
 
-    friction_coefficient: PerNode = 0.55
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    friction_coefficient: NotNegative = 0.55
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0,
-                     "friction_coefficient", "viscous_coefficient")
 
 
 @dataclass(frozen=True)
@@ -243,17 +221,12 @@ class GalvanettoFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.galvanetto
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    decay: PerNode = 1000.0
-    growth: PerNode = 0.0
-    smoothing_slope: PerNode = 1e6
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    decay: NotNegative = 1000.0
+    growth: NotNegative = 0.0
+    smoothing_slope: Positive = 1e6
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "decay", "growth")
 
 
 @dataclass(frozen=True)
@@ -296,15 +269,13 @@ class CubicFriction(SmoothedFriction):
     kernel: ClassVar = friction_kernels.cubic
 
     static_coefficient: PerNode = 0.8
-    minimum_coefficient: PerNode = 0.55
-    minimum_velocity: PerNode = 1e-2
-    smoothing_slope: PerNode = 1e6
+    minimum_coefficient: NotNegative = 0.55
+    minimum_velocity: Positive = 1e-2
+    smoothing_slope: Positive = 1e6
     smoothing: Smoothing = "arctan"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "minimum_coefficient")
-        self.require("above zero", lambda x: x > 0, "minimum_velocity")
         require_at_least(self, "static_coefficient", "minimum_coefficient")
 
 
@@ -340,15 +311,10 @@ class ProductFriction(MemorylessFriction):
 
     kernel: ClassVar = friction_kernels.product
 
-    factor: PerNode = 0.14
-    excess: PerNode = 1.14
-    decay: PerNode = 2.0
-    smoothing_slope: PerNode = 100.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "factor", "excess", "decay")
-        self.require("above zero", lambda x: x > 0, "smoothing_slope")
+    factor: NotNegative = 0.14
+    excess: NotNegative = 1.14
+    decay: NotNegative = 2.0
+    smoothing_slope: Positive = 100.0
 
     @property
     def velocity_scale(self) -> float:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fecontact.errors import InputError
 from fecontact.laws import contract
-from fecontact.laws.contract import NodeLaw, PerNode
+from fecontact.laws.contract import NodeLaw, Positive
 
 Array = NDArray[np.float64]
 
@@ -68,11 +68,7 @@ class SmoothedFriction(MemorylessFriction):
 
     choices: ClassVar = {"smoothing": ("arctan", "tanh", "square-root")}
 
-    smoothing_slope: PerNode
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "smoothing_slope")
+    smoothing_slope: Positive
 
     @property
     def velocity_scale(self) -> float:

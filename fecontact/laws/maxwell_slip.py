@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
-from fecontact.laws.contract import PerNode, memory_friction_law
+from fecontact.laws.contract import NotNegative, Positive, memory_friction_law
 from fecontact.laws.friction_base import MemoryFriction
 
 Array = NDArray[np.float64]
@@ -48,14 +48,9 @@ class _MaxwellSlip(MemoryFriction):
     kernel: ClassVar = _maxwell_slip
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: PerNode = 1e7
-    friction_coefficient: PerNode = 0.55
-    relaxation_time: PerNode = 1e-7
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness", "relaxation_time")
-        self.require("zero or above", lambda x: x >= 0, "friction_coefficient")
+    stiffness: Positive = 1e7
+    friction_coefficient: NotNegative = 0.55
+    relaxation_time: Positive = 1e-7
 
     def _yield_deflections(self, share: Array, normal_force: Array) -> Array:
         """Deflections (n, s) at which the elements slide [m]."""

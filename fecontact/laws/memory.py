@@ -2,13 +2,20 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.compiled import helper
-from fecontact.laws.contract import PerNode, memory_friction_law
+from fecontact.laws.contract import (
+    NotNegative,
+    OneOrAbove,
+    PerNode,
+    Positive,
+    Range,
+    memory_friction_law,
+)
 from fecontact.laws.friction_base import MemoryFriction, require_at_least
 from fecontact.laws.maxwell_slip import IwanFriction, JenkinsFriction
 
@@ -133,14 +140,9 @@ class DahlFriction(MemoryFriction):
 
     kernel: ClassVar = _dahl
 
-    friction_coefficient: PerNode = 0.55
-    presliding_stiffness: PerNode = 1e5
-    exponent: PerNode = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "friction_coefficient", "presliding_stiffness")
-        self.require("one or above", lambda x: x >= 1, "exponent")
+    friction_coefficient: Positive = 0.55
+    presliding_stiffness: Positive = 1e5
+    exponent: OneOrAbove = 1.0
 
     @property
     def memory(self) -> int:
@@ -218,20 +220,16 @@ class LuGreFriction(MemoryFriction):
     kernel: ClassVar = _lugre
 
     static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    stribeck_velocity: PerNode = 1e-3
-    stribeck_exponent: PerNode = 2.0
-    bristle_stiffness: PerNode = 1e5
-    bristle_damping: PerNode = 0.0
-    viscous_coefficient: PerNode = 0.0
-    damping_decay: PerNode = 0.0
+    kinetic_coefficient: Positive = 0.55
+    stribeck_velocity: Positive = 1e-3
+    stribeck_exponent: Positive = 2.0
+    bristle_stiffness: Positive = 1e5
+    bristle_damping: NotNegative = 0.0
+    viscous_coefficient: NotNegative = 0.0
+    damping_decay: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "kinetic_coefficient", "stribeck_velocity",
-                     "stribeck_exponent", "bristle_stiffness")
-        self.require("zero or above", lambda x: x >= 0, "bristle_damping", "viscous_coefficient",
-                     "damping_decay")
         require_at_least(self, "static_coefficient", "kinetic_coefficient")
 
     @property
@@ -304,17 +302,10 @@ class BoucWenFriction(MemoryFriction):
 
     kernel: ClassVar = _bouc_wen
 
-    friction_coefficient: PerNode = 0.55
-    yield_displacement: PerNode = 5e-6
-    beta: PerNode = 0.5
-    exponent: PerNode = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "friction_coefficient")
-        self.require("above zero", lambda x: x > 0, "yield_displacement")
-        self.require("0.5 or above", lambda x: x >= 0.5, "beta")
-        self.require("one or above", lambda x: x >= 1, "exponent")
+    friction_coefficient: NotNegative = 0.55
+    yield_displacement: Positive = 5e-6
+    beta: Annotated[PerNode, Range("0.5 or above", lambda x: x >= 0.5)] = 0.5
+    exponent: OneOrAbove = 1.0
 
     @property
     def memory(self) -> int:

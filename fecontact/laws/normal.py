@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NormalLaw, PerNode, normal_law
+from fecontact.laws.contract import NormalLaw, NotNegative, PerNode, Positive, Range, normal_law
 
 _TAU = 2.0 * math.pi
 _ROOT_HALF = math.sqrt(0.5)
@@ -149,14 +149,9 @@ class RoughSurface(NormalLaw):
     kernel: ClassVar = _uniform
     extensive: ClassVar = frozenset({"stiffness", "damping"})
 
-    stiffness: PerNode = 0.3e6
-    roughness_height: PerNode = 5.2e-6
-    damping: PerNode = 6.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness", "roughness_height")
-        self.require("zero or above", lambda x: x >= 0, "damping")
+    stiffness: Positive = 0.3e6
+    roughness_height: Positive = 5.2e-6
+    damping: NotNegative = 6.0
 
     @property
     def penetration_scale(self) -> float:
@@ -271,11 +266,8 @@ class GaussianSurface(RoughSurface):
 
     kernel: ClassVar = _gaussian
 
-    deviation: PerNode = 1.0 / 6.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("at least 0.02 and at most 1", lambda x: (x >= 0.02) & (x <= 1), "deviation")
+    deviation: Annotated[PerNode, Range(
+        "at least 0.02 and at most 1", lambda x: (x >= 0.02) & (x <= 1.0))] = 1.0 / 6.0
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters (n, 7): the fields, and three integrals of the density at the highest peak."""
