@@ -79,9 +79,14 @@ class SmoothedFriction(MemorylessFriction):
 class MemoryFriction(contract.FrictionLaw):
     """A friction law ``f(v, F, z, p, force, rates)`` with internal variables z.
 
-    Subclasses give :attr:`memory`, :attr:`state_scale`, :meth:`steady_coefficient` and, where it
-    has a closed form, :meth:`initial_memory`.
+    Subclasses give :attr:`state_scale`, :meth:`steady_coefficient` and, where there is more than
+    one internal variable, :attr:`memory`.
     """
+
+    @property
+    def memory(self) -> int:
+        """Number s of internal variables per node: one, if a law does not say otherwise."""
+        return 1
 
     @property
     def velocity_scale(self) -> float:
@@ -96,18 +101,6 @@ class MemoryFriction(contract.FrictionLaw):
         """R/F of sliding at constant slip velocity [m/s], with its sign; for v = 0 that of v > 0.
 
         With parameters per node, (n,) of them, velocities broadcast against (n,).
-        """
-        raise NotImplementedError
-
-    def initial_memory(self, normal_force: Array, slip_velocity: Array, share: Array) -> Array:
-        """Internal variables (n, s) of sliding at constant slip velocities; zero at v = 0.
-
-        Parameters
-        ----------
-        normal_force, slip_velocity : (n,) array
-            F [N] and v [m/s] of each node.
-        share : (n,) array
-            Each node's part of the contact face.
         """
         raise NotImplementedError
 
