@@ -1,6 +1,6 @@
 """Base classes of friction laws: without memory, smoothed, with memory."""
 
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,8 @@ from fecontact.laws import contract
 from fecontact.laws.contract import NodeLaw, Positive
 
 Array = NDArray[np.float64]
+
+Smoothing = Literal["arctan", "tanh", "square-root"]
 
 
 class MemorylessFriction(contract.FrictionLaw):
@@ -66,7 +68,7 @@ class SmoothedFriction(MemorylessFriction):
     a creep that the others have less of.
     """
 
-    choices: ClassVar = {"smoothing": ("arctan", "tanh", "square-root")}
+    choices: ClassVar = {"smoothing": get_args(Smoothing)}
 
     smoothing_slope: Positive
 

@@ -7,17 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.laws import memory_kernels
-from fecontact.laws.contract import (
-    NotNegative,
-    OneOrAbove,
-    PerNode,
-    Positive,
-    Range,
-)
+from fecontact.laws.contract import NotNegative, OneOrAbove, PerNode, Positive, Range
 from fecontact.laws.friction_base import MemoryFriction, require_at_least
-from fecontact.laws.maxwell_slip import IwanFriction, JenkinsFriction
-
-__all__ = ["BoucWenFriction", "DahlFriction", "IwanFriction", "JenkinsFriction", "LuGreFriction"]
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,9 @@ from fecontact.laws.signal_base import Signal
 def law_names() -> Mapping[type, Mapping[str, type]]:
     """Classes by name, for each kind of law (the base class)."""
     from fecontact.laws import (
+        fourier_series,
         friction,
+        friction_minimum,
         ground_motion,
         maxwell_slip,
         memory,
@@ -29,6 +31,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         normal_statistical,
         normal_stop,
         profiles,
+        random_roughness,
         signals,
         trace,
         transients,
@@ -55,8 +58,8 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "gaussian": friction.GaussianFriction,
             "hyperbolic": friction.HyperbolicFriction,
             "constant": friction.ConstantFriction,
-            "galvanetto": friction.GalvanettoFriction,
-            "cubic": friction.CubicFriction,
+            "galvanetto": friction_minimum.GalvanettoFriction,
+            "cubic": friction_minimum.CubicFriction,
             "product": friction.ProductFriction,
             "jenkins": maxwell_slip.JenkinsFriction,
             "iwan": maxwell_slip.IwanFriction,
@@ -67,9 +70,9 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         Profile: {
             "flat": profiles.Flat,
             "sine": profiles.Sine,
-            "fourier-series": profiles.FourierSeries,
+            "fourier-series": fourier_series.FourierSeries,
             "trace": trace.Trace,
-            "random-roughness": profiles.RandomRoughness,
+            "random-roughness": random_roughness.RandomRoughness,
         },
         GroundMotion: {
             "harmonic-speed": ground_motion.HarmonicSpeed,
