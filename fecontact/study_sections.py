@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 from fecontact.basis import ModalBasis
@@ -18,39 +17,6 @@ from fecontact.tables import located
 
 Place = str | tuple[float, float] | Patch
 Support = Literal["x", "y", "xy", "hinge"]
-
-
-@dataclass(frozen=True)
-class MeshFile:
-    """``[geometry]`` with the file of a mesh; see :func:`fecontact.mesh_io.read_mesh`.
-
-    Parameters
-    ----------
-    file : str
-        The mesh, relative to the study file.
-    scale : float
-        Factor from the file's unit of length to m.
-    boundaries : mapping of name to name or box
-        Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1] [m].
-    points : mapping of name to name or place
-        Points to name: a group of the file, or the node nearest to [x, y] [m].
-    """
-
-    file: str
-    scale: float = 1.0
-    boundaries: Mapping[str, str | tuple[float, float, float, float]] = field(
-        default_factory=dict)
-    points: Mapping[str, str | tuple[float, float]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        require_positive("MeshFile", scale=self.scale)
-
-    def mesh(self, folder: Path) -> Mesh:
-        """Read the mesh; ``folder`` is that of the study file."""
-        from fecontact.mesh_io import read_mesh
-
-        return read_mesh(folder / self.file, scale=self.scale,
-                         boundaries=self.boundaries or None, points=self.points or None)
 
 
 @dataclass(frozen=True)
