@@ -153,6 +153,19 @@ class ContactSystem:
         return tuple(sorted({time for source in given
                              for time in source.breakpoints(start, end)}))
 
+    def shortest_period(self, start: float, end: float) -> float:
+        """Shortest period of drive, loads and waves under the body [s]; infinite without any.
+
+        Waves pass at the largest speed of the ground between two times [s].
+        """
+        given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
+        given += [force.signal for force in self.load.forces]
+        periods = [source.shortest_period for source in given]
+        wavelength, speed = self.ground.shortest_wavelength, self.ground.largest_speed(start, end)
+        if wavelength is not None and speed > 0.0:
+            periods.append(wavelength / speed)
+        return float(min((period for period in periods if period is not None), default=np.inf))
+
     def stored_energy(self, penetration: Array) -> Array:
         """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""
         energy = np.zeros(penetration.shape[:-1])
