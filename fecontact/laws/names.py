@@ -1,6 +1,7 @@
 """Names of the laws in study files: ``law = "lugre"``, or a law of the user's own file."""
 
 import importlib.util
+import os
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -157,6 +158,28 @@ def with_folder(table: Any, folder: Path) -> Any:
     if not isinstance(table, Mapping):
         return table
     return {key: _located(key, with_folder(value, folder), folder) for key, value in table.items()}
+
+
+def movable(table: Any, folder: Path, root: Path) -> Any:
+    """A table in which files of laws below ``root`` are named from a folder, not absolutely.
+
+    The reverse of :func:`with_folder`; ``root`` can then be moved with all that is in it.
+    """
+    if isinstance(table, list):
+        return [movable(item, folder, root) for item in table]
+    if not isinstance(table, Mapping):
+        return table
+    return {key: _relative(key, movable(value, folder, root), folder.resolve(), root.resolve())
+            for key, value in table.items()}
+
+
+def _relative(key: str, value: Any, folder: Path, root: Path) -> Any:
+    if key != "law" or not isinstance(value, str) or ".py:" not in value:
+        return value
+    path, _, title = value.rpartition(":")
+    if not Path(path).is_relative_to(root):
+        return value
+    return f"{Path(os.path.relpath(path, folder)).as_posix()}:{title}"
 
 
 def _located(key: str, value: Any, folder: Path) -> Any:
