@@ -359,6 +359,13 @@ def test_own_law_with_memory_runs_is_kept_and_read(tmp_path):
 
 
 @pytest.mark.parametrize(("old", "new", "message"), [
+    ("    force[1] = 0.0\n", "    if v > 1e9:\n        raise ValueError(v)\n",
+     r"f\(v, F, z, p, force, rates\) has a raise or assert statement, which"),
+    ("    force[1] = 0.0\n", "    assert F >= 0.0\n", "has a raise or assert statement, which"),
+    ("@fc.memory_friction_law\ndef f(v, F, z, p, force, rates):\n",
+     "import numba\n\n@numba.njit\ndef checked(F):\n    if F < 0.0:\n        raise ValueError(F)\n"
+     "\n@fc.memory_friction_law\ndef f(v, F, z, p, force, rates):\n    checked(F)\n",
+     "statement in checked, which"),
     ("    memory: ClassVar = 1\n", "", "memory = 0 must be the number of internal variables"),
     ("memory: ClassVar = 1", "memory: ClassVar = -1", "memory = -1 must be"),
     ("velocity_scale: ClassVar = 1e-5", "velocity_scale: ClassVar = 0.0", "velocity_scale = 0.0"),
