@@ -11,6 +11,7 @@ from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
 from .integrate.initial import RigidStart
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.check import check_law
 from .laws.contract import (
     FrictionLaw,
     NormalLaw,
@@ -126,6 +127,7 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "check_law",
     "ensemble",
     "export_pvd",
     "forcing_period",

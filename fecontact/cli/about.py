@@ -29,7 +29,9 @@ def doctor() -> int:
 
 
 def laws(
-    name: Annotated[str | None, Parameter(help="A law, for its formula and parameters.")] = None,
+    name: Annotated[str | None, Parameter(help=(
+        "A law, for its formula and parameters; one of your own, FILE.py:CLASS, is checked too."))]
+    = None,
     /,
 ) -> None:
     """List the laws of contact, friction, ground and drive, or explain one."""

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -117,20 +118,33 @@ def law_class(kind: type, name: Any, where: str) -> type:
                          f"\"FILE.py:CLASS\".")
     if name in names:
         return names[name]
+    return own_law(kind, name, f"{where}: law = {name!r}")
+
+
+def own_law(kind: Any, name: str, where: str) -> type:
+    """The class ``FILE.py:CLASS`` of a law of a kind, or of one of several.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it cannot be loaded, or has no such class.
+    """
     path, _, title = name.rpartition(":")
     try:
         found = getattr(_module(str(Path(path).resolve())), title, None)
     except FileNotFoundError:
-        raise InputError(f"{where}: law = {name!r}: there is no file {path}.") from None
+        raise InputError(f"{where}: there is no file {path}.") from None
     except InputError:
         raise
     except Exception as error:
-        raise InputError(f"{where}: law = {name!r}: {path} cannot be loaded "
+        raise InputError(f"{where}: {path} cannot be loaded "
                          f"({type(error).__name__}: {error}).") from None
     if not (isinstance(found, type) and issubclass(found, kind)):
-        laws = [one.__name__ for one in _subclasses(kind)
-                if one.__module__ == _module_name(str(Path(path).resolve()))]
-        raise InputError(f"{where}: law = {name!r}: {path} has no {kind.__name__} of that name"
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        laws = {one.__name__ for one in chain(*map(_subclasses, kinds))
+                if one.__module__ == _module_name(str(Path(path).resolve()))}
+        what = "law" if len(kinds) > 1 else kind.__name__
+        raise InputError(f"{where}: {path} has no {what} of that name"
                          f"{nearest(title, laws)}; it has {choices(laws)}.")
     return found
 
