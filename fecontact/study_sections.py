@@ -33,10 +33,12 @@ class BodySettings:
     thickness : float
         Out-of-plane thickness [m].
     plane : 'stress' or 'strain'
+        Plane stress for thin bodies, plane strain for long ones.
     degree : 1 or 2
         Of the finite elements.
-    fixed : mapping of name to 'x', 'y' or 'xy'
-        Supports on boundaries and points of the mesh.
+    fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
+        Supports on boundaries and points of the mesh: the directions that are held, or a hole
+        that turns about its centre.
     """
 
     material: str | None = None
@@ -111,7 +113,9 @@ class BasisSettings:
         Number of modes, the rigid ones included.
     contact : str or list of str
         Boundary that touches the ground, or several, each a contact group of that name.
-    contact_nodes : int or 'all', or a list with one of them for each boundary
+    contact_nodes : int or 'all', or list
+        Number of contact nodes, or every node of the mesh there; a list has one of them for each
+        boundary.
     B, C : place, optional
         Excitation and load point: name of a point or boundary, [x, y], or a patch
         ``{at = name or [x, y], radius = r}``.

@@ -45,6 +45,17 @@ def laws(
         print(law_help(name))
 
 
+def keys(
+    section: Annotated[str | None, Parameter(help="A section, like ground.profile.")] = None, /,
+) -> None:
+    """Print the sections and keys of study files: types, defaults, units and meaning."""
+    from fecontact.console import loading
+
+    with loading():
+        from fecontact.study_keys import study_keys
+    print(study_keys(section), end="")
+
+
 def demo(
     folder: Annotated[Path, Parameter(help="Where the results go.")] = Path("demo-output"), /,
 ) -> int:

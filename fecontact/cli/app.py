@@ -17,6 +17,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     studies.run,
     runs.render,
     runs.export,
+    about.keys,
     about.laws,
     about.demo,
     about.doctor,
