@@ -29,6 +29,7 @@ from fecontact.study_sections import (
     RenderSettings,
     SimulationSettings,
 )
+from fecontact.study_system import contact_system
 from fecontact.system import ContactSystem
 from fecontact.tables import (
     PART_CLASSES,
@@ -242,21 +243,7 @@ class Study:
         FecontactError
             With the file and the section before the message, like all of these methods.
         """
-        title, basis = _title(self.path), self.basis()
-        parts = {part: getattr(self, part) for part in PART_CLASSES}
-        for part in ("normal", "friction"):
-            own = {group: law for group, laws in self.contact.items()
-                   if (law := getattr(laws, part)) is not None}
-            if own:
-                parts[part] = {name: parts[part] for name, _ in basis.groups} | own
-        try:
-            return ContactSystem(basis, gap=self.gap, **parts)
-        except InputError as error:
-            owner, _, message = str(error).partition(": ")
-            for part in PART_CLASSES:
-                if owner == type(getattr(self, part)).__name__:
-                    raise InputError(f"{title}: [{part}]: {message}") from None
-            raise InputError(f"{title}: {error}") from None
+        return contact_system(self, self.basis(), _title(self.path))
 
     def run(
         self, progress: Callable[[float], None] | None = None, checkpoint: Path | None = None

@@ -276,3 +276,6 @@ class RenderSettings:
                              f"height in pixels, at least [320, 180].")
         if self.scale is not None:
             require_positive("RenderSettings", scale=self.scale)
+        if self.start is not None and self.end is not None and not self.start <= self.end:
+            raise InputError(f"RenderSettings: end = {self.end!r} must not be before start = "
+                             f"{self.start!r}.")
