@@ -24,6 +24,11 @@ class Crown:
         R, positive [m].
     centre : float
         Abscissa of the lowest point [m].
+
+    Raises
+    ------
+    InputError
+        For a radius that is not positive, and when it is used, one that a contact node exceeds.
     """
 
     radius: float

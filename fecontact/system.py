@@ -54,6 +54,12 @@ class ContactSystem:
     gap : float, (n,) sequence, Crown or function of x
         Initial distance g_j of the contact nodes from flat ground, zero or above [m]; kept as
         numbers.
+
+    Raises
+    ------
+    InputError
+        For a part of another kind, laws for groups that the basis lacks, parameters or gaps of
+        another number than there are contact nodes, and laws that :func:`require_sound` refuses.
     """
 
     basis: ModalBasis
@@ -256,7 +262,8 @@ class ContactSystem:
         """Contact quantities (N, n, 6) at N times and states (N, 2 m + n s).
 
         The columns are normal force [N], friction force [N], penetration [m], its rate [m/s],
-        slip velocity [m/s] and the rate of the ground's height under the node [m/s].
+        slip velocity [m/s] and the rate of the ground's height under the node [m/s]. InputError
+        for states of another shape.
         """
         times = np.ascontiguousarray(times, dtype=float)
         states = np.ascontiguousarray(states, dtype=float)

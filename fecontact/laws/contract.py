@@ -96,12 +96,20 @@ def _ranges(law: Any) -> Mapping[str, tuple[Range, ...]]:
 
 
 def normal_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(u, v, p) -> F, dF/du, dF/dv``."""
+    """Decorator of a function ``f(u, v, p) -> F, dF/du, dF/dv``, compiled at its first use.
+
+    Arguments, results, units and signs stand at the top of the module. InputError at that use for
+    another form, or a statement that cannot be compiled.
+    """
     return compile_law(NORMAL, NORMAL_FORM, function)
 
 
 def friction_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(v, F, p) -> R, dR/dv, dR/dF``."""
+    """Decorator of a function ``f(v, F, p) -> R, dR/dv, dR/dF``, compiled at its first use.
+
+    Arguments, results, units and signs stand at the top of the module. InputError at that use for
+    another form, or a statement that cannot be compiled.
+    """
     return compile_law(FRICTION, FRICTION_FORM, function)
 
 
@@ -111,7 +119,10 @@ def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
 
 
 def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(v, F, z, p, force, rates)`` that fills force and rates."""
+    """Decorator of a function ``f(v, F, z, p, force, rates)`` that fills force and rates.
+
+    As :func:`friction_law`.
+    """
     return compile_law(MEMORY, MEMORY_FORM, function)
 
 
