@@ -14,6 +14,7 @@ from .integrate.sensitivity import Sensitivity, sensitivity
 from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.check import check_law
 from .laws.contract import (
     FrictionLaw,
     NormalLaw,
@@ -23,30 +24,26 @@ from .laws.contract import (
     normal_law,
 )
 from .laws.drive import Drive, Load, PointLoad
+from .laws.fourier_series import FourierSeries
 from .laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from .laws.friction_minimum import CubicFriction, GalvanettoFriction
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import (
-    BoucWenFriction,
-    DahlFriction,
-    IwanFriction,
-    JenkinsFriction,
-    LuGreFriction,
-)
+from .laws.maxwell_slip import IwanFriction, JenkinsFriction
+from .laws.memory import BoucWenFriction, DahlFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
-from .laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from .laws.profiles import Flat, Sine
+from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
 from .laws.trace import Trace
 from .laws.transients import Pulse, Tabulated
@@ -139,6 +136,7 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "check_law",
     "ensemble",
     "event",
     "export_pvd",
