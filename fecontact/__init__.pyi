@@ -1,5 +1,8 @@
 from .basis import ModalBasis
 from .basis_report import BasisReport
+from .bifurcation.basins import Attractor, Axis, Basins, basins
+from .bifurcation.brute_force import BruteForce, brute_force
+from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
@@ -63,10 +66,14 @@ from .system import ContactSystem
 __version__: str
 
 __all__ = [
+    "Attractor",
+    "Axis",
+    "Basins",
     "BasisReport",
     "Beam",
     "Block",
     "BoucWenFriction",
+    "BruteForce",
     "Constant",
     "ConstantFriction",
     "ContactEvents",
@@ -105,6 +112,7 @@ __all__ = [
     "Load",
     "LossFactor",
     "LuGreFriction",
+    "LyapunovExponents",
     "Material",
     "MeasuredSurface",
     "Mesh",
@@ -136,6 +144,8 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "basins",
+    "brute_force",
     "check_law",
     "ensemble",
     "event",
@@ -143,6 +153,7 @@ __all__ = [
     "forcing_period",
     "friction_law",
     "generate",
+    "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
