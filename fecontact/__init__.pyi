@@ -1,5 +1,8 @@
 from .analysis.impacts import Impacts, find_impacts, find_rests
 from .analysis.periods import Periodicity, count_periods, periodicity, strobe
+from .analysis.quantities import history
+from .analysis.receptance import frequency_response
+from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
@@ -125,12 +128,15 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "amplitude_spectrum",
     "count_periods",
     "export_pvd",
     "find_impacts",
     "find_rests",
+    "frequency_response",
     "friction_law",
     "generate",
+    "history",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
@@ -141,6 +147,7 @@ __all__ = [
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "power_spectral_density",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -148,6 +155,7 @@ __all__ = [
     "render",
     "rows_from_dofs",
     "simulate",
+    "spectrogram",
     "static_equilibrium",
     "strobe",
     "write_case",
