@@ -3,6 +3,7 @@ from .analysis.periods import Periodicity, count_periods, periodicity, strobe
 from .analysis.quantities import history
 from .analysis.receptance import frequency_response
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
@@ -48,6 +49,15 @@ from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
+from .output.analysis_plots import (
+    plot_friction_work,
+    plot_poincare,
+    plot_response,
+    plot_spectrogram,
+    plot_spectrum,
+)
+from .output.dataset import to_xarray
+from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
@@ -130,6 +140,9 @@ __all__ = [
     "TwoSidedStop",
     "amplitude_spectrum",
     "count_periods",
+    "export_csv",
+    "export_mat",
+    "export_netcdf",
     "export_pvd",
     "find_impacts",
     "find_rests",
@@ -144,9 +157,14 @@ __all__ = [
     "picture",
     "plot_contact_map",
     "plot_energies",
+    "plot_friction_work",
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_poincare",
+    "plot_response",
+    "plot_spectrogram",
+    "plot_spectrum",
     "power_spectral_density",
     "read_case",
     "read_matrix",
@@ -158,6 +176,8 @@ __all__ = [
     "spectrogram",
     "static_equilibrium",
     "strobe",
+    "to_xarray",
+    "window",
     "write_case",
     "write_mesh",
 ]

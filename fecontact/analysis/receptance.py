@@ -159,8 +159,8 @@ def _response(
     if not np.isfinite(values).all():
         first = int(np.flatnonzero(~np.isfinite(values).all(axis=(1, 2)))[0])
         at = w[first] / (2.0 * np.pi)
-        raise AnalysisError(f"The response at or near {at:g} Hz is infinite: nothing holds the body "
-                            f"there; leave this frequency out, or give damping or a spring.")
+        raise AnalysisError(f"The response at or near {at:g} Hz is infinite: nothing holds the "
+                            f"body there; leave this frequency out, or give damping or a spring.")
     return values
 
 

@@ -169,12 +169,12 @@ def amplitude_spectrum(
     n, step = len(x), float(t[1] - t[0])
     weights = get_window(window, n)
     transform = np.fft.rfft(weights * (x - x.mean()), padding * n)
-    amplitude: Array = 2.0 / float(weights.sum()) * np.abs(transform)
+    amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform), dtype=np.float64)
     # The mean and the frequency of half the sampling rate have no twin at the other side.
     amplitude[0] *= 0.5
     if (padding * n) % 2 == 0:
         amplitude[-1] *= 0.5
-    return Spectrum(np.fft.rfftfreq(padding * n, step), amplitude, "amplitude", 1.0 / (n * step))
+    return Spectrum(_frequencies(padding * n, step), amplitude, "amplitude", 1.0 / (n * step))
 
 
 def power_spectral_density(
@@ -258,11 +258,15 @@ def spectrogram(
     pieces = np.lib.stride_tricks.sliding_window_view(x, count)[::hop]
     padded = 2 * count
     transform = np.fft.rfft(weights * (pieces - pieces.mean(axis=1, keepdims=True)), padded)
-    amplitude: Array = 2.0 / float(weights.sum()) * np.abs(transform).T
+    amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform).T, dtype=np.float64)
     amplitude[0] *= 0.5
     amplitude[-1] *= 0.5
     middles = t[0] + step * (0.5 * (count - 1) + hop * np.arange(len(pieces)))
-    return Spectrogram(middles, np.fft.rfftfreq(padded, step), amplitude, 1.0 / (count * step))
+    return Spectrogram(middles, _frequencies(padded, step), amplitude, 1.0 / (count * step))
+
+
+def _frequencies(count: int, step: float) -> Array:
+    return np.asarray(np.fft.rfftfreq(count, step), dtype=np.float64)
 
 
 def _piece(length: float, times: int, step: float, *, given: bool) -> int:
