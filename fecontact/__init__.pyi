@@ -1,5 +1,5 @@
 from .analysis.impacts import Impacts, find_impacts, find_rests
-from .analysis.periods import Periodicity, count_periods, periodicity, strobe
+from .analysis.periods import Periodicity, count_periods, periodicity, strobed_states
 from .analysis.quantities import history
 from .analysis.receptance import frequency_response
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
@@ -8,11 +8,12 @@ from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
-from .errors import FecontactError
+from .errors import FecontactError, InputError
 from .formats.matrices import read_matrix
 from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
+from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
 from .integrate.initial import RigidStart
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
@@ -36,7 +37,13 @@ from .laws.friction import (
 )
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import BoucWenFriction, DahlFriction, IwanFriction, JenkinsFriction, LuGreFriction
+from .laws.memory import (
+    BoucWenFriction,
+    DahlFriction,
+    IwanFriction,
+    JenkinsFriction,
+    LuGreFriction,
+)
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
@@ -86,6 +93,7 @@ __all__ = [
     "Drive",
     "ElasticBody",
     "Energies",
+    "Ensemble",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -102,6 +110,7 @@ __all__ = [
     "Harmonics",
     "HyperbolicFriction",
     "Impacts",
+    "InputError",
     "IwanFriction",
     "JenkinsFriction",
     "LinearContact",
@@ -140,12 +149,14 @@ __all__ = [
     "TwoSidedStop",
     "amplitude_spectrum",
     "count_periods",
+    "ensemble",
     "export_csv",
     "export_mat",
     "export_netcdf",
     "export_pvd",
     "find_impacts",
     "find_rests",
+    "forcing_period",
     "frequency_response",
     "friction_law",
     "generate",
@@ -176,6 +187,7 @@ __all__ = [
     "spectrogram",
     "static_equilibrium",
     "strobe",
+    "strobed_states",
     "to_xarray",
     "window",
     "write_case",
