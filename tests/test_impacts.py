@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from fecontact.analysis.impacts import find_impacts, find_rests
 from fecontact.analysis.window import window
@@ -9,6 +10,7 @@ from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
 from fecontact.laws.drive import Drive, Load
+from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.normal_power import PowerContact
 from fecontact.laws.normal_stop import LinearContact
@@ -155,6 +157,27 @@ def test_nodes_that_do_not_exist():
         find_impacts(bouncing(outputs=301), "sole")
     with pytest.raises(InputError, match="Contact node 1 does not exist"):
         find_impacts(bouncing(outputs=301), 1)
+
+
+@pytest.mark.parametrize("outputs", [200, 2000])
+def test_impact_on_ground_that_moves_up(outputs):
+    """A mass in uniform flight above a wave that passes below: the root of the two heights."""
+    height, wave, length, speed = 2e-3, 1e-3, 0.1, 2.0
+    system = ball(LinearContact(C), ground=Ground(speed=speed, amplitude=wave, wavelength=length))
+    run = simulate(system, 0.05, initial=state(height, -V0), outputs=outputs, rtol=1e-8)
+    turn = 2.0 * np.pi * speed / length
+
+    def gap(t):
+        return height - V0 * t + wave * np.sin(turn * t)
+
+    times = np.linspace(0.0, 0.05, 5001)
+    first = np.flatnonzero(gap(times) < 0.0)[0]
+    expected = brentq(gap, times[first - 1], times[first])
+    found = find_impacts(run)
+    error = 1e-5 if outputs == 2000 else 1e-3
+    assert found.touch_down[0] == pytest.approx(expected, rel=error)
+    assert found.impact_velocity[0] == pytest.approx(
+        V0 - wave * turn * np.cos(turn * expected), rel=error)
 
 
 def test_impacts_per_period_of_a_driven_mass():
