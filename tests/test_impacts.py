@@ -10,6 +10,7 @@ from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
 from fecontact.laws.drive import Drive, Load
+from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.normal_power import PowerContact
@@ -157,6 +158,24 @@ def test_nodes_that_do_not_exist():
         find_impacts(bouncing(outputs=301), "sole")
     with pytest.raises(InputError, match="Contact node 1 does not exist"):
         find_impacts(bouncing(outputs=301), 1)
+
+
+def test_set_valued_friction_has_impacts_and_rigid_stops_have_none():
+    rows = np.zeros((3, 2))
+    rows[0, 0] = rows[1, 1] = 1.0
+    basis = ModalBasis.from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
+                                     {"contact": rows[None], "B": rows})
+    law = LinearContact(C, 2.0 * 0.2 * np.sqrt(C * MASS))
+    q = np.linalg.solve(basis.T[2, :2], [0.0, 1e-4])
+    system = ContactSystem(basis, normal=law, friction=ExponentialFriction(0.3, 0.3))
+    run = simulate(system, 0.006, initial=np.concatenate([q, -V0 / 1e-4 * q]), outputs=601, method="set-valued")
+    assert find_impacts(run).restitution == pytest.approx([RESTITUTION], rel=1e-3)
+    assert find_impacts(run).impact_velocity == pytest.approx([V0], rel=1e-3)
+    frictionless = ball(law, weight=1.0)
+    rigid = simulate(frictionless, 0.05, initial=state(1e-4, 0.0), outputs=601, restitution=0.5,
+                     method="set-valued")
+    with pytest.raises(InputError, match="rigid stops take no time"):
+        find_impacts(rigid)
 
 
 @pytest.mark.parametrize("outputs", [200, 2000])
