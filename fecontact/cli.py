@@ -261,7 +261,8 @@ def plot(
         negative=(), show_default=False,
         help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
         "takes several.")] = None,
-    axis: Annotated[Literal["x", "y", "phi"], Parameter(help="Direction of the motion.")] = "x",
+    axis: Annotated[Literal["x", "y", "phi"] | None, Parameter(
+        help="Direction of the motion; that of the drive by default.")] = None,
     quantity: Annotated[str, Parameter(
         help="Of spectra: velocity, displacement, normal_force, ...")] = "velocity",
     highest: Annotated[float | None, Parameter(help="End of the frequencies [Hz].")] = None,

@@ -168,7 +168,8 @@ def test_set_valued_friction_has_impacts_and_rigid_stops_have_none():
     law = LinearContact(C, 2.0 * 0.2 * np.sqrt(C * MASS))
     q = np.linalg.solve(basis.T[2, :2], [0.0, 1e-4])
     system = ContactSystem(basis, normal=law, friction=ExponentialFriction(0.3, 0.3))
-    run = simulate(system, 0.006, initial=np.concatenate([q, -V0 / 1e-4 * q]), outputs=601, method="set-valued")
+    run = simulate(system, 0.006, initial=np.concatenate([q, -V0 / 1e-4 * q]), outputs=601,
+                   method="set-valued")
     assert find_impacts(run).restitution == pytest.approx([RESTITUTION], rel=1e-3)
     assert find_impacts(run).impact_velocity == pytest.approx([V0], rel=1e-3)
     frictionless = ball(law, weight=1.0)
