@@ -14,9 +14,13 @@ from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
 from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
+from .integrate.sensitivity import Sensitivity, sensitivity
+from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.check import check_law
 from .laws.contract import (
     FrictionLaw,
     NormalLaw,
@@ -26,30 +30,26 @@ from .laws.contract import (
     normal_law,
 )
 from .laws.drive import Drive, Load, PointLoad
+from .laws.fourier_series import FourierSeries
 from .laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from .laws.friction_minimum import CubicFriction, GalvanettoFriction
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import (
-    BoucWenFriction,
-    DahlFriction,
-    IwanFriction,
-    JenkinsFriction,
-    LuGreFriction,
-)
+from .laws.maxwell_slip import IwanFriction, JenkinsFriction
+from .laws.memory import BoucWenFriction, DahlFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
-from .laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from .laws.profiles import Flat, Sine
+from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
 from .laws.trace import Trace
 from .laws.transients import Pulse, Tabulated
@@ -84,9 +84,11 @@ __all__ = [
     "BoucWenFriction",
     "Constant",
     "ConstantFriction",
+    "ContactEvents",
     "ContactState",
     "ContactSystem",
     "CosineSurface",
+    "Crossing",
     "Crown",
     "CubicFriction",
     "DahlFriction",
@@ -94,6 +96,8 @@ __all__ = [
     "ElasticBody",
     "Energies",
     "Ensemble",
+    "Event",
+    "Events",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -138,7 +142,9 @@ __all__ = [
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sensitivity",
     "Sine",
+    "SmoothingCost",
     "SpeedRamp",
     "Status",
     "Study",
@@ -148,8 +154,10 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "amplitude_spectrum",
+    "check_law",
     "count_periods",
     "ensemble",
+    "event",
     "export_csv",
     "export_mat",
     "export_netcdf",
@@ -183,7 +191,9 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
+    "sensitivity",
     "simulate",
+    "smoothing_cost",
     "spectrogram",
     "static_equilibrium",
     "strobe",
