@@ -1,3 +1,9 @@
+from .analysis.impacts import Impacts, find_impacts, find_rests
+from .analysis.periods import Periodicity, count_periods, periodicity, strobed_states
+from .analysis.quantities import history
+from .analysis.receptance import frequency_response
+from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .bifurcation.basins import Attractor, Axis, Basins, basins
@@ -53,6 +59,15 @@ from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
+from .output.analysis_plots import (
+    plot_friction_work,
+    plot_poincare,
+    plot_response,
+    plot_spectrogram,
+    plot_spectrum,
+)
+from .output.dataset import to_xarray
+from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
@@ -105,6 +120,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "Impacts",
     "InputError",
     "IwanFriction",
     "JenkinsFriction",
@@ -122,6 +138,7 @@ __all__ = [
     "Patch",
     "Pendulum",
     "PerNode",
+    "Periodicity",
     "PointLoad",
     "PowerContact",
     "PowerLawContact",
@@ -144,25 +161,41 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "amplitude_spectrum",
     "basins",
     "brute_force",
     "check_law",
+    "count_periods",
     "ensemble",
     "event",
+    "export_csv",
+    "export_mat",
+    "export_netcdf",
     "export_pvd",
+    "find_impacts",
+    "find_rests",
     "forcing_period",
+    "frequency_response",
     "friction_law",
     "generate",
+    "history",
     "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
+    "periodicity",
     "picture",
     "plot_contact_map",
     "plot_energies",
+    "plot_friction_work",
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_poincare",
+    "plot_response",
+    "plot_spectrogram",
+    "plot_spectrum",
+    "power_spectral_density",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -172,8 +205,12 @@ __all__ = [
     "sensitivity",
     "simulate",
     "smoothing_cost",
+    "spectrogram",
     "static_equilibrium",
     "strobe",
+    "strobed_states",
+    "to_xarray",
+    "window",
     "write_case",
     "write_mesh",
 ]

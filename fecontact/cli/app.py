@@ -16,6 +16,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     studies.modes,
     studies.run,
     runs.render,
+    runs.plot,
     runs.export,
     about.keys,
     about.laws,
