@@ -8,7 +8,10 @@ from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
 from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
+from .integrate.sensitivity import Sensitivity, sensitivity
+from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.check import check_law
@@ -66,9 +69,11 @@ __all__ = [
     "BoucWenFriction",
     "Constant",
     "ConstantFriction",
+    "ContactEvents",
     "ContactState",
     "ContactSystem",
     "CosineSurface",
+    "Crossing",
     "Crown",
     "CubicFriction",
     "DahlFriction",
@@ -76,6 +81,8 @@ __all__ = [
     "ElasticBody",
     "Energies",
     "Ensemble",
+    "Event",
+    "Events",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -118,7 +125,9 @@ __all__ = [
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sensitivity",
     "Sine",
+    "SmoothingCost",
     "SpeedRamp",
     "Status",
     "Study",
@@ -129,6 +138,7 @@ __all__ = [
     "TwoSidedStop",
     "check_law",
     "ensemble",
+    "event",
     "export_pvd",
     "forcing_period",
     "friction_law",
@@ -148,7 +158,9 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
+    "sensitivity",
     "simulate",
+    "smoothing_cost",
     "static_equilibrium",
     "strobe",
     "write_case",
