@@ -65,11 +65,14 @@ def since(trajectory: Trajectory, after: float) -> Trajectory:
     if np.count_nonzero(kept) < 2:
         raise InputError(f"The run ends at {trajectory.time[-1]:g} s and leaves no two output "
                          f"times after {after:g} s; run it longer, or put after earlier.")
-    histories = ("time", "modal_coordinates", "modal_velocities", "work", "memory",
-                 "node_friction_work", "held_normal_force", "held_friction_force")
-    return replace(trajectory, **{
-        name: value[kept] for name in histories
-        if (value := getattr(trajectory, name)) is not None})
+    histories = ("time", "modal_coordinates", "modal_velocities", "memory", "held_normal_force",
+                 "held_friction_force")
+    changed = {name: value[kept] for name in histories
+               if (value := getattr(trajectory, name)) is not None}
+    for name in ("work", "node_friction_work"):  # from the first time
+        if (value := getattr(trajectory, name)) is not None:
+            changed[name] = value[kept] - value[kept][0]
+    return replace(trajectory, **changed)
 
 
 def functions_for(
