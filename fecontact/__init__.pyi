@@ -2,11 +2,12 @@ from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
-from .errors import FecontactError
+from .errors import FecontactError, InputError
 from .formats.matrices import read_matrix
 from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
+from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
 from .integrate.initial import RigidStart
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
@@ -77,6 +78,7 @@ __all__ = [
     "Drive",
     "ElasticBody",
     "Energies",
+    "Ensemble",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -92,6 +94,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "InputError",
     "IwanFriction",
     "JenkinsFriction",
     "LinearContact",
@@ -127,7 +130,9 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "ensemble",
     "export_pvd",
+    "forcing_period",
     "friction_law",
     "generate",
     "memory_friction_law",
@@ -147,6 +152,7 @@ __all__ = [
     "rows_from_dofs",
     "simulate",
     "static_equilibrium",
+    "strobe",
     "write_case",
     "write_mesh",
 ]
