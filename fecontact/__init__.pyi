@@ -51,13 +51,26 @@ from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
 from .output.movie import picture, render
-from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
+from .output.plots import (
+    plot_contact_map,
+    plot_energies,
+    plot_history,
+    plot_modes,
+    plot_phase,
+    plot_sensitivity,
+    plot_sweep,
+)
 from .output.pvd import export_pvd
 from .output.store import read_case, write_case
 from .points import Patch
 from .rows import rows_from_dofs
 from .statics import static_equilibrium
 from .study import Study
+from .sweeps.executors import dask_executor
+from .sweeps.settings import Distribution, Range, SweepSettings
+from .sweeps.statistics import sensitivity, statistics
+from .sweeps.sweep import sweep
+from .sweeps.table import SweepTable, read_table
 from .system import ContactSystem
 
 __version__: str
@@ -74,6 +87,7 @@ __all__ = [
     "CosineSurface",
     "Crown",
     "CubicFriction",
+    "Distribution",
     "DahlFriction",
     "Drive",
     "ElasticBody",
@@ -117,6 +131,7 @@ __all__ = [
     "ProductFriction",
     "Pulse",
     "RandomRoughness",
+    "Range",
     "Rayleigh",
     "RestitutionContact",
     "RigidStart",
@@ -126,11 +141,14 @@ __all__ = [
     "Status",
     "Study",
     "Sweep",
+    "SweepSettings",
+    "SweepTable",
     "Tabulated",
     "Trace",
     "Trajectory",
     "TwoSidedStop",
     "ensemble",
+    "dask_executor",
     "export_pvd",
     "forcing_period",
     "friction_law",
@@ -144,15 +162,21 @@ __all__ = [
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_sensitivity",
+    "plot_sweep",
     "read_case",
     "read_matrix",
     "read_mesh",
+    "read_table",
     "read_uff",
     "render",
     "rows_from_dofs",
+    "sensitivity",
     "simulate",
     "static_equilibrium",
+    "statistics",
     "strobe",
+    "sweep",
     "write_case",
     "write_mesh",
 ]

@@ -11,6 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from fecontact.console import INTERRUPTED
 from fecontact.errors import FecontactError, InputError
+from fecontact.sweeps.command import sweep
 
 StudyFile = Annotated[Path, Parameter(help="Study file; `fecontact init` writes one.")]
 Changes = Annotated[list[str] | None, Parameter(
@@ -34,6 +35,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.meta.suppress_keyboard_interrupt = False
+app.command(sweep, sort_key=5)
 
 
 def main() -> None:

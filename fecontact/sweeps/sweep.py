@@ -116,7 +116,7 @@ def sweep(
         except FecontactError as error:
             done = sum(case.key in rows for case in work.cases)
             raise type(error)(f"{error} {done} of {len(work.cases)} cases are kept in {place}; go "
-                              f"on with resume.") from None
+                              f"on with --resume (resume=True).") from None
         finally:
             with contextlib.suppress(InputError):
                 work.table(rows, place).write(place / "index.csv")
@@ -204,8 +204,8 @@ def _clear_or_refuse(store: Store, *, resume: bool, overwrite: bool) -> None:
         for path in kept:
             path.unlink(missing_ok=True)
     elif not resume and any(path.suffix == ".json" for path in kept):
-        raise InputError(f"{store.folder} holds a sweep; go on with it by resume, begin anew with "
-                         f"overwrite, or choose another folder.")
+        raise InputError(f"{store.folder} holds a sweep; go on with --resume (resume=True), begin "
+                         f"anew with --overwrite (overwrite=True), or choose another folder.")
 
 
 def _compute(

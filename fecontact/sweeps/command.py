@@ -1,0 +1,144 @@
+"""The command ``fecontact sweep``."""
+
+import contextlib
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from fecontact.errors import InputError
+
+if TYPE_CHECKING:
+    from fecontact.sweeps.settings import SweepSettings
+    from fecontact.sweeps.table import SweepTable
+
+_SHOWN = 10  # failed cases
+
+
+def sweep(
+    study: Annotated[Path, Parameter(help="Study file with a section [sweep].")],
+    /,
+    *,
+    set_: Annotated[list[str] | None, Parameter(
+        name="--set", negative=(), show_default=False,
+        help="A key of the study and its value, `sweep.samples=64`; may be given several "
+             "times.")] = None,
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"], help="Folder of the sweep, instead of NAME-sweep among the "
+                                      "results of the study.")] = None,
+    resume: Annotated[bool, Parameter(
+        negative=(), help="Go on with a sweep; what is finished is not computed again.")] = False,
+    retry: Annotated[bool, Parameter(
+        negative=(), help="With --resume: compute failed cases again.")] = False,
+    overwrite: Annotated[bool, Parameter(
+        negative=(), help="Remove the sweep that is there and begin anew.")] = False,
+    workers: Annotated[int | None, Parameter(
+        help="Processes on this machine; one a core by default.")] = None,
+    dask: Annotated[str | None, Parameter(
+        help="Address of a running Dask scheduler, `tcp://node1:8786`, whose workers compute.")]
+    = None,
+) -> int:
+    """Run many cases of a study on all cores or a cluster; write a table (index.csv) and plots.
+
+    Ctrl-C stops it; finished cases are kept, and --resume goes on from there.
+    """
+    from fecontact.results import read_study
+
+    described = read_study(study, set_)
+    if described.sweep is None:
+        raise InputError(f"{study} has no section [sweep]; add one with the parameters that change "
+                         f"in [sweep.axes].")
+    if dask is not None and workers is not None:
+        raise InputError("--workers is for processes on this machine; leave it out with --dask.")
+    from fecontact.sweeps.executors import dask_executor
+    from fecontact.sweeps.progress import sweep_bar
+    from fecontact.sweeps.sweep import sweep as run_sweep
+
+    folder = output or described.results / f"{described.name}-sweep"
+    with contextlib.ExitStack() as stack:
+        executor = None if dask is None else stack.enter_context(dask_executor(dask))
+        progress = stack.enter_context(sweep_bar())
+        try:
+            table = run_sweep(described, executor=executor, folder=folder, resume=resume,
+                              overwrite=overwrite, retry=retry, workers=workers,
+                              progress=progress)
+        except KeyboardInterrupt:
+            print(f"Finished cases are kept in {folder}; go on with --resume.", file=sys.stderr)
+            raise
+    return _report(table, described.sweep, folder)
+
+
+def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int:
+    from fecontact.console import waiting
+
+    failed = table.failed
+    print(f"{len(table)} cases, {len(failed)} failed")
+    if len(failed) < len(table):
+        _show(_summary_table(table, settings.method))
+    for case, reason in list(failed.items())[:_SHOWN]:
+        print(f"failed: case {case}: {reason}", file=sys.stderr)
+    if len(failed) > _SHOWN:
+        print(f"failed: {len(failed) - _SHOWN} more, with their reasons in the table",
+              file=sys.stderr)
+    with waiting("Drawing"):
+        pictures = _draw(table, settings, folder)
+    for file in (folder / "index.csv", *pictures):
+        print(f"wrote {file}")
+    return 1 if len(failed) == len(table) else 0
+
+
+def _summary_table(table: "SweepTable", method: str) -> Any:
+    """Statistics of drawn samples; smallest and largest value of grids and lists."""
+    import numpy as np
+
+    from fecontact.report import table as make_table
+    from fecontact.sweeps.statistics import Estimate, statistics
+    from fecontact.sweeps.summaries import unit_of
+
+    def shown(estimate: Estimate) -> str:
+        return f"{estimate.value:.4g} ({estimate.low:.4g} ... {estimate.high:.4g})"
+
+    rows = []
+    drawn = method not in ("grid", "list", "sensitivity")
+    for name, values in table.values.items():
+        known = values[np.isfinite(values)]
+        unit = unit_of(name)
+        title = f"{name} [{unit}]" if unit else name
+        if drawn and len(known) >= 3:
+            found = statistics(known)
+            rows.append((title, *(shown(found[key]) for key in ("mean", "std", "5 %", "95 %"))))
+        elif len(known):
+            rows.append((title, f"{known.min():.4g}", f"{np.median(known):.4g}",
+                         f"{known.max():.4g}"))
+    headings = ("mean (95 %)", "std", "5 % quantile", "95 % quantile") if drawn else (
+        "smallest", "median", "largest")
+    return make_table("", *headings, rows=rows)
+
+
+def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[Path]:
+    from fecontact.output.plots import plot_sensitivity, plot_sweep
+    from fecontact.sweeps.statistics import sensitivity
+
+    if len(set(table.keys)) < 2:
+        return []
+    names = [name for name, values in table.values.items() if (values == values).any()]
+    files = [plot_sweep(table, name, folder / f"{_file_name(name)}.png") for name in names]
+    if settings.method == "sensitivity" and names:
+        found = {}
+        for name in names:
+            with contextlib.suppress(InputError):  # too few base samples went well
+                found[name] = sensitivity(table, name, seed=settings.seed)
+        if found:
+            files.append(plot_sensitivity(found, folder / "sensitivity.png"))
+    return files
+
+
+def _file_name(name: str) -> str:
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)
+
+
+def _show(renderable: Any) -> None:
+    from rich.console import Console
+
+    Console().print(renderable)
