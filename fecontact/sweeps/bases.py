@@ -45,8 +45,7 @@ class Bases:
             if self.store.basis_file(key).exists():
                 self._put(key, ModalBasis.load(self.store.basis_file(key)), batch)
             elif self.only:
-                # Numbers of the first case suffice: no other changes the basis.
-                self._put(key, self.study.with_(**batch.cases[0].changes).basis(), batch)
+                self._put(key, self.study.with_(**batch.cases[0].basis_changes).basis(), batch)
             else:
                 jobs.append(Job(make_basis, batch))
         return jobs + self._released()

@@ -10,14 +10,18 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, TypedDict, cast
 from uuid import uuid4
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, FecontactError
 from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.parameters import with_parameters
 from fecontact.study import Study
 from fecontact.sweeps.summaries import functions_for, summarise
+from fecontact.tables import PART_CLASSES
+
+BASIS_SECTIONS = ("geometry", "body", "basis")
 
 _BASES_KEPT = 4  # in a worker
 
@@ -37,6 +41,12 @@ class Case:
     key: str
     basis: str
     changes: Mapping[str, Any]
+
+    @property
+    def basis_changes(self) -> dict[str, Any]:
+        """What of the changes the modal basis depends on."""
+        return {name: value for name, value in self.changes.items()
+                if name.partition(".")[0] in BASIS_SECTIONS}
 
 
 @dataclass(frozen=True)
@@ -98,7 +108,7 @@ def make_basis(batch: Batch) -> bytes | str:
     """The modal basis of the first case of a batch, packed, or the reason why there is none."""
     path = None if batch.path is None else Path(batch.path)
     try:
-        study = Study.from_tables(batch.study, path).with_(**batch.cases[0].changes)
+        study = Study.from_tables(batch.study, path).with_(**batch.cases[0].basis_changes)
         return packed(study.basis(), shapes=True)
     except FecontactError as error:
         return str(error)
@@ -127,7 +137,7 @@ def _row(batch: Batch, base: Study, case: Case) -> Row:
 
 
 def _run(batch: Batch, base: Study, case: Case) -> tuple[Trajectory, Study]:
-    study = base.with_(**case.changes)
+    study = changed(base, case.changes)
     # Not by with_: the basis may come from another process.
     vars(study)["_basis"] = _basis(batch, study, case.basis)
     trajectory = study.run()
@@ -137,6 +147,31 @@ def _run(batch: Batch, base: Study, case: Case) -> tuple[Trajectory, Study]:
         place = trajectory.statistics.get("message", "")
         raise AnalysisError(f"{trajectory.status.value} {place}".strip())
     return trajectory, study
+
+
+def changed(study: Study, changes: Mapping[str, Any]) -> Study:
+    """As ``study.with_(**changes)``, and ten times faster where numbers of laws change alone."""
+    values = {}
+    for name, value in changes.items():
+        present = _present(study, name)
+        if not isinstance(present, float) or isinstance(value, bool) or (
+                not isinstance(value, int | float)):
+            return study.with_(**changes)
+        values[name] = float(value)
+    try:
+        return cast(Study, with_parameters(study, values))
+    except FecontactError:
+        return study.with_(**changes)  # whose message says where in the study it is
+
+
+def _present(study: Study, name: str) -> Any:
+    first, *rest = name.split(".")
+    if first not in PART_CLASSES:
+        return None
+    value: Any = study
+    for part in (first, *rest):
+        value = getattr(value, part, None)
+    return value
 
 
 def _functions(batch: Batch, study: Study) -> dict[str, Callable[[Trajectory], float]]:

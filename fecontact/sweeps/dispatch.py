@@ -14,7 +14,7 @@ from fecontact.sweeps.executors import Pool
 
 @dataclass(frozen=True)
 class Job:
-    """A function to call with a batch, and how often workers ended while they may have been at it.
+    """A function to call with a batch; ``breaks`` is 1 if a worker ended that may have been at it.
     """
 
     function: Callable[[Batch], Any]
@@ -33,9 +33,9 @@ class LostError(FecontactError):
 def results(waiting: deque[Job], pool: Pool) -> Iterator[tuple[Job, Any]]:
     """Jobs with what they return, as it comes; jobs may be added to ``waiting`` meanwhile.
 
-    When workers end, the jobs that they may have been at run again; from the second time on alone,
-    to find the one that is to blame, which is then split into its cases. A single case that ends
-    its worker comes with a :class:`LostError`.
+    When workers end, the jobs that they may have been at run again, one by one to find the one
+    that is to blame, which is then split into its cases. A case that ends its worker when it runs
+    alone comes with a :class:`LostError`.
 
     Raises
     ------
@@ -64,18 +64,23 @@ def results(waiting: deque[Job], pool: Pool) -> Iterator[tuple[Job, Any]]:
                 else:
                     yield job, result
             if broken:
-                suspects, done = list(flying.values()), queue.SimpleQueue()
-                flying.clear()
+                suspects = []
+                for future, job in flying.items():
+                    if future.done() and not future.cancelled() and future.exception() is None:
+                        yield job, future.result()
+                    else:
+                        suspects.append(job)
+                flying, done = {}, queue.SimpleQueue()
                 pool.renew()
                 for job in reversed(suspects):
-                    if job.breaks == 2 and len(job.batch.cases) == 1:
+                    if not job.breaks:
+                        waiting.appendleft(replace(job, breaks=1))
+                    elif len(job.batch.cases) == 1:
                         yield job, LostError()
-                    elif job.breaks == 2:
+                    else:
                         waiting.extendleft(
                             replace(job, batch=replace(job.batch, cases=(case,)))
                             for case in reversed(job.batch.cases))
-                    else:
-                        waiting.appendleft(replace(job, breaks=job.breaks + 1))
     finally:
         for future in flying:
             future.cancel()
@@ -87,7 +92,7 @@ def _launch(
 ) -> bool:
     """Submit what may run now; False if the executor is broken."""
     while waiting and len(flying) < pool.window:
-        alone = waiting[0].breaks > 1 or any(job.breaks > 1 for job in flying.values())
+        alone = waiting[0].breaks or any(job.breaks for job in flying.values())
         if alone and flying:
             break
         job = waiting.popleft()

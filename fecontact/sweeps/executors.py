@@ -25,7 +25,7 @@ class Pool:
         self.executor = executor
         # How many workers a cluster has, or will have, is not known.
         workers = getattr(executor, "_max_workers", None)
-        self.window = 4 * workers if isinstance(workers, int) and workers > 0 else 1000
+        self.window = 2 * workers + 2 if isinstance(workers, int) and workers > 0 else 1000
 
     def submit(self, function: Callable[[Any], Any], argument: Any) -> "Future[Any]":
         """Start a computation."""

@@ -9,11 +9,11 @@ from typing import Any
 from fecontact import __version__
 from fecontact.errors import InputError
 from fecontact.study import Study
+from fecontact.sweeps.batch import BASIS_SECTIONS
 from fecontact.tables import shown
 
 _DIGITS = 24  # of a hash that are kept: 96 bits
 _NOT_OF_THE_RUN = ("output", "render", "sweep")
-_OF_THE_BASIS = ("geometry", "body", "basis")
 
 
 def case_keys(
@@ -48,7 +48,7 @@ def case_keys(
                 # This case will fail; it is known by what was asked for.
                 resolved = base | dict(zip(names, row, strict=True))
         body = {name: value for name, value in resolved.items()
-                if name.partition(".")[0] in _OF_THE_BASIS}
+                if name.partition(".")[0] in BASIS_SECTIONS}
         text = json.dumps(body, sort_keys=True)
         if text not in seen:
             seen[text] = digest({"basis": body})

@@ -88,8 +88,8 @@ def _values(name: str, axis: Axis, method: str) -> Sequence[Any]:
         raise InputError(f"[sweep.axes]: {name} lacks the key 'count', the number of values from "
                          f"{axis.start!r} to {axis.end!r}, which method = '{method}' needs.")
     space = np.geomspace if axis.spacing == "log" else np.linspace
-    values: list[float] = space(axis.start, axis.end, axis.count).tolist()
-    return values
+    # As people would write them: 0.84, not 0.8400000000000001.
+    return [float(f"{value:.12g}") for value in space(axis.start, axis.end, axis.count)]
 
 
 def _draw(settings: SweepSettings, d: int, samples: int) -> Array:

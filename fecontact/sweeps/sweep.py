@@ -115,6 +115,8 @@ def sweep(
             _compute(work, store, rows, executor, workers, progress)
         except FecontactError as error:
             done = sum(case.key in rows for case in work.cases)
+            if not done:
+                raise
             raise type(error)(f"{error} {done} of {len(work.cases)} cases are kept in {place}; go "
                               f"on with --resume (resume=True).") from None
         finally:
