@@ -13,6 +13,7 @@ from typing import Any
 from fecontact.errors import AnalysisError, InputError, MissingLibraryError
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+PATIENCE = 10.0  # with a scheduler [s]
 
 
 class Pool:
@@ -147,15 +148,15 @@ def cores() -> int:
 
 
 @contextlib.contextmanager
-def dask_executor(address: str, timeout: float = 10.0) -> Iterator[Executor]:
+def dask_executor(address: str, timeout: float | None = None) -> Iterator[Executor]:
     """The executor of a running Dask scheduler.
 
     Parameters
     ----------
     address : str
         Like ``tcp://node1:8786``.
-    timeout : float
-        How long to wait for an answer [s].
+    timeout : float, optional
+        How long to wait for an answer [s]; ten seconds by default.
 
     Raises
     ------
@@ -164,6 +165,7 @@ def dask_executor(address: str, timeout: float = 10.0) -> Iterator[Executor]:
     InputError
         If no scheduler answers there.
     """
+    timeout = PATIENCE if timeout is None else timeout
     try:
         from distributed import Client
     except ImportError:
