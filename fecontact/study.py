@@ -243,9 +243,9 @@ class Study:
             place = _number(key, table, name, _title(self.path)) if isinstance(table, list) else key
             table[place] = plain(value)
         study = self.from_tables(tables, self.path)
-        for made, sections in _MADE_FROM.items():
+        for made, needed in _MADE_FROM.items():
             if made in vars(self) and all(getattr(study, section) == getattr(self, section)
-                                          for section in sections):
+                                          for section in needed):
                 vars(study)[made] = vars(self)[made]
         return study
 

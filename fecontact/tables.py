@@ -55,7 +55,7 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
         chosen = law_class(cls, table.get("law"), where)
         parameters = {key: value for key, value in table.items() if key != "law"}
         return cast(T, from_table(chosen, parameters, where))
-    hints = _hints(cls)
+    hints = _hints(cast(Any, cls))
     entries = {entry.name: entry for entry in fields(cls)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for key, value in table.items():
@@ -70,7 +70,9 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
         return cls(**values)
 
 
-_hints = cache(get_type_hints)
+@cache
+def _hints(cls: Any) -> dict[str, Any]:
+    return get_type_hints(cls)
 
 
 def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:

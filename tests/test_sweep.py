@@ -243,7 +243,7 @@ def test_two_sweeps_in_one_folder(study, tmp_path):
     """The lock keeps the second out; without locks shards of both fit together."""
     store = Store(tmp_path / "f")
     (tmp_path / "f").mkdir()
-    with store.locked(), pytest.raises(InputError, match="Another sweep is at work in .*f; wait"):
+    with store.locked(), pytest.raises(InputError, match=r"Another sweep is at work in .*f; wait"):
         sweep(study, AXES, Serial(), folder=tmp_path / "f")
     sweep(study, AXES, Serial(), folder=tmp_path / "f")
     rows = [Row(case=f"{k:03}", values={"x": 0.1 * k}, reason="") for k in range(200)]
@@ -310,7 +310,7 @@ def test_an_executor_that_breaks(study, tmp_path):
                 raise BrokenExecutor
             return super().submit(function, *arguments, **options)
 
-    with pytest.raises(AnalysisError, match="executor broke .* 2 of 3 cases are kept"):
+    with pytest.raises(AnalysisError, match=r"executor broke .* 2 of 3 cases are kept"):
         sweep(study, {"ground.speed": [1e-3, 2e-3, 3e-3]}, Broken(), folder=tmp_path / "f",
               batch=1)
 

@@ -48,11 +48,11 @@ def diagram_figure(
     axes = figure.subplots()
     factor = _label(axes, name, table.values[name])
     x, labels = _places(table.parameters[parameter])
-    groups: Mapping[Any, list[int]] = {None: list(range(len(table)))}
+    groups: dict[Any, list[int]] = {None: list(range(len(table)))}
     if by is not None:
         groups = {}
         for k, value in enumerate(table.parameters[by]):
-            groups.setdefault(value, []).append(k)  # type: ignore[attr-defined]
+            groups.setdefault(value, []).append(k)
     for number, (value, cases) in enumerate(groups.items()):
         order = sorted(cases, key=lambda k: x[k])
         places, values = x[order], table.values[name][order] / factor

@@ -14,8 +14,7 @@ from fecontact.sweeps.executors import Pool
 
 @dataclass(frozen=True)
 class Job:
-    """A function to call with a batch; ``breaks`` is 1 if a worker ended that may have been at it.
-    """
+    """A function to call with a batch; ``breaks`` is 1 if a worker ended that may be its own."""
 
     function: Callable[[Batch], Any]
     batch: Batch

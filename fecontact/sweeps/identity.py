@@ -78,8 +78,9 @@ def _converter(
 ) -> Callable[[Any], Any] | None:
     """What turns numbers of an axis into those of the resolved study; None if that takes more."""
     present = base.get(name)
-    if isinstance(present, bool) or any(isinstance(value, bool) or not isinstance(value, int | float)
-                                        for value in values):
+    numbers = all(isinstance(value, int | float) and not isinstance(value, bool)
+                  for value in values)
+    if isinstance(present, bool) or not numbers:
         return None
     if isinstance(present, float):
         return float

@@ -43,7 +43,9 @@ class Sensitivity:
     samples: int
 
 
-def statistics(values: ArrayLike, *, confidence: float = 0.95, seed: int = 0) -> dict[str, Estimate]:
+def statistics(
+    values: ArrayLike, *, confidence: float = 0.95, seed: int = 0
+) -> dict[str, Estimate]:
     """Mean, standard deviation and the quantiles 5 %, 50 % and 95 % of N samples.
 
     The interval of the mean is Student's, that of the standard deviation from the bootstrap

@@ -105,8 +105,8 @@ def unit_of(name: str) -> str:
 
 def _function(name: str, folder: Path, known: Mapping[str, Any]) -> Callable[[Trajectory], float]:
     if ".py:" in name:
-        file, _, function = name.rpartition(":")
-        return _of_user(folder / file, function)
+        file, _, wanted = name.rpartition(":")
+        return _of_user(folder / file, wanted)
     bare, at, point = name.partition("@")
     if bare not in SUMMARIES:
         raise InputError(f"There is no summary '{bare}'{nearest(bare, SUMMARIES)}; there are: "
@@ -139,7 +139,7 @@ def _of_user(file: Path, name: str) -> Callable[[Trajectory], float]:
     function = getattr(module, name, None)
     if not callable(function):
         raise InputError(f"{file} has no function '{name}'{nearest(name, vars(module))}.")
-    return function  # type: ignore[no-any-return]
+    return function
 
 
 def usual_point(trajectory: Trajectory) -> Point:
