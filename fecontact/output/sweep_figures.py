@@ -56,6 +56,8 @@ def diagram_figure(
     for number, (value, cases) in enumerate(groups.items()):
         order = sorted(cases, key=lambda k: x[k])
         places, values = x[order], table.values[name][order] / factor
+        if not np.isfinite(values).any():
+            continue
         axes.plot(places, values, "-" if len(places) <= 200 else "",
                   color=COLOURS[number % len(COLOURS)], linewidth=0.9,
                   marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
@@ -93,10 +95,9 @@ def map_figure(table: SweepTable, name: str, first: str, second: str) -> "Figure
     drawn = axes.pcolormesh(_edges(x, logs[0]), _edges(y, logs[1]),
                             np.ma.masked_invalid(values / factor),
                             cmap=colormaps[_COLOUR_MAP], rasterized=True)
-    if logs[0]:
-        axes.set_xscale("log")
-    if logs[1]:
-        axes.set_yscale("log")
+    for which, log in zip("xy", logs, strict=True):
+        if log:
+            _logarithmic(axes, which)
     bar = figure.colorbar(drawn, ax=axes, pad=0.02)
     bar.set_label(_with_unit(name, unit))
     bar.outline.set_visible(False)
@@ -109,15 +110,15 @@ def map_figure(table: SweepTable, name: str, first: str, second: str) -> "Figure
 
 def scatter_figure(table: SweepTable, name: str, parameters: Sequence[str]) -> "Figure":
     """A summary over each of the parameters, and its distribution."""
-    columns = min(len(parameters) + 1, 4)
-    rows = -(-(len(parameters) + 1) // columns)
+    rows = -(-(len(parameters) + 1) // 4)
+    columns = -(-(len(parameters) + 1) // rows)
     figure = new_figure(3.1 * columns, 3.1 * rows)
     grid = np.atleast_1d(figure.subplots(rows, columns, sharey=True)).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
         x, labels = _places(table.parameters[parameter])
         factor = _label(axes, name, table.values[name])
         axes.plot(x, table.values[name] / factor, ".", color=COLOURS[0], markeredgewidth=0,
-                  markersize=float(np.clip(60.0 / np.sqrt(len(table)), 1.5, 7.0)),
+                  markersize=float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0)),
                   alpha=0.7)
         _mark_failed(axes, table, x)
         axes.set_xlabel(_title(parameter))
@@ -201,13 +202,24 @@ def _spaced(axes: "Axes", which: str, x: Array, labels: list[str] | None) -> Non
     if labels is not None:
         axes.set_xticks(range(len(labels)), labels)
     elif _is_geometric(np.unique(x)):
-        axes.set_xscale("log")
+        _logarithmic(axes, which)
+
+
+def _logarithmic(axes: "Axes", which: str) -> None:
+    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+
+    axes.set(**{f"{which}scale": "log"})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def _mark_failed(axes: "Axes", table: SweepTable, x: Array) -> None:
     cases = list(table.failed)
     if cases:
-        axes.plot(x[cases], np.full(len(cases), 0.02), "x", color=COLOURS[1], markersize=5,
+        axes.plot(x[cases], np.full(len(cases), 0.02), "x", color="#303030", markersize=5,
                   transform=axes.get_xaxis_transform(), clip_on=False, label="failed")
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from fecontact.sweeps.settings import SweepSettings
     from fecontact.sweeps.table import SweepTable
 
-_SHOWN = 10  # failed cases
+_SHOWN = 10  # reasons, and cases of each
 
 
 def sweep(
@@ -76,16 +77,42 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int
     print(f"{len(table)} cases, {len(failed)} failed")
     if len(failed) < len(table):
         _show(_summary_table(table, settings.method))
-    for case, reason in list(failed.items())[:_SHOWN]:
-        print(f"failed: case {case}: {reason}", file=sys.stderr)
-    if len(failed) > _SHOWN:
-        print(f"failed: {len(failed) - _SHOWN} more, with their reasons in the table",
-              file=sys.stderr)
+        if settings.method == "sensitivity":
+            for name in table.values:
+                with contextlib.suppress(InputError):  # too few base samples went well
+                    _show(_sensitivity_table(table, name, settings.seed))
+    _complain(failed)
     with waiting("Drawing"):
         pictures = _draw(table, settings, folder)
     for file in (folder / "index.csv", *pictures):
         print(f"wrote {file}")
     return 1 if len(failed) == len(table) else 0
+
+
+def _complain(failed: Mapping[int, str]) -> None:
+    """One line for each reason, with the first of its cases."""
+    cases: dict[str, list[int]] = {}
+    for case, reason in failed.items():
+        cases.setdefault(reason, []).append(case)
+    for reason, numbers in list(cases.items())[:_SHOWN]:
+        few = ", ".join(f"{number}" for number in numbers[:_SHOWN])
+        more = ", ..." if len(numbers) > _SHOWN else ""
+        print(f"failed: case{'s' * (len(numbers) > 1)} {few}{more}: {reason}", file=sys.stderr)
+    if len(cases) > _SHOWN:
+        print(f"failed: for {len(cases) - _SHOWN} more reasons, see the table", file=sys.stderr)
+
+
+def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
+    from fecontact.report import table as make_table
+    from fecontact.sweeps.statistics import Estimate, sensitivity
+
+    def shown(one: Estimate) -> tuple[str, str]:
+        return f"{one.value:.2f}", f"{one.low:.2f} ... {one.high:.2f}"
+
+    found = sensitivity(table, name, seed=seed)
+    return make_table(f"variance of {name}", "alone", "95 %", "with others", "95 %", rows=[
+        (parameter, *shown(found.first[parameter]), *shown(found.total[parameter]))
+        for parameter in found.first])
 
 
 def _summary_table(table: "SweepTable", method: str) -> Any:
