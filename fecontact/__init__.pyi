@@ -1,3 +1,9 @@
+from .analysis.impacts import Impacts, find_impacts, find_rests
+from .analysis.periods import Periodicity, count_periods, periodicity
+from .analysis.quantities import history
+from .analysis.receptance import frequency_response
+from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
@@ -31,13 +37,7 @@ from .laws.friction import (
 )
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import (
-    BoucWenFriction,
-    DahlFriction,
-    IwanFriction,
-    JenkinsFriction,
-    LuGreFriction,
-)
+from .laws.memory import BoucWenFriction, DahlFriction, IwanFriction, JenkinsFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
@@ -50,6 +50,15 @@ from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
+from .output.analysis_plots import (
+    plot_friction_work,
+    plot_poincare,
+    plot_response,
+    plot_spectrogram,
+    plot_spectrum,
+)
+from .output.dataset import to_xarray
+from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import (
     plot_contact_map,
@@ -57,11 +66,10 @@ from .output.plots import (
     plot_history,
     plot_modes,
     plot_phase,
-    plot_sensitivity,
-    plot_sweep,
 )
 from .output.pvd import export_pvd
 from .output.store import read_case, write_case
+from .output.sweep_plots import plot_sensitivity, plot_sweep
 from .points import Patch
 from .rows import rows_from_dofs
 from .statics import static_equilibrium
@@ -108,6 +116,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "Impacts",
     "InputError",
     "IwanFriction",
     "JenkinsFriction",
@@ -124,6 +133,7 @@ __all__ = [
     "Patch",
     "Pendulum",
     "PerNode",
+    "Periodicity",
     "PointLoad",
     "PowerContact",
     "PowerLawContact",
@@ -147,23 +157,39 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "amplitude_spectrum",
+    "count_periods",
     "dask_executor",
     "ensemble",
+    "export_csv",
+    "export_mat",
+    "export_netcdf",
     "export_pvd",
+    "find_impacts",
+    "find_rests",
     "forcing_period",
+    "frequency_response",
     "friction_law",
     "generate",
+    "history",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
+    "periodicity",
     "picture",
     "plot_contact_map",
     "plot_energies",
+    "plot_friction_work",
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_poincare",
+    "plot_response",
     "plot_sensitivity",
+    "plot_spectrogram",
+    "plot_spectrum",
     "plot_sweep",
+    "power_spectral_density",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -173,10 +199,13 @@ __all__ = [
     "rows_from_dofs",
     "sensitivity",
     "simulate",
+    "spectrogram",
     "static_equilibrium",
     "statistics",
     "strobe",
     "sweep",
+    "to_xarray",
+    "window",
     "write_case",
     "write_mesh",
 ]

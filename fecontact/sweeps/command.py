@@ -144,7 +144,7 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
 
 
 def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[Path]:
-    from fecontact.output.plots import plot_sensitivity, plot_sweep
+    from fecontact.output.sweep_plots import plot_sensitivity, plot_sweep
     from fecontact.sweeps.statistics import sensitivity
 
     if len(set(table.keys)) < 2:
