@@ -69,13 +69,13 @@ from .output.plots import (
 )
 from .output.pvd import export_pvd
 from .output.store import read_case, write_case
-from .output.sweep_plots import plot_sensitivity, plot_sweep
+from .output.sweep_plots import plot_sensitivity, plot_strobed, plot_sweep
 from .points import Patch
 from .rows import rows_from_dofs
 from .statics import static_equilibrium
 from .study import Study
 from .sweeps.executors import dask_executor
-from .sweeps.settings import Distribution, Range, SweepSettings
+from .sweeps.settings import Distribution, Range, Strobing, SweepSettings
 from .sweeps.statistics import sensitivity, statistics
 from .sweeps.sweep import sweep
 from .sweeps.table import SweepTable, read_table
@@ -149,6 +149,7 @@ __all__ = [
     "Sine",
     "SpeedRamp",
     "Status",
+    "Strobing",
     "Study",
     "Sweep",
     "SweepSettings",
@@ -188,6 +189,7 @@ __all__ = [
     "plot_sensitivity",
     "plot_spectrogram",
     "plot_spectrum",
+    "plot_strobed",
     "plot_sweep",
     "power_spectral_density",
     "read_case",

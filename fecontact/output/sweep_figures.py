@@ -70,6 +70,25 @@ def diagram_figure(
     return figure
 
 
+def strobed_figure(table: SweepTable, parameter: str) -> "Figure":
+    """Displacements once per period over a parameter: a brute-force bifurcation diagram."""
+    if table.strobed is None:
+        raise InputError("The sweep has no displacements once per period; give it a key strobe.")
+    figure = new_figure(7.5, 4.8)
+    axes = figure.subplots()
+    x, labels = _places(table.parameters[parameter])
+    known = table.strobed[np.isfinite(table.strobed)]
+    factor, unit = suitable_unit(float(np.abs(known).max()) if len(known) else 0.0, "m")
+    axes.plot(np.repeat(x, table.strobed.shape[1]), table.strobed.ravel() / factor, ".",
+              color="#1a1a1a", markersize=float(np.clip(60.0 / np.sqrt(len(table)), 0.8, 4.0)),
+              markeredgewidth=0, rasterized=True)
+    _mark_failed(axes, table, x)
+    axes.set_xlabel(_title(parameter))
+    axes.set_ylabel(f"displacement once per period [{unit}]")
+    _spaced(axes, "x", x, labels)
+    return figure
+
+
 def map_figure(table: SweepTable, name: str, first: str, second: str) -> "Figure":
     """A summary over two parameters of a grid; grey where cases failed."""
     from matplotlib import colormaps

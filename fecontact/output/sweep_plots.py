@@ -53,6 +53,35 @@ def plot_sweep(
     return save_figure(path, lambda: sweep_figures.map_figure(table, name, over[0], over[1]))
 
 
+def plot_strobed(table: SweepTable, parameter: str, path: str | Path) -> Path:
+    """Plot displacements once per period over a parameter: a brute-force bifurcation diagram.
+
+    Parameters
+    ----------
+    table : SweepTable
+        Of a sweep that strobes.
+    parameter : str
+        One of those that changed.
+    path : str or Path
+        A .png, .pdf or .svg file; it is replaced if it exists.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        For a sweep that does not strobe, a parameter that does not exist, another suffix, or a
+        file that cannot be written.
+    """
+    if parameter not in table.parameters:
+        raise InputError(f"The sweep has no parameter '{parameter}'; there are: "
+                         f"{choices(table.parameters)}.")
+    return save_figure(path, lambda: sweep_figures.strobed_figure(table, parameter))
+
+
 def plot_sensitivity(found: Mapping[str, Sensitivity], path: str | Path) -> Path:
     """Plot Sobol indices of summaries with their confidence intervals.
 

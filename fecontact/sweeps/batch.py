@@ -10,7 +10,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypedDict, cast
+from typing import Any, NotRequired, TypedDict, cast
 from uuid import uuid4
 
 from fecontact.basis import ModalBasis
@@ -18,6 +18,7 @@ from fecontact.errors import AnalysisError, FecontactError
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.parameters import with_parameters
 from fecontact.study import Study
+from fecontact.sweeps.settings import Strobing
 from fecontact.sweeps.summaries import functions_for, summarise
 from fecontact.tables import PART_CLASSES
 
@@ -32,6 +33,7 @@ class Row(TypedDict):
     case: str
     values: dict[str, float]
     reason: str
+    points: NotRequired[list[float]]  # displacements once per period
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,8 @@ class Batch:
         Folder for a file of each case; None for no files.
     frames : int
         Number of fields in each of them.
+    strobe : Strobing or None
+        Runs of which only the states once per period are kept.
     """
 
     study: Mapping[str, Any]
@@ -81,6 +85,7 @@ class Batch:
     bases: Mapping[str, bytes | Path | str] = field(default_factory=dict)
     files: str | None = None
     frames: int = 0
+    strobe: Strobing | None = None
 
 
 class UnwritableError(FecontactError):
@@ -101,6 +106,10 @@ def run_batch(batch: Batch) -> list[Row]:
     """
     path = None if batch.path is None else Path(batch.path)
     study = Study.from_tables(batch.study, path)
+    if batch.strobe is not None:
+        from fecontact.sweeps.strobed import strobed_rows
+
+        return strobed_rows(batch.cases, batch.strobe, lambda case: prepared(batch, study, case))
     return [_row(batch, study, case) for case in batch.cases]
 
 
@@ -137,9 +146,7 @@ def _row(batch: Batch, base: Study, case: Case) -> Row:
 
 
 def _run(batch: Batch, base: Study, case: Case) -> tuple[Trajectory, Study]:
-    study = changed(base, case.changes)
-    # Not by with_: the basis may come from another process.
-    vars(study)["_basis"] = _basis(batch, study, case.basis)
+    study = prepared(batch, base, case)
     trajectory = study.run()
     if trajectory.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
@@ -172,6 +179,14 @@ def _present(study: Study, name: str) -> Any:
     for part in (first, *rest):
         value = getattr(value, part, None)
     return value
+
+
+def prepared(batch: Batch, base: Study, case: Case) -> Study:
+    """The study of a case, with its modal basis."""
+    study = changed(base, case.changes)
+    # Not by with_: the basis may come from another process.
+    vars(study)["_basis"] = _basis(batch, study, case.basis)
+    return study
 
 
 def _functions(batch: Batch, study: Study) -> dict[str, Callable[[Trajectory], float]]:

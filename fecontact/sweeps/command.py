@@ -144,13 +144,16 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
 
 
 def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[Path]:
-    from fecontact.output.sweep_plots import plot_sensitivity, plot_sweep
+    from fecontact.output.sweep_plots import plot_sensitivity, plot_strobed, plot_sweep
     from fecontact.sweeps.statistics import sensitivity
 
     if len(set(table.keys)) < 2:
         return []
     names = [name for name, values in table.values.items() if (values == values).any()]
     files = [plot_sweep(table, name, folder / f"{_file_name(name)}.png") for name in names]
+    if table.strobed is not None:
+        files += [plot_strobed(table, parameter, folder / f"strobed-{_file_name(parameter)}.png")
+                  for parameter, values in table.parameters.items() if len(set(values)) > 1]
     if settings.method == "sensitivity" and names:
         found = {}
         for name in names:

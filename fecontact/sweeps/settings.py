@@ -7,6 +7,9 @@ from typing import Any, Literal
 
 from fecontact.errors import InputError, choices, require_positive
 
+_SUMMARIES = ("largest_displacement", "stick_fraction", "mean_normal_force", "peak_normal_force",
+              "friction_power")
+
 _PARAMETERS: Mapping[str, tuple[str, ...]] = {
     "normal": ("mean", "std"),
     "lognormal": ("mean", "std"),
@@ -111,6 +114,34 @@ class Distribution:
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
+@dataclass(frozen=True)
+class Strobing:
+    """Runs of which only the states once per period of the excitation are kept.
+
+    Parameters
+    ----------
+    transient : int
+        Periods that are left out.
+    keep : int
+        Periods after them.
+    point : str or int
+        Whose displacement is kept once per period: 'B', 'C', a named point, a contact node by its
+        number.
+    axis : 'x' or 'y'
+    """
+
+    transient: int = 100
+    keep: int = 64
+    point: str | int = "B"
+    axis: Literal["x", "y"] = "x"
+
+    def __post_init__(self) -> None:
+        if self.transient < 0:
+            raise InputError(f"Strobing: transient = {self.transient} must be zero or above.")
+        if self.keep < 1:
+            raise InputError(f"Strobing: keep = {self.keep} must be at least 1.")
+
+
 Value = bool | int | float | str | tuple[float, ...]
 Axis = Range | Distribution | tuple[Value, ...]
 
@@ -144,18 +175,21 @@ class SweepSettings:
         Whether each case has a file of its own, with its motion alone or with fields for ParaView.
     batch : int, optional
         Cases computed in one go; by default up to 64, fewer when there are few.
+    strobe : Strobing, optional
+        ``strobe = { transient = 100, keep = 64 }``: faster runs without histories, over so many
+        periods of the excitation in the place of ``t_end``; the only summary is then 'periods'.
     """
 
     axes: Mapping[str, Axis] = field(default_factory=dict)
     method: Literal["grid", "list", "random", "latin-hypercube", "sobol", "sensitivity"] = "grid"
     samples: int | None = None
     seed: int = 0
-    summaries: tuple[str, ...] = ("largest_displacement", "stick_fraction", "mean_normal_force",
-                                  "peak_normal_force", "friction_power")
+    summaries: tuple[str, ...] = _SUMMARIES
     after: float | None = None
     wear_coefficient: float | None = None
     keep: Literal["none", "histories", "fields"] = "none"
     batch: int | None = None
+    strobe: Strobing | None = None
 
     def __post_init__(self) -> None:
         for name, count in (("samples", self.samples), ("batch", self.batch)):
@@ -167,6 +201,10 @@ class SweepSettings:
             raise InputError("SweepSettings: summaries is empty; name at least one.")
         if self.wear_coefficient is not None:
             require_positive("SweepSettings", wear_coefficient=self.wear_coefficient)
+        if self.strobe is not None and (self.keep != "none" or self.after is not None
+                                        or self.summaries not in (_SUMMARIES, ("periods",))):
+            raise InputError("SweepSettings: strobe keeps no histories, so that keep, after and "
+                             "summaries other than 'periods' cannot stand beside it.")
         if self.after is not None and not math.isfinite(self.after):
             raise InputError(f"SweepSettings: after = {self.after!r} must be finite.")
 

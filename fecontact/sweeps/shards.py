@@ -51,8 +51,9 @@ class Store:
             try:
                 rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
                 for row in rows:
-                    self._take(Row(case=row["case"], values=row["values"],
-                                   reason=row["reason"]), found)
+                    if not row.keys() >= Row.__required_keys__:
+                        raise KeyError("a row is not whole")
+                    self._take(row, found)
             except (OSError, ValueError, KeyError, TypeError) as error:
                 raise InputError(f"{path} is damaged ({error}); remove it, and its cases are "
                                  f"computed again.") from None

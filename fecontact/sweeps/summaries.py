@@ -274,6 +274,14 @@ def dominant_frequency(trajectory: Trajectory, point: Point | None = None) -> fl
     return float(k + shift) / (len(t) * float(t[1] - t[0]))
 
 
+def periods(trajectory: Trajectory) -> float:
+    """Number of drive periods after which the run repeats; 0 if it does not."""
+    from fecontact.analysis.periods import periodicity
+
+    found = periodicity(trajectory, start=float(trajectory.time[0]))
+    return float(found.periods or 0)
+
+
 def energy_imbalance(trajectory: Trajectory) -> float:
     """Error of the energy balance relative to the largest energy in it."""
     return trajectory.energies.imbalance
@@ -286,6 +294,6 @@ SUMMARIES: Mapping[str, Summary] = {
         (mean_normal_force, "N"), (peak_normal_force, "N"), (mean_friction_force, "N"),
         (peak_friction_force, "N"), (peak_pressure, "N/m"), (friction_power, "W"),
         (belt_power, "W"), (wear_depth, "m"), (wear_rate, "m/s"), (dominant_frequency, "Hz"),
-        (energy_imbalance, ""),
+        (periods, ""), (energy_imbalance, ""),
     )
 }

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.errors import FecontactError, InputError
 from fecontact.study import Study
@@ -22,7 +23,7 @@ from fecontact.sweeps.settings import SweepSettings, flat_axes
 from fecontact.sweeps.shards import Store, write_whole
 from fecontact.sweeps.summaries import functions_for
 from fecontact.sweeps.table import SweepTable
-from fecontact.tables import from_table, plain, require_known
+from fecontact.tables import from_table, plain, require_known, to_table
 
 Progress = Callable[[int, int, int], None]
 
@@ -97,6 +98,8 @@ def sweep(
     wanted = _settings(study, axes, settings)
     base = replace(study, sweep=None)
     vars(base).update({name: value for name, value in vars(study).items() if name[0] == "_"})
+    if wanted.strobe is None:
+        _ = base.t_end
     if wanted.after is not None and wanted.after >= base.t_end:
         raise InputError(f"[sweep]: after = {wanted.after:g} must lie before the end of the run, "
                          f"t_end = {base.t_end:g}.")
@@ -138,7 +141,8 @@ class _Work:
     def of(cls, study: Study, settings: SweepSettings, cases: Plan) -> "_Work":
         request = {"summaries": list(settings.summaries), "after": settings.after,
                    "wear_coefficient": settings.wear_coefficient, "keep": settings.keep,
-                   "frames": study.output.frames if settings.keep == "fields" else 0}
+                   "frames": study.output.frames if settings.keep == "fields" else 0,
+                   "strobe": None if settings.strobe is None else to_table(settings.strobe)}
         keys, bases = case_keys(study, cases.names, cases.rows, request)
         return cls(study, settings, cases, tuple(
             Case(key, basis, dict(zip(cases.names, row, strict=True)))
@@ -157,7 +161,8 @@ class _Work:
             self.study.tables(defaults=False), None if path is None else str(path.absolute()), (),
             self.settings.summaries, self.settings.after, self.settings.wear_coefficient,
             files=str(store.cases.absolute()) if store.files else None,
-            frames=self.study.output.frames if self.settings.keep == "fields" else 0)
+            frames=self.study.output.frames if self.settings.keep == "fields" else 0,
+            strobe=self.settings.strobe)
         for start in range(0, len(different), size):
             yield replace(common, cases=tuple(different[start : start + size]))
 
@@ -172,7 +177,13 @@ class _Work:
                              for row in found]) for name in self.settings.summaries},
             [case.key for case in self.cases],
             [None if row is None else row["reason"] for row in found],
-            shape=self.plan.shape, folder=folder)
+            shape=self.plan.shape, folder=folder, strobed=self._strobed(found))
+
+    def _strobed(self, rows: Sequence[Row | None]) -> NDArray[np.float64] | None:
+        if self.settings.strobe is None:
+            return None
+        nothing = [np.nan] * self.settings.strobe.keep
+        return np.array([row.get("points", nothing) if row else nothing for row in rows])
 
 
 def _settings(
@@ -187,6 +198,8 @@ def _settings(
     if axes is not None:
         table["axes"] = {name: list(axis) if isinstance(axis, range) else axis
                          for name, axis in axes.items()}
+    if table.get("strobe") is not None and "summaries" not in changes:
+        table["summaries"] = ("periods",)
     return from_table(SweepSettings, flat_axes(table), "[sweep]")
 
 

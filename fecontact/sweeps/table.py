@@ -38,6 +38,8 @@ class SweepTable:
         Of a grid: numbers of values along the axes.
     folder : Path or None
         Where the sweep is kept.
+    strobed : (N, K) array or None
+        Displacements once per period, of a sweep that strobes; NaN for cases that failed.
     """
 
     parameters: Mapping[str, Sequence[Any]]
@@ -46,6 +48,7 @@ class SweepTable:
     reasons: Sequence[str | None]
     shape: tuple[int, ...] | None = None
     folder: Path | None = field(default=None, compare=False)
+    strobed: Array | None = None
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -103,7 +106,8 @@ class SweepTable:
     def write(self, path: str | Path) -> Path:
         """Write the table as CSV: case, key, parameters, summaries, status and reason.
 
-        Numbers have all their digits: reading gives them back to the last bit.
+        Numbers have all their digits: reading gives them back to the last bit. Strobed
+        displacements go to ``NAME-strobed.csv``, one line a case.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -114,7 +118,15 @@ class SweepTable:
             writer.writerow([k, key, *(_text(column[k]) for column in columns), status,
                              reason or ""])
         write_whole(Path(path), text.getvalue())
+        if self.strobed is not None:
+            lines = "".join(f"{k},{','.join(map(_text, row))}\n"
+                            for k, row in enumerate(self.strobed.tolist()))
+            write_whole(_strobed_file(Path(path)), lines)
         return Path(path)
+
+
+def _strobed_file(path: Path) -> Path:
+    return path.with_name(f"{path.stem}-strobed.csv")
 
 
 def is_numeric(values: Sequence[Any]) -> bool:
@@ -151,11 +163,18 @@ def read_table(path: str | Path) -> SweepTable:
             columns["key"],
             [None if status == "missing" else reason
              for status, reason in zip(columns["status"], columns["reason"], strict=True)],
-            folder=path.parent)
+            folder=path.parent, strobed=_read_strobed(_strobed_file(path)))
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; run the sweep first.") from None
     except (OSError, ValueError, KeyError, IndexError):
         raise InputError(f"{path} is not the table of a sweep.") from None
+
+
+def _read_strobed(path: Path) -> Array | None:
+    if not path.is_file():
+        return None
+    with path.open(encoding="utf-8", newline="") as file:
+        return np.array([[float(text or "nan") for text in row[1:]] for row in csv.reader(file)])
 
 
 def _is_parameter(name: str) -> bool:
