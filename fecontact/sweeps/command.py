@@ -120,27 +120,25 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
     import numpy as np
 
     from fecontact.report import table as make_table
-    from fecontact.sweeps.statistics import Estimate, statistics
+    from fecontact.sweeps.statistics import statistics
     from fecontact.sweeps.summaries import unit_of
 
-    def shown(estimate: Estimate) -> str:
-        return f"{estimate.value:.4g} ({estimate.low:.4g} ... {estimate.high:.4g})"
-
-    rows = []
+    rows: list[tuple[str, ...]] = []
     drawn = method not in ("grid", "list", "sensitivity")
     for name, values in table.values.items():
         known = values[np.isfinite(values)]
         unit = unit_of(name)
         title = f"{name} [{unit}]" if unit else name
         if drawn and len(known) >= 3:
-            found = statistics(known)
-            rows.append((title, *(shown(found[key]) for key in ("mean", "std", "5 %", "95 %"))))
+            rows += [(title if key == "mean" else "", key, f"{one.value:.4g}",
+                      f"{one.low:.4g} ... {one.high:.4g}")
+                     for key, one in statistics(known).items()]
         elif len(known):
             rows.append((title, f"{known.min():.4g}", f"{np.median(known):.4g}",
                          f"{known.max():.4g}"))
-    headings = ("mean (95 %)", "std", "5 % quantile", "95 % quantile") if drawn else (
-        "smallest", "median", "largest")
-    return make_table("", *headings, rows=rows)
+    if drawn:
+        return make_table("", "", "value", "95 %", rows=rows, left=2)
+    return make_table("", "smallest", "median", "largest", rows=rows)
 
 
 def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[Path]:
