@@ -118,6 +118,7 @@ def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
 def _summary_table(table: "SweepTable", method: str) -> Any:
     """Statistics of drawn samples; smallest and largest value of grids and lists."""
     import numpy as np
+    from rich.markup import escape
 
     from fecontact.report import table as make_table
     from fecontact.sweeps.statistics import statistics
@@ -128,7 +129,7 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
     for name, values in table.values.items():
         known = values[np.isfinite(values)]
         unit = unit_of(name)
-        title = f"{name} [{unit}]" if unit else name
+        title = escape(f"{name} [{unit}]" if unit else name)
         if drawn and len(known) >= 3:
             rows += [(title if key == "mean" else "", key, f"{one.value:.4g}",
                       f"{one.low:.4g} ... {one.high:.4g}")
