@@ -74,13 +74,12 @@ def test_killed_at_random_times_it_goes_on_to_the_same_files(tmp_path, undisturb
             assert read_table(folder / "index.csv").missing
         wait_for(lambda pids=tuple(workers): not any(is_alive(pid) for pid in pids))
         assert before < len(list(shards.glob("*.json"))) < 30
-    kept = {name: (folder / name).stat().st_mtime_ns for name in files_below(folder / "..")
-            if (folder / name).is_file()}
+    kept = {path: path.stat().st_mtime_ns for path in shards.glob("*.json")}
     assert subprocess.run(command, timeout=60.0).returncode == 0
     finished = {name: text for name, text in files_below(folder).items()
                 if not name.endswith(".png")}
     assert finished == undisturbed
-    assert all((folder / name).stat().st_mtime_ns == kept[name] for name in kept)
+    assert all(path.stat().st_mtime_ns == kept[path] for path in kept)
 
 
 def free_port():

@@ -9,6 +9,7 @@ import pickle
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict, cast
 from uuid import uuid4
@@ -190,8 +191,15 @@ def prepared(batch: Batch, base: Study, case: Case) -> Study:
 
 
 def _functions(batch: Batch, study: Study) -> dict[str, Callable[[Trajectory], float]]:
-    return functions_for(batch.summaries, study.folder, wear_coefficient=batch.wear_coefficient,
-                         thickness=study.body_settings.thickness)
+    return _functions_for(batch.summaries, study.folder, batch.wear_coefficient,
+                          study.body_settings.thickness)
+
+
+@lru_cache(maxsize=16)
+def _functions_for(
+    names: tuple[str, ...], folder: Path, wear_coefficient: float | None, thickness: float
+) -> dict[str, Callable[[Trajectory], float]]:
+    return functions_for(names, folder, wear_coefficient=wear_coefficient, thickness=thickness)
 
 
 _bases: OrderedDict[tuple[str, bool], ModalBasis] = OrderedDict()
