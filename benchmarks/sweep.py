@@ -1,8 +1,9 @@
 """Efficiency of a sweep of many short cases: ``python benchmarks/sweep.py [cases]``.
 
-The time of the integrator alone for all cases, on one core, is compared with what all cores took
-together, in the wall clock (after the first batches, when all workers have started) and as CPU
-time of the sweep and its workers. The wall clock says something on idle cores alone.
+Two times of all cases on one core, of :func:`simulate` alone and of all that belongs to a case
+(its study, system, run, summaries), are compared with what all cores took together: in the wall
+clock, after the first batches, when all workers have started, and as CPU time of the sweep and its
+workers. The wall clock says something on idle cores alone.
 """
 
 import os
@@ -13,8 +14,9 @@ import time
 
 import numpy as np
 
-from fecontact import Range, Study, simulate, sweep
+from fecontact import Range, Study, SweepSettings, simulate, sweep
 from fecontact.sweeps.executors import cores, one_thread_each
+from fecontact.sweeps.summaries import functions_for, summarise
 
 STUDY = """
 geometry = { shape = "block", element_size = 0.01 }
@@ -38,17 +40,22 @@ def main(cases: int) -> None:
     axes = {"ground.speed": Range(1e-3, 4e-3, cases // 20),
             "friction.static_coefficient": Range(0.6, 0.9, 20)}
     # The first runs load the kernels.
-    single: list[float] = []
+    single: list[tuple[float, float]] = []
     rng = np.random.default_rng(0)
-    for _ in range(60):
+    names = SweepSettings().summaries
+    for _ in range(110):
+        begin = time.process_time()
         system = study.with_(**{
             "ground.speed": rng.uniform(1e-3, 4e-3),
             "friction.static_coefficient": rng.uniform(0.6, 0.9)}).system()
-        begin = time.process_time()
-        simulate(system, study.t_end, outputs=study.simulation.outputs)
-        single.append(time.process_time() - begin)
-    alone = float(np.mean(single[10:]))
-    print(f"one case, the integrator alone: {1e3 * alone:.2f} ms")
+        middle = time.process_time()
+        run = simulate(system, study.t_end, outputs=study.simulation.outputs)
+        end = time.process_time()
+        summarise(run, functions_for(names))
+        single.append((end - middle, time.process_time() - begin))
+    alone, whole = (float(value) for value in np.mean(single[10:], axis=0))
+    print(f"one case: {1e3 * alone:.2f} ms for its run alone, {1e3 * whole:.2f} ms with its study, "
+          f"its system and its summaries")
     ticks: list[tuple[float, int, float]] = []
 
     def tick(done: int, failed: int, total: int) -> None:
@@ -64,14 +71,16 @@ def main(cases: int) -> None:
     start = min(8, len(ticks) - 2)
     seconds, done = ticks[-1][0] - ticks[start][0], ticks[-1][1] - ticks[start][1]
     parent = ticks[-1][2] - ticks[0][2]
-    ideal = done * alone / cores()
     print(f"{len(table)} cases on {cores()} cores: {ticks[-1][0] - ticks[0][0]:.1f} s with the "
           f"start of the workers, {len(table) / (ticks[-1][0] - ticks[0][0]):.0f} cases/s")
     print(f"wall clock after the start: {seconds:.2f} s for {done} cases, efficiency "
-          f"{ideal / seconds:.0%}")
-    print(f"CPU time: integrator {len(table) * alone:.1f} s, workers {children:.1f} s without "
+          f"{done * alone / cores() / seconds:.0%} of runs alone, "
+          f"{done * whole / cores() / seconds:.0%} of whole cases")
+    used = children + parent
+    print(f"CPU time: runs alone {len(table) * alone:.1f} s, workers {children:.1f} s without "
           f"their start of {starting:.1f} s, parent {parent:.1f} s: efficiency "
-          f"{len(table) * alone / (children + parent):.0%}")
+          f"{len(table) * alone / used:.0%} of runs alone, {len(table) * whole / used:.0%} of whole "
+          f"cases")
 
 
 if __name__ == "__main__":
