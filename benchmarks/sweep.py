@@ -79,8 +79,8 @@ def main(cases: int) -> None:
     used = children + parent
     print(f"CPU time: runs alone {len(table) * alone:.1f} s, workers {children:.1f} s without "
           f"their start of {starting:.1f} s, parent {parent:.1f} s: efficiency "
-          f"{len(table) * alone / used:.0%} of runs alone, {len(table) * whole / used:.0%} of whole "
-          f"cases")
+          f"{len(table) * alone / used:.0%} of runs alone, "
+          f"{len(table) * whole / used:.0%} of whole cases")
 
 
 if __name__ == "__main__":

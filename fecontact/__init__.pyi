@@ -1,5 +1,5 @@
 from .analysis.impacts import Impacts, find_impacts, find_rests
-from .analysis.periods import Periodicity, count_periods, periodicity
+from .analysis.periods import Periodicity, count_periods, periodicity, strobed_states
 from .analysis.quantities import history
 from .analysis.receptance import frequency_response
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
@@ -14,9 +14,13 @@ from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
 from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
+from .integrate.sensitivity import Sensitivity, sensitivity
+from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.check import check_law
 from .laws.contract import (
     FrictionLaw,
     NormalLaw,
@@ -26,24 +30,26 @@ from .laws.contract import (
     normal_law,
 )
 from .laws.drive import Drive, Load, PointLoad
+from .laws.fourier_series import FourierSeries
 from .laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from .laws.friction_minimum import CubicFriction, GalvanettoFriction
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import BoucWenFriction, DahlFriction, IwanFriction, JenkinsFriction, LuGreFriction
+from .laws.maxwell_slip import IwanFriction, JenkinsFriction
+from .laws.memory import BoucWenFriction, DahlFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
-from .laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from .laws.profiles import Flat, Sine
+from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
 from .laws.trace import Trace
 from .laws.transients import Pulse, Tabulated
@@ -60,23 +66,17 @@ from .output.analysis_plots import (
 from .output.dataset import to_xarray
 from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
-from .output.plots import (
-    plot_contact_map,
-    plot_energies,
-    plot_history,
-    plot_modes,
-    plot_phase,
-)
+from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
 from .output.store import read_case, write_case
-from .output.sweep_plots import plot_sensitivity, plot_strobed, plot_sweep
+from .output.sweep_plots import plot_sobol, plot_strobed, plot_sweep
 from .points import Patch
 from .rows import rows_from_dofs
 from .statics import static_equilibrium
 from .study import Study
 from .sweeps.executors import dask_executor
 from .sweeps.settings import Distribution, Range, Strobing, SweepSettings
-from .sweeps.statistics import sensitivity, statistics
+from .sweeps.statistics import SobolIndices, sobol_indices, statistics
 from .sweeps.sweep import sweep
 from .sweeps.table import SweepTable, read_table
 from .system import ContactSystem
@@ -90,9 +90,11 @@ __all__ = [
     "BoucWenFriction",
     "Constant",
     "ConstantFriction",
+    "ContactEvents",
     "ContactState",
     "ContactSystem",
     "CosineSurface",
+    "Crossing",
     "Crown",
     "CubicFriction",
     "DahlFriction",
@@ -101,6 +103,8 @@ __all__ = [
     "ElasticBody",
     "Energies",
     "Ensemble",
+    "Event",
+    "Events",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -146,7 +150,10 @@ __all__ = [
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sensitivity",
     "Sine",
+    "SmoothingCost",
+    "SobolIndices",
     "SpeedRamp",
     "Status",
     "Strobing",
@@ -159,9 +166,11 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "amplitude_spectrum",
+    "check_law",
     "count_periods",
     "dask_executor",
     "ensemble",
+    "event",
     "export_csv",
     "export_mat",
     "export_netcdf",
@@ -186,7 +195,7 @@ __all__ = [
     "plot_phase",
     "plot_poincare",
     "plot_response",
-    "plot_sensitivity",
+    "plot_sobol",
     "plot_spectrogram",
     "plot_spectrum",
     "plot_strobed",
@@ -201,10 +210,13 @@ __all__ = [
     "rows_from_dofs",
     "sensitivity",
     "simulate",
+    "smoothing_cost",
+    "sobol_indices",
     "spectrogram",
     "static_equilibrium",
     "statistics",
     "strobe",
+    "strobed_states",
     "sweep",
     "to_xarray",
     "window",

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from sweep_study import Serial, write_study
 
-from fecontact import SweepTable, plot_sensitivity, plot_sweep, read_table, sweep
+from fecontact import SweepTable, plot_sobol, plot_sweep, read_table, sweep
 from fecontact.cli import execute
+from fecontact.cli import sweeps as command
 from fecontact.errors import InputError
 from fecontact.output import sweep_figures
-from fecontact.sweeps import command, executors
+from fecontact.sweeps import executors
 from fecontact.sweeps.progress import clock, note
-from fecontact.sweeps.statistics import Estimate, Sensitivity
+from fecontact.sweeps.statistics import Estimate, SobolIndices
 
 SWEEP = """
 [sweep]
@@ -177,8 +178,8 @@ def test_plots_of_sweeps_as_files(tmp_path):
     with pytest.raises(InputError, match=r"'ground\.speed' is a parameter of the sweep"):
         plot_sweep(table, "ground.speed", tmp_path / "x.png")
     one = Estimate(0.5, 0.4, 0.6)
-    found = Sensitivity({"a": one, "b": one}, {"a": one, "b": one}, 64)
-    assert plot_sensitivity({"f": found, "g": found}, tmp_path / "s.png").stat().st_size > 5000
+    found = SobolIndices({"a": one, "b": one}, {"a": one, "b": one}, 64)
+    assert plot_sobol({"f": found, "g": found}, tmp_path / "s.png").stat().st_size > 5000
 
 
 def test_names_of_files_are_safe():

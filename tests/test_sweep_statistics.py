@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fecontact import Range, SweepSettings, SweepTable, sensitivity, statistics
+from fecontact import Range, SweepSettings, SweepTable, sobol_indices, statistics
 from fecontact.errors import InputError
 from fecontact.sweeps.samples import plan
-from fecontact.sweeps.statistics import sobol_indices
+from fecontact.sweeps.statistics import indices_of
 
 
 def test_moments_and_quantiles():
@@ -57,7 +57,7 @@ def ishigami_table(samples, seed=2):
 
 def test_sobol_indices_of_the_function_of_ishigami():
     table = ishigami_table(8192)
-    found = sensitivity(table, "f")
+    found = sobol_indices(table, "f")
     V1, V13, V2 = (1.0 + 0.1 * np.pi**4 / 5.0) ** 2 / 2.0, 0.01 * np.pi**8 * 8.0 / 225.0, 49.0 / 8.0
     total = V1 + V2 + V13
     assert [found.first[name].value for name in "abc"] == pytest.approx(
@@ -80,11 +80,11 @@ def test_sobol_indices_of_the_function_of_ishigami():
 def test_failed_cases_are_left_out_of_sobol_indices():
     table = ishigami_table(1024)
     table.values["f"][[3, 1024 + 7, 4000]] = np.nan
-    found = sensitivity(table, "f")
+    found = sobol_indices(table, "f")
     assert found.samples == 1021
     assert found.first["b"].value == pytest.approx(0.4424, abs=0.03)
-    assert sobol_indices(np.ones(40), 3)[0][0].value == 0.0
+    assert indices_of(np.ones(40), 3)[0][0].value == 0.0
     with pytest.raises(InputError, match="need samples in blocks of 5"):
-        sobol_indices(np.ones(41), 3)
+        indices_of(np.ones(41), 3)
     with pytest.raises(InputError, match="at least 8 base samples that went well, not 4"):
-        sobol_indices(np.ones(20), 3)
+        indices_of(np.ones(20), 3)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fecontact.errors import InputError
 from fecontact.output.figures import COLOURS, new_figure
 from fecontact.output.units import suitable_unit
-from fecontact.sweeps.statistics import Sensitivity
+from fecontact.sweeps.statistics import SobolIndices
 from fecontact.sweeps.summaries import unit_of
 from fecontact.sweeps.table import SweepTable, is_numeric
 
@@ -156,7 +156,7 @@ def scatter_figure(table: SweepTable, name: str, parameters: Sequence[str]) -> "
     return figure
 
 
-def sensitivity_figure(found: Mapping[str, Sensitivity]) -> "Figure":
+def sensitivity_figure(found: Mapping[str, SobolIndices]) -> "Figure":
     """First-order and total Sobol indices of summaries, with their confidence intervals."""
     names = list(found)
     parameters = list(next(iter(found.values())).first)

@@ -6,7 +6,7 @@ from pathlib import Path
 from fecontact.errors import InputError, choices
 from fecontact.output import sweep_figures
 from fecontact.output.saving import save_figure
-from fecontact.sweeps.statistics import Sensitivity
+from fecontact.sweeps.statistics import SobolIndices
 from fecontact.sweeps.table import SweepTable
 
 
@@ -82,13 +82,13 @@ def plot_strobed(table: SweepTable, parameter: str, path: str | Path) -> Path:
     return save_figure(path, lambda: sweep_figures.strobed_figure(table, parameter))
 
 
-def plot_sensitivity(found: Mapping[str, Sensitivity], path: str | Path) -> Path:
+def plot_sobol(found: Mapping[str, SobolIndices], path: str | Path) -> Path:
     """Plot Sobol indices of summaries with their confidence intervals.
 
     Parameters
     ----------
-    found : mapping of summary to Sensitivity
-        What :func:`fecontact.sensitivity` found.
+    found : mapping of summary to SobolIndices
+        What :func:`fecontact.sobol_indices` found.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
 

@@ -25,7 +25,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity:
+class SobolIndices:
     """Sobol indices of d parameters.
 
     Attributes
@@ -95,9 +95,9 @@ def _spread(x: Array, axis: int = -1) -> Array:
     return np.asarray(np.std(x, ddof=1, axis=axis))
 
 
-def sensitivity(
+def sobol_indices(
     table: SweepTable, name: str, *, confidence: float = 0.95, seed: int = 0
-) -> Sensitivity:
+) -> SobolIndices:
     """Sobol indices of a summary of a sweep with ``method = "sensitivity"``.
 
     Parameters
@@ -117,13 +117,13 @@ def sensitivity(
         If the cases are not those of such a sweep, or too few went well.
     """
     names = tuple(table.parameters)
-    first, total, samples = sobol_indices(table.column(name), len(names), confidence=confidence,
+    first, total, samples = indices_of(table.column(name), len(names), confidence=confidence,
                                           seed=seed)
-    return Sensitivity(dict(zip(names, first, strict=True)), dict(zip(names, total, strict=True)),
+    return SobolIndices(dict(zip(names, first, strict=True)), dict(zip(names, total, strict=True)),
                        samples)
 
 
-def sobol_indices(
+def indices_of(
     values: ArrayLike, parameters: int, *, confidence: float = 0.95, seed: int = 0
 ) -> tuple[list[Estimate], list[Estimate], int]:
     """First-order and total indices of d parameters, and the number of base samples used.

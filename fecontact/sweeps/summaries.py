@@ -245,9 +245,7 @@ def _power(trajectory: Trajectory, name: str) -> float:
 
 def wear_depth(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:
     """Depth worn away where it is largest: coefficient x friction work per area."""
-    work = trajectory.friction_work[-1] - trajectory.friction_work[0]
-    areas = trajectory.system.basis.tributary * thickness
-    return float(wear_coefficient * (work / areas).max())
+    return float(trajectory.wear_depth(wear_coefficient, thickness)[-1].max())
 
 
 def wear_rate(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:

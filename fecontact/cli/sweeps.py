@@ -1,4 +1,4 @@
-"""The command ``fecontact sweep``."""
+"""The command ``sweep``: many cases of a study."""
 
 import contextlib
 import sys
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from fecontact.cli.options import Changes, StudyFile
+from fecontact.cli.printing import say, say_written, show
 from fecontact.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,13 +20,10 @@ _SHOWN = 10  # reasons, and cases of each
 
 
 def sweep(
-    study: Annotated[Path, Parameter(help="Study file with a section [sweep].")],
+    study: StudyFile,
     /,
     *,
-    set_: Annotated[list[str] | None, Parameter(
-        name="--set", negative=(), show_default=False,
-        help="A key of the study and its value, `sweep.samples=64`; may be given several "
-             "times.")] = None,
+    set_: Changes = None,
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="Folder of the sweep, instead of NAME-sweep among the "
                                       "results of the study.")] = None,
@@ -74,18 +73,17 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int
     from fecontact.console import waiting
 
     failed = table.failed
-    print(f"{len(table)} cases, {len(failed)} failed")
+    say(f"{len(table)} cases, {len(failed)} failed")
     if len(failed) < len(table):
-        _show(_summary_table(table, settings.method))
+        show(_summary_table(table, settings.method))
         if settings.method == "sensitivity":
             for name in table.values:
                 with contextlib.suppress(InputError):  # too few base samples went well
-                    _show(_sensitivity_table(table, name, settings.seed))
+                    show(_sensitivity_table(table, name, settings.seed))
     _complain(failed)
     with waiting("Drawing"):
         pictures = _draw(table, settings, folder)
-    for file in (folder / "index.csv", *pictures):
-        print(f"wrote {file}")
+    say_written(folder / "index.csv", *pictures)
     return 1 if len(failed) == len(table) else 0
 
 
@@ -104,12 +102,12 @@ def _complain(failed: Mapping[int, str]) -> None:
 
 def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
     from fecontact.report import table as make_table
-    from fecontact.sweeps.statistics import Estimate, sensitivity
+    from fecontact.sweeps.statistics import Estimate, sobol_indices
 
     def shown(one: Estimate) -> tuple[str, str]:
         return f"{one.value:.2f}", f"{one.low:.2f} ... {one.high:.2f}"
 
-    found = sensitivity(table, name, seed=seed)
+    found = sobol_indices(table, name, seed=seed)
     return make_table(f"variance of {name}", "alone", "95 %", "with others", "95 %", rows=[
         (parameter, *shown(found.first[parameter]), *shown(found.total[parameter]))
         for parameter in found.first])
@@ -143,8 +141,8 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
 
 
 def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[Path]:
-    from fecontact.output.sweep_plots import plot_sensitivity, plot_strobed, plot_sweep
-    from fecontact.sweeps.statistics import sensitivity
+    from fecontact.output.sweep_plots import plot_sobol, plot_strobed, plot_sweep
+    from fecontact.sweeps.statistics import sobol_indices
 
     if len(set(table.keys)) < 2:
         return []
@@ -157,17 +155,12 @@ def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[
         found = {}
         for name in names:
             with contextlib.suppress(InputError):  # too few base samples went well
-                found[name] = sensitivity(table, name, seed=settings.seed)
+                found[name] = sobol_indices(table, name, seed=settings.seed)
         if found:
-            files.append(plot_sensitivity(found, folder / "sensitivity.png"))
+            files.append(plot_sobol(found, folder / "sensitivity.png"))
     return files
 
 
 def _file_name(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)
 
-
-def _show(renderable: Any) -> None:
-    from rich.console import Console
-
-    Console().print(renderable)
