@@ -194,7 +194,7 @@ def test_a_script_without_main_guard_is_told(tmp_path):
         "import fecontact\n"
         "fecontact.sweep('small.toml', {'ground.speed': [1e-3, 2e-3]}, workers=1)\n")
     done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True,
-                          text=True, timeout=60.0,
+                          text=True, timeout=180.0,
                           env={**os.environ,
                                "PYTHONPATH": str(Path(__file__).parents[1])})
     assert done.returncode == 1

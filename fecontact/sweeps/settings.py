@@ -57,17 +57,22 @@ class Range:
 class Distribution:
     """An uncertain parameter: ``{ distribution = "normal", mean = 0.5, std = 0.05 }``.
 
-    ======================  ============================================================
-    normal, gamma           mean, std
-    lognormal               mean, std, of the parameter itself, not of its logarithm
-    truncated-normal        mean, std before it is cut off; low, high
-    uniform, loguniform     low, high
-    triangular              low, mode, high
-    beta                    a, b; from low to high
-    weibull                 shape, scale
-    ======================  ============================================================
-
-    All but the shapes a, b and shape are in the unit of the parameter.
+    Parameters
+    ----------
+    distribution : str
+        'normal', 'gamma', 'lognormal' with mean, std; 'truncated-normal' with mean, std, low,
+        high; 'uniform', 'loguniform' with low, high; 'triangular' with low, mode, high; 'beta'
+        with a, b, low, high; 'weibull' with shape, scale.
+    mean, std : float, optional
+        Of the parameter itself, not of its logarithm; before it is cut off.
+    low, high : float, optional
+        Ends.
+    mode : float, optional
+        Most frequent value.
+    a, b, shape : float, optional
+        Dimensionless shapes.
+    scale : float, optional
+        In the unit of the parameter, as are all but the shapes.
     """
 
     distribution: str
