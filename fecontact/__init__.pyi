@@ -6,6 +6,9 @@ from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectr
 from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
+from .bifurcation.basins import Attractor, Axis, Basins, basins
+from .bifurcation.brute_force import BruteForce, brute_force
+from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
@@ -84,10 +87,14 @@ from .system import ContactSystem
 __version__: str
 
 __all__ = [
+    "Attractor",
+    "Axis",
+    "Basins",
     "BasisReport",
     "Beam",
     "Block",
     "BoucWenFriction",
+    "BruteForce",
     "Constant",
     "ConstantFriction",
     "ContactEvents",
@@ -128,6 +135,7 @@ __all__ = [
     "Load",
     "LossFactor",
     "LuGreFriction",
+    "LyapunovExponents",
     "Material",
     "MeasuredSurface",
     "Mesh",
@@ -166,6 +174,8 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "amplitude_spectrum",
+    "basins",
+    "brute_force",
     "check_law",
     "count_periods",
     "dask_executor",
@@ -182,6 +192,7 @@ __all__ = [
     "friction_law",
     "generate",
     "history",
+    "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",

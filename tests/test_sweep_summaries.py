@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import synthetic
+from oscillators import impact_oscillator
 
+from fecontact import RigidStart, simulate
 from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.friction import ConstantFriction
@@ -95,7 +97,7 @@ def test_the_late_part_counts_from_its_first_time(run):
 
 
 def test_every_summary_has_a_sentence_a_unit_and_a_finite_value(run):
-    names = tuple(name for name in SUMMARIES if name != "periods")
+    names = tuple(name for name in SUMMARIES if name not in ("periods", "lyapunov_exponent"))
     with np.errstate(all="raise"):
         found = values(run, *names, wear_coefficient=1e-13, thickness=0.1)
     assert all(np.isfinite(value) for value in found.values())
@@ -121,6 +123,19 @@ def test_number_of_periods(run):
         "periods": 0.0}
     with pytest.raises(InputError, match="periods: count_periods: 9 points cannot show 16"):
         values(motion, "periods", after=52.0)
+
+
+def test_lyapunov_exponents_of_the_impact_oscillator():
+    """About +6 1/s in the chaotic regime, below zero where the motion repeats."""
+    found = []
+    for w in (23.63, 64.32):
+        system = impact_oscillator(w=w)
+        period = 2.0 * np.pi / w
+        motion = simulate(system, 250 * period, outputs=251,
+                          initial=RigidStart(displacement=(0.0, 1e-4, 0.0)))
+        found.append(values(motion, "lyapunov_exponent", after=50 * period)["lyapunov_exponent"])
+    assert found[0] == pytest.approx(6.0, abs=1.0)
+    assert found[1] < -0.05
 
 
 def test_summaries_that_cannot_be(run):

@@ -194,7 +194,7 @@ def _with_unit(name: str, unit: str) -> str:
 def _unit(name: str, values: Array) -> tuple[float, str]:
     unit = unit_of(name)
     known = values[np.isfinite(values)]
-    if not unit or not len(known):
+    if unit in ("", "1/s") or not len(known):
         return 1.0, unit
     return suitable_unit(float(np.abs(known).max()), unit)
 

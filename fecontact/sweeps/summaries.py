@@ -5,11 +5,10 @@ for another point than the usual one: ``amplitude_x@C``, ``amplitude_y@0`` for t
 node. ``FILE.py:FUNCTION`` is a function of the user: it takes a Trajectory and returns a number.
 """
 
-import importlib.util
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from fecontact.contact_energy import POWERS
 from fecontact.errors import FecontactError, InputError, choices, nearest
 from fecontact.integrate.trajectory import ContactState, Trajectory
+from fecontact.sweeps.user_functions import user_function
 
 Point = str | int
 
@@ -106,7 +106,7 @@ def unit_of(name: str) -> str:
 def _function(name: str, folder: Path, known: Mapping[str, Any]) -> Callable[[Trajectory], float]:
     if ".py:" in name:
         file, _, wanted = name.rpartition(":")
-        return _of_user(folder / file, wanted)
+        return user_function(folder / file, wanted)
     bare, at, point = name.partition("@")
     if bare not in SUMMARIES:
         raise InputError(f"There is no summary '{bare}'{nearest(bare, SUMMARIES)}; there are: "
@@ -126,20 +126,6 @@ def _function(name: str, folder: Path, known: Mapping[str, Any]) -> Callable[[Tr
                              f"'@{point}'.")
         options["point"] = int(point) if point.isdigit() else point
     return partial(function, **options) if options else function
-
-
-@cache
-def _of_user(file: Path, name: str) -> Callable[[Trajectory], float]:
-    try:
-        spec = importlib.util.spec_from_file_location(f"fecontact_summary_{file.stem}", file)
-        module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
-        spec.loader.exec_module(module)  # type: ignore[union-attr]
-    except Exception as error:
-        raise InputError(f"{file} cannot be loaded ({type(error).__name__}: {error}).") from None
-    function = getattr(module, name, None)
-    if not callable(function):
-        raise InputError(f"{file} has no function '{name}'{nearest(name, vars(module))}.")
-    return function
 
 
 def usual_point(trajectory: Trajectory) -> Point:
@@ -280,6 +266,16 @@ def periods(trajectory: Trajectory) -> float:
     return float(found.periods or 0)
 
 
+def lyapunov_exponent(trajectory: Trajectory) -> float:
+    """Largest Lyapunov exponent, from a run as long again that starts from the first state."""
+    from fecontact.bifurcation.lyapunov import lyapunov_exponents
+
+    duration = _duration(trajectory)
+    found = lyapunov_exponents(trajectory.system, duration, initial=trajectory.states[0],
+                               transient=0.1 * duration)
+    return float(found.exponents[0])
+
+
 def energy_imbalance(trajectory: Trajectory) -> float:
     """Error of the energy balance relative to the largest energy in it."""
     return trajectory.energies.imbalance
@@ -292,6 +288,6 @@ SUMMARIES: Mapping[str, Summary] = {
         (mean_normal_force, "N"), (peak_normal_force, "N"), (mean_friction_force, "N"),
         (peak_friction_force, "N"), (peak_pressure, "N/m"), (friction_power, "W"),
         (belt_power, "W"), (wear_depth, "m"), (wear_rate, "m/s"), (dominant_frequency, "Hz"),
-        (periods, ""), (energy_imbalance, ""),
+        (periods, ""), (lyapunov_exponent, "1/s"), (energy_imbalance, ""),
     )
 }
