@@ -77,6 +77,22 @@ def test_numbers_of_laws_change_as_they_do_in_the_study(study):
         assert changed(study, {name: value}) == study.with_(**{name: value}) != study
 
 
+def test_members_of_lists_and_kept_bodies(study):
+    force = {"point": "C", "direction": "y", "signal": {"law": "harmonic", "amplitude": 1.0,
+                                                        "angular_frequency": 5.0}}
+    loaded = study.with_(**{"load.forces": [force, force]})
+    moved = loaded.with_(**{"load.forces.1.signal.amplitude": 3.0})
+    assert [one.signal.amplitude for one in moved.load.forces] == [1.0, 3.0]
+    with pytest.raises(InputError, match="'2' is none of the 2 members, counted from 0"):
+        loaded.with_(**{"load.forces.2.signal.amplitude": 3.0})
+    basis = study.basis()
+    assert study.with_(**{"ground.speed": 1.0}).basis() is basis
+    other = study.with_(**{"basis.modes": 3})
+    assert other.body() is study.body()
+    assert other.basis() is not basis
+    assert study.with_(**{"geometry.width": 0.13}).mesh() is not study.mesh()
+
+
 def test_cases_are_known_by_what_they_are(study, tmp_path):
     """Not by how they were asked for: the same speeds are not computed again."""
     folder = tmp_path / "f"

@@ -1,6 +1,7 @@
 """Summaries of runs whose numbers are known in closed form."""
 
 import inspect
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -136,6 +137,19 @@ def test_lyapunov_exponents_of_the_impact_oscillator():
         found.append(values(motion, "lyapunov_exponent", after=50 * period)["lyapunov_exponent"])
     assert found[0] == pytest.approx(6.0, abs=1.0)
     assert found[1] < -0.05
+
+
+def test_functions_of_the_user_are_those_of_the_file_now(run, tmp_path):
+    (tmp_path / "own.py").write_text("def f(run):\n    return run.time[-1]\n")
+    assert summarise(run, functions_for(["own.py:f"], tmp_path)) == {"own.py:f": run.time[-1]}
+    (tmp_path / "own.py").write_text("def f(run):\n    return 2.0\n")
+    os.utime(tmp_path / "own.py", ns=(1, 1))
+    assert summarise(run, functions_for(["own.py:f"], tmp_path)) == {"own.py:f": 2.0}
+    with pytest.raises(InputError, match=r"none\.py cannot be loaded \(no such file"):
+        functions_for(["none.py:f"], tmp_path)
+    (tmp_path / "bad.py").write_text("1 / 0")
+    with pytest.raises(InputError, match=r"bad\.py cannot be loaded \(ZeroDivisionError"):
+        functions_for(["bad.py:f"], tmp_path)
 
 
 def test_summaries_that_cannot_be(run):

@@ -9,7 +9,6 @@ import pickle
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict, cast
 from uuid import uuid4
@@ -24,6 +23,8 @@ from fecontact.sweeps.summaries import functions_for, summarise
 from fecontact.tables import PART_CLASSES
 
 BASIS_SECTIONS = ("geometry", "body", "basis")
+
+Functions = dict[str, Callable[[Trajectory], float]]
 
 _BASES_KEPT = 4  # in a worker
 
@@ -111,7 +112,8 @@ def run_batch(batch: Batch) -> list[Row]:
         from fecontact.sweeps.strobed import strobed_rows
 
         return strobed_rows(batch.cases, batch.strobe, lambda case: prepared(batch, study, case))
-    return [_row(batch, study, case) for case in batch.cases]
+    summaries: dict[float, Functions] = {}
+    return [_row(batch, study, case, summaries) for case in batch.cases]
 
 
 def make_basis(batch: Batch) -> bytes | str:
@@ -129,10 +131,15 @@ def packed(basis: ModalBasis, *, shapes: bool) -> bytes:
     return pickle.dumps(basis if shapes else replace(basis, field=None, quality=None))
 
 
-def _row(batch: Batch, base: Study, case: Case) -> Row:
+def _row(batch: Batch, base: Study, case: Case, summaries: dict[float, Functions]) -> Row:
     try:
         trajectory, study = _run(batch, base, case)
-        values = summarise(trajectory, _functions(batch, study), batch.after)
+        thickness = study.body_settings.thickness
+        if thickness not in summaries:
+            summaries[thickness] = functions_for(
+                batch.summaries, study.folder, wear_coefficient=batch.wear_coefficient,
+                thickness=thickness)
+        values = summarise(trajectory, summaries[thickness], batch.after)
     except UnwritableError:
         raise
     except FecontactError as error:
@@ -188,18 +195,6 @@ def prepared(batch: Batch, base: Study, case: Case) -> Study:
     # Not by with_: the basis may come from another process.
     vars(study)["_basis"] = _basis(batch, study, case.basis)
     return study
-
-
-def _functions(batch: Batch, study: Study) -> dict[str, Callable[[Trajectory], float]]:
-    return _functions_for(batch.summaries, study.folder, batch.wear_coefficient,
-                          study.body_settings.thickness)
-
-
-@lru_cache(maxsize=16)
-def _functions_for(
-    names: tuple[str, ...], folder: Path, wear_coefficient: float | None, thickness: float
-) -> dict[str, Callable[[Trajectory], float]]:
-    return functions_for(names, folder, wear_coefficient=wear_coefficient, thickness=thickness)
 
 
 _bases: OrderedDict[tuple[str, bool], ModalBasis] = OrderedDict()

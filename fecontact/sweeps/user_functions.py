@@ -9,15 +9,25 @@ from fecontact.errors import InputError, nearest
 from fecontact.integrate.trajectory import Trajectory
 
 
-@cache
 def user_function(file: Path, name: str) -> Callable[[Trajectory], float]:
-    """A function of a Python file.
+    """A function of a Python file, as it is now.
 
     Raises
     ------
     InputError
         If the file cannot be loaded, or has no such function.
     """
+    try:
+        written = file.stat().st_mtime_ns
+    except OSError as error:
+        raise InputError(f"{file} cannot be loaded "
+                         f"({(error.strerror or str(error)).lower()}).") from None
+    return _function(file, name, written)
+
+
+@cache
+def _function(file: Path, name: str, written: int) -> Callable[[Trajectory], float]:
+    """The function as it was written then: processes may outlive a change of the file."""
     try:
         spec = importlib.util.spec_from_file_location(f"fecontact_summary_{file.stem}", file)
         module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
