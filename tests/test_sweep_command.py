@@ -120,6 +120,18 @@ def test_ctrl_c_says_how_to_go_on(cli, tmp_path, monkeypatch):
                    f"--resume.\nerror: interrupted.\n")
 
 
+def test_example_of_stick_and_slip(cli, tmp_path):
+    """Below ln(N (mu_0 - mu_inf) lambda / b) / lambda it sticks and slips, above it slides."""
+    code, _, _ = cli("sweep", Path(__file__).parents[1] / "examples/sweep_stick_slip.toml",
+                     "-o", tmp_path, "--set", 'sweep.axes={"ground.speed"=[6e-3, 11e-3], '
+                     '"friction.static_coefficient"=[0.7, 0.8]}')
+    assert code == 0
+    table = read_table(tmp_path / "index.csv")
+    assert (table.values["stick_fraction"][:2] > 0.2).all()
+    assert (table.values["amplitude_x"][2:] < 2e-6).all()
+    assert (table.values["stick_fraction"][2:] == 0.0).all()
+
+
 def test_rate_and_time_left():
     assert note(0, 0, 100, 0, 3.0) == "starting"
     assert note(60, 2, 100, 40, 10.0) == "2 cases/s, 0:20 left, 2 failed"
