@@ -255,6 +255,21 @@ def rate(run):
     assert table.values["dominant_frequency"] == pytest.approx(frequency, rel=2e-3)
 
 
+def test_runs_that_an_event_stops_are_finished(study, tmp_path):
+    """A free block falls from a height h and touches after sqrt(2 m h / F)."""
+    falling = study.with_(**{
+        "drive.stiffness_x": 0.0, "drive.amplitude_x": 0.0, "simulation.t_end": 0.2,
+        "simulation.initial": {"displacement": [0.0, 1e-4, 0.0]}, "simulation.stop": ["touch-down"],
+        "basis.modes": 3})
+    loads = [7.0, 14.0, 28.0]
+    table = sweep(falling, {"load.normal": loads}, Serial(), folder=tmp_path / "f",
+                  summaries=["end_time"])
+    assert not table.failed
+    mass = 7850.0 * 0.12 * 0.06 * 0.1
+    assert table.values["end_time"] == pytest.approx(
+        np.sqrt(2.0 * mass * 1e-4 / np.array(loads)), rel=1e-3)
+
+
 def test_two_sweeps_in_one_folder(study, tmp_path):
     """The lock keeps the second out; without locks shards of both fit together."""
     store = Store(tmp_path / "f")

@@ -43,6 +43,7 @@ def sweep(
 
     Ctrl-C stops it; finished cases are kept, and --resume goes on from there.
     """
+    from fecontact.console import waiting
     from fecontact.results import read_study
 
     described = read_study(study, set_)
@@ -55,6 +56,8 @@ def sweep(
     from fecontact.sweeps.progress import sweep_bar
     from fecontact.sweeps.sweep import sweep as run_sweep
 
+    with waiting("Compiling, once after an installation"):
+        from fecontact.integrate import control  # noqa: F401
     folder = output or described.results / f"{described.name}-sweep"
     with contextlib.ExitStack() as stack:
         executor = None if dask is None else stack.enter_context(dask_executor(dask))

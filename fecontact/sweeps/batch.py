@@ -158,7 +158,7 @@ def _run(batch: Batch, base: Study, case: Case) -> tuple[Trajectory, Study]:
     trajectory = study.run()
     if trajectory.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
-    if trajectory.status is not Status.FINISHED:
+    if trajectory.status not in (Status.FINISHED, Status.EVENT):
         place = trajectory.statistics.get("message", "")
         raise AnalysisError(f"{trajectory.status.value} {place}".strip())
     return trajectory, study

@@ -122,6 +122,8 @@ def opened(executor: Executor | None, workers: int | None) -> Iterator[Pool]:
             raise InputError(f"workers = {count} must be at least 1.")
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             raise SystemExit(1)  # the parent says what is wrong
+        # Compiled here once, if need be, and not by every worker.
+        from fecontact.integrate import control  # noqa: F401
         with one_thread_each():
             yield from _closing(Processes(count))
         return

@@ -276,6 +276,11 @@ def lyapunov_exponent(trajectory: Trajectory) -> float:
     return float(found.exponents[0])
 
 
+def end_time(trajectory: Trajectory) -> float:
+    """Time at which the run ended, at its end or by an event that stopped it."""
+    return float(trajectory.time[-1])
+
+
 def energy_imbalance(trajectory: Trajectory) -> float:
     """Error of the energy balance relative to the largest energy in it."""
     return trajectory.energies.imbalance
@@ -288,6 +293,7 @@ SUMMARIES: Mapping[str, Summary] = {
         (mean_normal_force, "N"), (peak_normal_force, "N"), (mean_friction_force, "N"),
         (peak_friction_force, "N"), (peak_pressure, "N/m"), (friction_power, "W"),
         (belt_power, "W"), (wear_depth, "m"), (wear_rate, "m/s"), (dominant_frequency, "Hz"),
-        (periods, ""), (lyapunov_exponent, "1/s"), (energy_imbalance, ""),
+        (periods, ""), (lyapunov_exponent, "1/s"), (end_time, "s"),
+        (energy_imbalance, ""),
     )
 }
