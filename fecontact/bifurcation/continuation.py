@@ -92,8 +92,8 @@ class Settings:
     bounds : tuple
         Least and largest value of the parameter; the last point lies on the bound.
     tolerance : float
-        Newton's method ends with a step of this size, relative to u; what is left then is of the
-        order of its square. Special points are located to 1e-10.
+        Newton's method ends with a step of this size, relative to 1 + the size of u; what is left
+        then is of the order of its square. Special points are located to 1e-10.
     iterations : int
         Newton steps before a step counts as failed.
     largest_turn : float
@@ -257,7 +257,7 @@ def _corrected(
         if not np.isfinite(size) or (count > 2 and size > before):
             return None
         u = u + change
-        if size <= tolerance * _norm(problem, u):
+        if size <= tolerance * (1.0 + _norm(problem, u)):
             return u, linearisation, count
         before = size
     return None
