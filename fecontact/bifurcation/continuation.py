@@ -22,15 +22,11 @@ _EXACT = 1e-10
 
 
 class Linearisation(Protocol):
-    """The equations about some u.
+    """The equations about some u."""
 
-    Attributes
-    ----------
-    residual : (N,) array
-        G(u).
-    """
-
-    residual: Array
+    @property
+    def residual(self) -> Array:
+        """The residual G(u) (N,)."""
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution (N + 1,) of ``[[dG/du], [row]] x = rhs``."""

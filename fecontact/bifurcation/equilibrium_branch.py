@@ -76,6 +76,7 @@ class EquilibriumProblem(Problem):
         return values
 
     def linearise(self, u: Array) -> _Bordered:
+        """The rates and their derivatives at u."""
         f, J, P = self.field.derivatives(np.zeros(1), np.ascontiguousarray(u[None, :-1]),
                                          self.values(u), (self.index,))
         matrix = np.concatenate([J[0], P[0]], axis=1)
@@ -84,6 +85,7 @@ class EquilibriumProblem(Problem):
         return _Bordered(f[0], matrix)
 
     def weights(self) -> Array:
+        """From the scales of the states and the width of the diagram."""
         return self._weights
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array] | None:
@@ -97,12 +99,14 @@ class EquilibriumProblem(Problem):
                                   self._limits), u, tangent
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
+        """State, stability and eigenvalues."""
         eigenvalues = linearisation.eigenvalues
         unstable = int((eigenvalues.real > 0.0).sum())
         return {"state": u[:-1].copy(), "unstable": unstable, "stable": unstable == 0,
                 "eigenvalues": eigenvalues}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
+        """Branch points and Hopf points; see :func:`pair_test`."""
         scaled = np.vstack([linearisation.matrix, tangent * self._weights])
         scaled = scaled / np.sqrt(self._weights)
         scaled = scaled / np.abs(scaled).max()
@@ -114,6 +118,7 @@ class EquilibriumProblem(Problem):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> Mapping[str, Any] | None:
+        """Details of a fold, Hopf or branch point; None for what only looks like one."""
         if kind == "Hopf":
             return self._hopf(u, linearisation)
         x, values = np.ascontiguousarray(u[:-1]), self.values(u)
