@@ -164,14 +164,14 @@ class _Corners:
         return True
 
     def grown(self, family: SystemFamily, values: Array) -> "_Corners | None":
-        """A box that holds the values too, and some more; None where nothing is affine there."""
+        """A box twice as wide that holds the values too; None where nothing is affine there."""
         family.system(values)  # raises for values out of range
-        for more in (1.0, 0.0):
-            low = np.minimum(self.low, values - more * (self.low - values))
-            high = np.maximum(self.high, values + more * (values - self.high))
+        width = self.high - self.low
+        for more in (1.0, 0.1, 0.0):
+            low = np.where(values < self.low, values - more * width, self.low)
+            high = np.where(values > self.high, values + more * width, self.high)
             try:
-                return _corners(family, np.where(values < self.low, low, self.low),
-                                np.where(values > self.high, high, self.high))
+                return _corners(family, low, high)
             except _NotAffineError:
                 return None
             except FecontactError:
