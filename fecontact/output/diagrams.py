@@ -256,8 +256,8 @@ def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
-    labelled: list[Array] = []
-    to_axes = axis.transData + axis.transAxes.inverted()
+    """Markers and letters; those of points close to another one point away from it."""
+    special: list[tuple[str, str, float, float]] = []
     for kind, places in known.items():
         letters, marker = _SPECIAL.get(kind, ("", "."))
         # A point that two branches share is marked once.
@@ -266,15 +266,22 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
             if not any(np.allclose(place, other, rtol=1e-6) for other in distinct):
                 distinct.append(place)
         for number, (x, y) in enumerate(distinct):
-            axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
-                      linestyle="none", zorder=4)
-            text = f"{letters or kind}{number + 1 if letters and len(distinct) > 1 else ''}"
-            here = to_axes.transform((x, y))
-            near = any(np.abs(here - other).max() < 0.05 for other in labelled)
-            labelled.append(here)
-            axis.annotate(text, (x, y), xytext=(-7.0, -13.0) if near else (6.0, 6.0),
-                          ha="right" if near else "left", textcoords="offset points",
-                          fontsize=9.0, zorder=5)
+            count = str(number + 1) if letters and len(distinct) > 1 else ""
+            special.append((f"{letters or kind}{count}", marker, x, y))
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    to_axes = axis.transData + axis.transAxes.inverted()
+    seen = np.array([to_axes.transform((x, y)) for _, _, x, y in special]).reshape(-1, 2)
+    for index, (text, marker, x, y) in enumerate(special):
+        axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
+                  linestyle="none", zorder=4)
+        away = seen[index] - np.delete(seen, index, axis=0)
+        near = away[np.abs(away).max(axis=1) < 0.06]
+        left, below = (near.sum(axis=0) < 0.0) if len(near) else (False, False)
+        axis.annotate(text, (x, y), xytext=(-6.0 if left else 6.0, -6.0 if below else 6.0),
+                      ha="right" if left else "left", va="top" if below else "bottom",
+                      textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
 
 
 def _legend(
