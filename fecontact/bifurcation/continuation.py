@@ -19,6 +19,10 @@ from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
 
+# Part of the first step below which corners are taken for corners of the branch itself, as contact
+# laws with kinks make them.
+_SHORT = 1e-3
+
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
 
@@ -125,13 +129,13 @@ def _believable(
     problem: Problem, here: Solution, there: Solution, step: float, settings: Settings
 ) -> bool:
     """Whether a step neither turns too much nor passes over more than its tests can tell."""
+    if step < _SHORT * settings.step:
+        return True
     turn = float(problem.weights() * here.tangent @ there.tangent)
     if turn < np.cos(settings.largest_turn):
         return False
     jump = abs(int(there.values.get("unstable", 0)) - int(here.values.get("unstable", 0)))
-    if not settings.locate or step < 1e-3 * settings.step:
-        return True
-    return jump <= 2 * len(changed(here, there))
+    return not settings.locate or jump <= 2 * len(changed(here, there))
 
 
 def _next_step(

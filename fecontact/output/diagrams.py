@@ -101,8 +101,8 @@ def plot_eigenvalues(branch: "Branch", path: str | Path, *, x_label: str | None 
 
 
 def plot_stability_map(
-    found: "StabilityMap", path: str | Path, *, x_label: str | None = None,
-    y_label: str | None = None,
+    found: "StabilityMap", path: str | Path, *, borders: "Sequence[Branch]" = (),
+    x_label: str | None = None, y_label: str | None = None,
 ) -> Path:
     """Plot where an equilibrium is unstable, with the frequency of the mode that grows fastest.
 
@@ -112,6 +112,9 @@ def plot_stability_map(
         The first parameter goes along x.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
+    borders : sequence of Branch
+        Curves of Hopf points or folds in the same parameters, drawn instead of the border that is
+        interpolated from the map.
     x_label, y_label : str, optional
         Labels of the parameters, with their units.
 
@@ -125,7 +128,7 @@ def plot_stability_map(
     InputError
         For another suffix, or a file that cannot be written.
     """
-    return save_figure(path, lambda: stability_map_figure(found, x_label, y_label))
+    return save_figure(path, lambda: stability_map_figure(found, borders, x_label, y_label))
 
 
 def branches_figure(
@@ -191,7 +194,8 @@ def eigenvalues_figure(
 
 
 def stability_map_figure(
-    found: "StabilityMap", x_label: str | None = None, y_label: str | None = None
+    found: "StabilityMap", borders: "Sequence[Branch]" = (), x_label: str | None = None,
+    y_label: str | None = None,
 ) -> "Figure":
     """See :func:`plot_stability_map`."""
     figure = new_figure(7.4, 5.2)
@@ -204,7 +208,9 @@ def stability_map_figure(
                             vmin=low, vmax=high if high > low else low + 1e-3 * max(low, 1.0))
     figure.colorbar(image, ax=axis, pad=0.02, label="frequency of the fastest growing mode [Hz]")
     growth = found.growth_rate.T
-    if unstable.any() and not unstable.all() and min(growth.shape) > 1:
+    for border in borders:
+        axis.plot(*(border.column(name) for name in found.names), color="#303030", linewidth=1.4)
+    if not borders and 0 < unstable.sum() < unstable.size and min(growth.shape) > 1:
         axis.contour(found.first, found.second, growth, levels=[0.0], colors="#303030",
                      linewidths=1.4)
     if (found.unstable < 0).any():
