@@ -65,6 +65,10 @@ def continuation(
     FecontactError
         If there is no solution near the start.
     """
+    low, high = settings.bounds
+    if not low <= u[-1] <= high:
+        raise InputError(f"The start lies at {u[-1]:.6g}, outside the bounds of the parameter, "
+                         f"{low:g} to {high:g}.")
     start = start_of(problem, u, settings, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
     here, step, count, message, fixed_mesh = start, settings.step, 1, "", True

@@ -122,6 +122,8 @@ def switched_branch(
     for side in (-1.0, 1.0) if both else (1.0,):
         # The first step leaves the branch point, where the two directions cannot be told apart.
         first = point.u + side * chosen.step * tangent
+        if not chosen.bounds[0] <= first[-1] <= chosen.bounds[1]:
+            continue
         branch = follow(problem, first, chosen, name=parameter, tangent=side * tangent,
                         attributes=_attributes(field, begin))
         ends.append(branch)
@@ -130,6 +132,9 @@ def switched_branch(
             points.append(replace(point, tangent=tangent))
         else:
             points = [*(points or [replace(point, tangent=tangent)]), *branch.points]
+    if not ends:
+        raise InputError(f"The other branch leaves the bounds of {parameter} at once, at "
+                         f"{point.parameter:.6g}; widen them.")
     return replace(ends[-1], points=tuple(points))
 
 

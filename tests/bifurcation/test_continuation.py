@@ -146,6 +146,8 @@ def test_points_come_one_by_one():
 def test_no_solution_near_the_start():
     with pytest.raises(InputError, match="no solution near the start at the parameter 3"):
         follow(CIRCLE, np.array([0.1, 3.0]), Settings())
+    with pytest.raises(InputError, match=r"start lies at 1, outside the bounds .* 2 to 3"):
+        follow(CUBIC, np.array([0.1, 1.0]), Settings(bounds=(2.0, 3.0)))
 
 
 @pytest.mark.parametrize(("options", "message"), [

@@ -12,6 +12,7 @@ from systems_for_bifurcations import (
     two_mass_jacobian,
 )
 
+from fecontact import LuGreFriction
 from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.continuation import Settings
@@ -227,3 +228,22 @@ def test_parameter_leaves_its_range():
     assert "friction_coefficient = " in branch.message
     with pytest.raises(InputError, match="no parameter 'mu'"):
         equilibrium_branch(field, "mu")
+
+
+def test_friction_with_memory():
+    """LuGre's bristles: Hurwitz' condition of m l^3 + (b + m a) l^2 + (c + b a + F a g') l + c a,
+    a = sigma_0 V / g(V)."""
+    static, kinetic, v_s, sigma = 0.8, 0.55, 2e-3, 1e5
+    law = LuGreFriction(static, kinetic, v_s, 1.0, sigma)
+    field = contact_field(belt(speed=5e-3).with_(friction=law), ["ground.speed"])
+    branch = equilibrium_branch(field, "ground.speed", bounds=(1e-3, 40e-3))
+    hopf, = branch.special
+    m, b, c, F = 5.632, 0.768, 5610.0, 14.0
+
+    def hurwitz(V):
+        fall = (static - kinetic) * np.exp(-V / v_s)
+        a = sigma * V / (kinetic + fall)
+        return (b + m * a) * (c + b * a - F * a * fall / v_s) - m * c * a
+
+    assert hopf.parameter == pytest.approx(brentq(hurwitz, 8e-3, 25e-3, xtol=1e-16), rel=1e-10)
+    assert branch.column("unstable")[[0, -1]].tolist() == [2, 0]
