@@ -9,14 +9,19 @@ from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
-from .errors import FecontactError
+from .errors import FecontactError, InputError
 from .formats.matrices import read_matrix
 from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
+from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
+from .integrate.sensitivity import Sensitivity, sensitivity
+from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.check import check_law
 from .laws.contract import (
     FrictionLaw,
     NormalLaw,
@@ -26,30 +31,26 @@ from .laws.contract import (
     normal_law,
 )
 from .laws.drive import Drive, Load, PointLoad
+from .laws.fourier_series import FourierSeries
 from .laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from .laws.friction_minimum import CubicFriction, GalvanettoFriction
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import (
-    BoucWenFriction,
-    DahlFriction,
-    IwanFriction,
-    JenkinsFriction,
-    LuGreFriction,
-)
+from .laws.maxwell_slip import IwanFriction, JenkinsFriction
+from .laws.memory import BoucWenFriction, DahlFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
-from .laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from .laws.profiles import Flat, Sine
+from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
 from .laws.trace import Trace
 from .laws.transients import Pulse, Tabulated
@@ -77,15 +78,20 @@ __all__ = [
     "Branch",
     "Constant",
     "ConstantFriction",
+    "ContactEvents",
     "ContactState",
     "ContactSystem",
     "CosineSurface",
+    "Crossing",
     "Crown",
     "CubicFriction",
     "DahlFriction",
     "Drive",
     "ElasticBody",
     "Energies",
+    "Ensemble",
+    "Event",
+    "Events",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -101,6 +107,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "InputError",
     "IwanFriction",
     "JenkinsFriction",
     "LinearContact",
@@ -127,7 +134,9 @@ __all__ = [
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sensitivity",
     "Sine",
+    "SmoothingCost",
     "SpeedRamp",
     "Status",
     "Study",
@@ -137,11 +146,15 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "VectorField",
+    "check_law",
     "contact_field",
+    "ensemble",
     "equilibrium_branch",
+    "event",
     "export_pvd",
     "find_equilibrium",
     "fold_curve",
+    "forcing_period",
     "friction_law",
     "generate",
     "hopf_curve",
@@ -163,9 +176,12 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
+    "sensitivity",
     "simulate",
+    "smoothing_cost",
     "stability_map",
     "static_equilibrium",
+    "strobe",
     "switched_branch",
     "write_case",
     "write_mesh",

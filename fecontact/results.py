@@ -40,7 +40,7 @@ def write_run(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Pa
     from fecontact.output.store import write_case
 
     case = write_case(folder / f"{study.name}.vtkhdf", trajectory, frames=study.output.frames,
-                      study=study.to_toml())
+                      study=study.to_toml(), root=study.folder)
     return [case, *write_plots(study, trajectory, folder)]
 
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 from fecontact.basis import ModalBasis
@@ -21,39 +20,6 @@ Support = Literal["x", "y", "xy", "hinge"]
 
 
 @dataclass(frozen=True)
-class MeshFile:
-    """``[geometry]`` with the file of a mesh; see :func:`fecontact.mesh_io.read_mesh`.
-
-    Parameters
-    ----------
-    file : str
-        The mesh, relative to the study file.
-    scale : float
-        Factor from the file's unit of length to m.
-    boundaries : mapping of name to name or box
-        Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1] [m].
-    points : mapping of name to name or place
-        Points to name: a group of the file, or the node nearest to [x, y] [m].
-    """
-
-    file: str
-    scale: float = 1.0
-    boundaries: Mapping[str, str | tuple[float, float, float, float]] = field(
-        default_factory=dict)
-    points: Mapping[str, str | tuple[float, float]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        require_positive("MeshFile", scale=self.scale)
-
-    def mesh(self, folder: Path) -> Mesh:
-        """Read the mesh; ``folder`` is that of the study file."""
-        from fecontact.mesh_io import read_mesh
-
-        return read_mesh(folder / self.file, scale=self.scale,
-                         boundaries=self.boundaries or None, points=self.points or None)
-
-
-@dataclass(frozen=True)
 class BodySettings:
     """``[body]``: material, thickness and supports; see :class:`fecontact.body.ElasticBody`.
 
@@ -67,10 +33,12 @@ class BodySettings:
     thickness : float
         Out-of-plane thickness [m].
     plane : 'stress' or 'strain'
+        Plane stress for thin bodies, plane strain for long ones.
     degree : 1 or 2
         Of the finite elements.
-    fixed : mapping of name to 'x', 'y' or 'xy'
-        Supports on boundaries and points of the mesh.
+    fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
+        Supports on boundaries and points of the mesh: the directions that are held, or a hole
+        that turns about its centre.
     """
 
     material: str | None = None
@@ -145,7 +113,9 @@ class BasisSettings:
         Number of modes, the rigid ones included.
     contact : str or list of str
         Boundary that touches the ground, or several, each a contact group of that name.
-    contact_nodes : int or 'all', or a list with one of them for each boundary
+    contact_nodes : int or 'all', or list
+        Number of contact nodes, or every node of the mesh there; a list has one of them for each
+        boundary.
     B, C : place, optional
         Excitation and load point: name of a point or boundary, [x, y], or a patch
         ``{at = name or [x, y], radius = r}``.
@@ -306,3 +276,6 @@ class RenderSettings:
                              f"height in pixels, at least [320, 180].")
         if self.scale is not None:
             require_positive("RenderSettings", scale=self.scale)
+        if self.start is not None and self.end is not None and not self.start <= self.end:
+            raise InputError(f"RenderSettings: end = {self.end!r} must not be before start = "
+                             f"{self.start!r}.")

@@ -11,13 +11,12 @@ from scipy.optimize import brentq
 from fecontact.errors import InputError
 from fecontact.laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from fecontact.laws.friction_minimum import CubicFriction, GalvanettoFriction
 
 SMOOTHINGS = ("arctan", "tanh", "square-root")
 
@@ -148,6 +147,26 @@ def test_period_of_leines_oscillator():
 
 
 # Inverse questions -------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("law", [
+    ExponentialFriction(0.3, 0.5, 300.0, smoothing="tanh"),
+    GaussianFriction(0.3, 0.5, 2e-3, smoothing="tanh"),
+    HyperbolicFriction(0.3, 0.5, 2e-3, smoothing="tanh"),
+    GalvanettoFriction(0.3, 0.5, 300.0, smoothing="tanh"),
+], ids=lambda law: type(law).__name__)
+def test_friction_that_rises_with_velocity(law):
+    """A static coefficient below the kinetic one: from 0.3 up to 0.5, without a maximum."""
+    check_friction_law(law)
+    speeds = np.geomspace(1e-5, 1e3, 200)
+    coefficient = law.coefficient(speeds)
+    assert coefficient[0] == pytest.approx(0.3, rel=5e-3)
+    assert coefficient[-1] == pytest.approx(0.5, rel=1e-5)
+    assert (np.diff(coefficient) >= 0.0).all()
+    largest, velocity = law.largest_coefficient()
+    assert largest == pytest.approx(0.5, rel=1e-6)
+    assert velocity == math.inf
+    assert law.velocity_of_minimum() == math.inf
+
 
 def test_largest_coefficient_and_minimum_of_the_cubic():
     law = CubicFriction(0.7, 0.4, 5e-3, smoothing_slope=1e7, smoothing="square-root")

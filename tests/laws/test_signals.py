@@ -288,7 +288,7 @@ def test_signal_of_ones_own():
     (lambda: Harmonics((1.0,), (1.0,), (1.0, 2.0)), "phases has 2 values for 1 amplitudes"),
     (lambda: Harmonics((1.0,), (-1.0,)), r"angular_frequencies\[0\] = -1\.0 must"),
     (lambda: Sweep(1.0, -1.0, 2.0, 1.0), r"Sweep: start_frequency_hz = -1\.0"),
-    (lambda: Sweep(1.0, 0.0, 2.0, 1.0, "logarithmic"), r"logarithmic: start_frequency_hz = 0\.0"),
+    (lambda: Sweep(1.0, 0.0, 2.0, 1.0, "logarithmic"), r"Sweep: start_frequency_hz = 0\.0"),
     (lambda: Sweep(1.0, 1.0, 2.0, 0.0), r"Sweep: duration = 0\.0"),
     (lambda: Sweep(1.0, 1.0, 2.0, 1.0, "log"), "kind = 'log' must be one of 'linear', 'logari"),
     (lambda: Pulse("sine", 1.0, 1.0), "Pulse: kind = 'sine' must be one of 'half-sine', 'haver"),
