@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation import contact_field_kernels as kernels
-from fecontact.bifurcation.forcing import forcing_period
+from fecontact.bifurcation.forcing import common_period
 from fecontact.bifurcation.system_family import SystemFamily
 from fecontact.bifurcation.vector_field import Array, VectorField
 from fecontact.system import ContactSystem
@@ -118,11 +118,11 @@ class ContactField(VectorField):
         AnalysisError
             If what is given in time has no common period.
         """
-        return self._base_period if self._constant_period else forcing_period(self.system(values))
+        return self._base_period if self._constant_period else common_period(self.system(values))
 
     @cached_property
     def _base_period(self) -> float | None:
-        return forcing_period(self.system())
+        return common_period(self.system())
 
     def displacement_row(self, point: str | int, direction: str = "x") -> Array:
         """Row (d,) that gives the displacement of a point [m] from a state.
