@@ -49,8 +49,8 @@ def main(folder: Path) -> tuple[fc.Branch, fc.Branch]:
     loads, frictions = border.column("load.normal"), border.column(FRICTION)
     print(f"border: {len(border)} points, friction coefficient from {frictions.min():.3f} to "
           f"{frictions.max():.3f}, load from {loads.min():.1f} to {loads.max():.1f} N")
-    found = fc.stability_map(field, {FRICTION: np.linspace(0.0, 0.6, 41),
-                                     "load.normal": np.linspace(2.0, 30.0, 43)})
+    found = fc.stability_map(field, {FRICTION: np.linspace(0.0, 0.6, 31),
+                                     "load.normal": np.linspace(2.0, 30.0, 29)})
     fc.plot_stability_map(found, folder / "squeal_map.png", borders=[border],
                           x_label="friction coefficient", y_label="load [N]")
     return branch, border

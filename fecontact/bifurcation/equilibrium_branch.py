@@ -38,7 +38,8 @@ def equilibrium_branch(
     positive real part) and 'stable'. Special points are
 
     - 'fold': with its null_vector and quadratic coefficient,
-    - 'Hopf': angular_frequency, frequency_hz, period, eigenvector, first_lyapunov and criticality
+    - 'Hopf': angular_frequency, frequency_hz, period, eigenvector, crossing_speed (rate of the real
+      part with the parameter), first_lyapunov and criticality
       ('supercritical', 'subcritical' or 'undecided', see
       :func:`fecontact.bifurcation.normal_forms.hopf`),
     - 'branch point': null_vector, and other_tangent for :func:`switched_branch`.

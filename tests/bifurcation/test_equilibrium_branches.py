@@ -129,6 +129,7 @@ def test_first_lyapunov_coefficient():
         assert hopf.parameter == pytest.approx(0.0, abs=1e-13)
         assert hopf.details["first_lyapunov"] == pytest.approx(2.0 * c / 2.0, rel=1e-9)
         assert hopf.details["criticality"] == kind
+        assert hopf.details["crossing_speed"] == pytest.approx(1.0, rel=1e-9)
 
 
 def exact_hopf(v0, low, high):
@@ -151,6 +152,13 @@ def test_two_masses_over_the_normal_force():
     assert second.parameter == pytest.approx(7.09, abs=5e-3)
     # Equilibrium and orbit coexist below H1, so the unstable orbit is born there.
     assert first.details["criticality"] == "subcritical"
+    for point in branch.special:
+        h = 1e-5
+        growth = [np.min(np.abs(np.linalg.eigvals(two_mass_jacobian(B, 1.0))
+                                - (1j * point.details["angular_frequency"] + 1.0)))
+                  for B in (point.parameter - h, point.parameter + h)]
+        slope = (growth[0] - growth[1]) / (2.0 * h)
+        assert point.details["crossing_speed"] == pytest.approx(slope, rel=1e-6)
     assert branch.status is Status.BOUND
     assert len(branch) < 120
 
@@ -195,6 +203,16 @@ def test_mode_coupling_with_damping():
     assert hopf.details["angular_frequency"] == pytest.approx(np.sqrt(2.0), rel=1e-7)
     # The equations are linear but for the smoothed sign, far from the origin.
     assert branch.column("unstable")[[0, -1]].tolist() == [0, 2]
+
+
+def test_undamped_modes_are_neither_unstable_nor_crossing():
+    """Pairs on the imaginary axis are round-off away from it; only their meeting counts."""
+    field = contact_field(mode_coupling(), ["friction.friction_coefficient"])
+    branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(0.0, 1.0))
+    assert [round(point.parameter, 3) for point in branch.special] in ([], [0.75])
+    counts, mu = branch.column("unstable"), branch.parameter
+    assert (counts[mu < 0.749] == 0).all()
+    assert (counts[mu > 0.751] == 2).all()
 
 
 def test_neutral_saddles_are_not_reported():
