@@ -57,10 +57,11 @@ from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
-from .output.diagrams import plot_branches, plot_eigenvalues, plot_stability_map
+from .output.diagrams import plot_branches
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
+from .output.stability_plots import plot_eigenvalues, plot_stability_map
 from .output.store import read_case, write_case
 from .points import Patch
 from .rows import rows_from_dofs

@@ -134,6 +134,15 @@ def test_sharp_corner_is_not_jumped():
     assert branch.points[-1].u[0] == pytest.approx(np.sqrt(1.0001), rel=1e-12)
 
 
+def test_corners_of_the_branch_itself_are_passed():
+    """x = |p| / 2 turns by 0.93 rad, more than is believed of a step of ordinary size."""
+    bent = Plane(lambda x, p: x - 0.5 * abs(p), lambda x, p: (1.0, -0.5 * np.sign(p)))
+    branch = follow(bent, np.array([0.5, -1.0]), Settings(bounds=(-1.0, 1.0)))
+    assert branch.status is Status.BOUND
+    assert branch.column("x") == pytest.approx(0.5 * np.abs(branch.parameter), abs=1e-7)
+    assert branch.parameter[-1] == pytest.approx(1.0, rel=1e-12)
+
+
 def test_points_come_one_by_one():
     steps = continuation(CIRCLE, np.array([1.0, 0.0]), Settings(points=5), direction=-1.0)
     points = [next(steps) for _ in range(5)]
