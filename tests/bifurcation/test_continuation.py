@@ -126,10 +126,12 @@ def test_end_of_existence_keeps_the_branch():
     assert "what was computed until then is kept" in branch.status.value
 
 
-def test_sharp_corner_is_not_jumped():
+@pytest.mark.parametrize("step", [0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7])
+def test_sharp_corner_is_not_jumped(step):
     """A hyperbola's two arms come within 0.02: the steps must not jump from one to the other."""
     near = Plane(lambda x, p: x * x - p * p - 1e-4, lambda x, p: (2.0 * x, -2.0 * p))
-    branch = follow(near, np.array([1.0, -1.0]), Settings(bounds=(-2.0, 1.0), largest_step=0.2))
+    settings = Settings(bounds=(-2.0, 1.0), step=step, largest_step=step)
+    branch = follow(near, np.array([1.0, -1.0]), settings)
     assert (branch.column("x") > 0.0).all()
     assert branch.points[-1].u[0] == pytest.approx(np.sqrt(1.0001), rel=1e-12)
 

@@ -216,12 +216,43 @@ def test_undamped_modes_are_neither_unstable_nor_crossing():
 
 
 def test_neutral_saddles_are_not_reported():
+    """Two real eigenvalues of opposite sign, beside a damped pair."""
     def saddle(t, x, p, out):
         out[0] = (1.0 + p[0]) * x[0]
         out[1] = -x[1]
+        out[2] = -0.3 * x[2] - x[3]
+        out[3] = -0.3 * x[3] + x[2]
 
-    field = VectorField.from_function(saddle, {"a": -0.5}, 2)
+    field = VectorField.from_function(saddle, {"a": -0.5}, 4)
     assert equilibrium_branch(field, "a", bounds=(-0.9, 0.9)).special == ()
+
+
+def test_pairs_on_the_axis_do_not_cross_it():
+    """Three undamped oscillators whose coupling depends on the parameter: all real parts zero."""
+    def chain(t, x, p, out):
+        for i in range(3):
+            out[i] = x[3 + i]
+            out[3 + i] = -(i + 1.3) * x[i]
+            for j in range(3):
+                out[3 + i] -= p[0] * (0.2 + 0.1 * (i + 1) * (j + 1)) * x[j]
+
+    field = VectorField.from_function(chain, {"a": 0.1}, 6)
+    branch = equilibrium_branch(field, "a", bounds=(0.0, 2.0), settings=Settings(
+        step=0.005, largest_step=0.005))
+    assert len(branch) > 150
+    assert branch.special == ()
+    assert branch.column("stable").all()
+
+
+def test_pitchfork_passed_on_the_bent_branch_is_no_fold():
+    def pitchfork(t, x, p, out):
+        out[0] = p[0] * x[0] - x[0] * x[0] * x[0]
+
+    field = VectorField.from_function(pitchfork, {"a": 0.49}, 1)
+    branch = equilibrium_branch(field, "a", [-0.7], bounds=(-0.5, 0.5), direction=-1.0)
+    assert branch.points[-1].u == pytest.approx([np.sqrt(0.5), 0.5], rel=1e-9)
+    assert [point.kind for point in branch.special] == ["branch point"]
+    assert branch.special[0].u == pytest.approx([0.0, 0.0], abs=1e-7)
 
 
 def test_restart_at_any_point():
