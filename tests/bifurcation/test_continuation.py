@@ -61,6 +61,15 @@ def test_closed_curve_ends_at_its_start():
     assert (np.diff(angle) > 0.0).all()
 
 
+@pytest.mark.parametrize("turn", [0.3, 0.6])
+def test_turns_between_points_are_limited(turn):
+    branch = follow(CIRCLE, np.array([1.0, 0.0]),
+                    Settings(step=1.0, largest_step=1.0, largest_turn=turn))
+    turns = [np.arccos(min(1.0, before.tangent @ after.tangent))
+             for before, after in zip(branch.points[:-1], branch.points[1:], strict=True)]
+    assert 0.5 * turn < max(turns) <= turn
+
+
 def test_both_directions_and_restart():
     settings = Settings(bounds=(-0.3, 0.2))
     branch = follow(CUBIC, np.array([0.0, 0.0]), settings, both=True)

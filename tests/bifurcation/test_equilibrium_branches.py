@@ -216,12 +216,12 @@ def test_undamped_modes_are_neither_unstable_nor_crossing():
 
 
 def test_neutral_saddles_are_not_reported():
-    """Two real eigenvalues of opposite sign, beside a damped pair."""
+    """Two real eigenvalues of opposite sign, beside a pair whose damping changes."""
     def saddle(t, x, p, out):
         out[0] = (1.0 + p[0]) * x[0]
         out[1] = -x[1]
-        out[2] = -0.3 * x[2] - x[3]
-        out[3] = -0.3 * x[3] + x[2]
+        out[2] = (0.1 * p[0] - 0.3) * x[2] - x[3]
+        out[3] = (0.1 * p[0] - 0.3) * x[3] + x[2]
 
     field = VectorField.from_function(saddle, {"a": -0.5}, 4)
     assert equilibrium_branch(field, "a", bounds=(-0.9, 0.9)).special == ()
