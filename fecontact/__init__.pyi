@@ -1,3 +1,9 @@
+from .analysis.impacts import Impacts, find_impacts, find_rests
+from .analysis.periods import Periodicity, count_periods, periodicity, strobed_states
+from .analysis.quantities import history
+from .analysis.receptance import frequency_response
+from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .bifurcation.branch import Branch
@@ -7,6 +13,9 @@ from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
+from .bifurcation.basins import Attractor, Axis, Basins, basins
+from .bifurcation.brute_force import BruteForce, brute_force
+from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
@@ -58,6 +67,15 @@ from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
 from .output.diagrams import plot_branches
+from .output.analysis_plots import (
+    plot_friction_work,
+    plot_poincare,
+    plot_response,
+    plot_spectrogram,
+    plot_spectrum,
+)
+from .output.dataset import to_xarray
+from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
@@ -72,11 +90,15 @@ from .system import ContactSystem
 __version__: str
 
 __all__ = [
+    "Attractor",
+    "Axis",
+    "Basins",
     "BasisReport",
     "Beam",
     "Block",
     "BoucWenFriction",
     "Branch",
+    "BruteForce",
     "Constant",
     "ConstantFriction",
     "ContactEvents",
@@ -108,6 +130,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "Impacts",
     "InputError",
     "IwanFriction",
     "JenkinsFriction",
@@ -115,6 +138,7 @@ __all__ = [
     "Load",
     "LossFactor",
     "LuGreFriction",
+    "LyapunovExponents",
     "Material",
     "MeasuredSurface",
     "Mesh",
@@ -124,6 +148,7 @@ __all__ = [
     "Patch",
     "Pendulum",
     "PerNode",
+    "Periodicity",
     "PointLoad",
     "PowerContact",
     "PowerLawContact",
@@ -147,30 +172,49 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "VectorField",
+    "amplitude_spectrum",
+    "basins",
+    "brute_force",
     "check_law",
     "contact_field",
+    "count_periods",
     "ensemble",
     "equilibrium_branch",
     "event",
+    "export_csv",
+    "export_mat",
+    "export_netcdf",
     "export_pvd",
     "find_equilibrium",
+    "find_impacts",
+    "find_rests",
     "fold_curve",
     "forcing_period",
+    "frequency_response",
     "friction_law",
     "generate",
+    "history",
     "hopf_curve",
+    "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
+    "periodicity",
     "picture",
     "plot_branches",
     "plot_contact_map",
     "plot_eigenvalues",
     "plot_energies",
+    "plot_friction_work",
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_poincare",
+    "plot_response",
+    "plot_spectrogram",
+    "plot_spectrum",
     "plot_stability_map",
+    "power_spectral_density",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -180,10 +224,14 @@ __all__ = [
     "sensitivity",
     "simulate",
     "smoothing_cost",
+    "spectrogram",
     "stability_map",
     "static_equilibrium",
     "strobe",
+    "strobed_states",
     "switched_branch",
+    "to_xarray",
+    "window",
     "write_case",
     "write_mesh",
 ]

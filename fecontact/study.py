@@ -11,6 +11,7 @@ from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Crown
+from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.contract import FrictionLaw, NormalLaw
@@ -261,7 +262,11 @@ class Study:
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=settings.initial, outputs=settings.outputs,
                             method=settings.method, rtol=settings.rtol,
-                            restitution=settings.restitution, progress=progress,
+                            restitution=settings.restitution,
+                            static_coefficient=settings.static_coefficient,
+                            scheme=settings.scheme, progress=progress,
+                            events=(ContactEvents(settings.stop)
+                                    if settings.events or settings.stop else None),
                             checkpoint=checkpoint if settings.method == "Rodas5P" else None)
 
     @cached_property

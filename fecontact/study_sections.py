@@ -182,11 +182,21 @@ class SimulationSettings:
     outputs : int
         Number of equally spaced output times, both ends included.
     method : str
-        Integrator: 'Rodas5P', compiled; 'Radau', 'BDF', 'LSODA' of scipy; 'set-valued' friction.
+        Integrator: 'Rodas5P', compiled; 'Radau', 'BDF', 'LSODA' of scipy; 'CVODE' of
+        scikit-sundae; 'set-valued' friction.
     rtol : float
         Relative tolerance.
     restitution : float, optional
         For 'set-valued': rigid stops with this coefficient in place of the normal law.
+    static_coefficient : float, optional
+        For 'set-valued': limit of R/F in stick [-]; default that of the law.
+    scheme : str, optional
+        For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
+    events : bool
+        For 'Rodas5P': whether to locate touch-down, lift-off, stick and slip of every contact
+        node, and keep them with the result.
+    stop : list of str
+        Events at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
     initial : 'rest', 'sliding' or RigidStart
         Where it starts; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid
         motion.
@@ -198,6 +208,10 @@ class SimulationSettings:
     method: str = "Rodas5P"
     rtol: float = 1e-6
     restitution: float | None = None
+    static_coefficient: float | None = None
+    scheme: str | None = None
+    events: bool = False
+    stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding"] | RigidStart = "rest"
 
     def __post_init__(self) -> None:

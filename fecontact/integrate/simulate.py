@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.contact_energy import POWERS
 from fecontact.contact_kernels import PENETRATION
 from fecontact.errors import InputError, choices, nearest
-from fecontact.integrate.events import Watched
+from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system import ContactSystem
@@ -113,8 +113,7 @@ def simulate(
         raise InputError(f"A checkpoint is for method = 'Rodas5P' alone, not '{method}'.")
     if events is not None and method != "Rodas5P":
         raise InputError(f"Events are for method = 'Rodas5P' alone, not '{method}'.")
-    watched = () if events is None else (
-        tuple(events) if isinstance(events, Sequence) else (events,))
+    watched = as_watched(events)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory):
         _warn_of_depth(system, state, t_start)

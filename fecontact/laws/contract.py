@@ -90,9 +90,14 @@ UpToOne = Annotated[PerNode, Range("above zero and at most 1", lambda x: (x > 0.
 @cache
 def _ranges(law: Any) -> Mapping[str, tuple[Range, ...]]:
     """Ranges that the annotations of a law's parameters name."""
+    try:
+        hints = get_type_hints(law, include_extras=True)
+    except NameError as error:
+        raise InputError(f"{law.__name__}: an annotation cannot be understood ({error}); use names "
+                         f"that the module of the law knows.") from None
     return {name: tuple(item for item in getattr(hint, "__metadata__", ())
                         if isinstance(item, Range))
-            for name, hint in get_type_hints(law, include_extras=True).items()}
+            for name, hint in hints.items()}
 
 
 def normal_law(function: Callable[..., Any]) -> CompiledLaw:

@@ -11,6 +11,7 @@ from typing import Any
 import tomli_w
 
 from fecontact.errors import InputError
+from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.names import movable, with_folder
 from fecontact.output.frames import frame_indices
@@ -119,6 +120,11 @@ def read_case(path: str | Path) -> Case:
             stored = file["trajectory"]
             state = {name: stored[name][()] for name in _STATE}
             state |= {name: stored[name][()] for name in _OPTIONAL if name in stored}
+            if "events" in stored:
+                events = stored["events"]
+                state["events"] = Events(
+                    events["time"][()], tuple(kind.decode() for kind in events["kind"][()]),
+                    events["node"][()], events["states"][()])
             status = Status[stored.attrs["status"]]
             statistics = json.loads(stored.attrs["statistics"])
             study = (_changed(str(file["study"].attrs["toml"]),
@@ -142,11 +148,19 @@ def _changed(study: str, change: Callable[[Any], Any]) -> str:
 
 
 def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
+    import h5py
+
     kept = {name: unit for name, unit in _OPTIONAL.items()
             if getattr(trajectory, name) is not None}
     for name, unit in (_STATE | kept | _CONTACT).items():
         data = group.create_dataset(name, data=getattr(trajectory, name))
         data.attrs["unit"] = unit
+    if trajectory.events is not None:
+        events = group.create_group("events")
+        for name, unit in (("time", "s"), ("node", ""), ("states", "as y = [q, q', z]")):
+            data = events.create_dataset(name, data=getattr(trajectory.events, name))
+            data.attrs["unit"] = unit
+        events.create_dataset("kind", data=list(trajectory.events.kind), dtype=h5py.string_dtype())
     group.attrs["status"] = trajectory.status.name
     group.attrs["statistics"] = json.dumps(trajectory.statistics, default=lambda x: x.item())
 

@@ -1,6 +1,8 @@
 """All friction laws without memory: forces from independent formulas, limits, inverse questions."""
 
 import math
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fecontact.errors import InputError
+from fecontact.laws.contract import PerNode, Positive, Range
 from fecontact.laws.friction import (
     ConstantFriction,
     ExponentialFriction,
@@ -16,6 +19,7 @@ from fecontact.laws.friction import (
     HyperbolicFriction,
     ProductFriction,
 )
+from fecontact.laws.friction_base import MemorylessFriction
 from fecontact.laws.friction_minimum import CubicFriction, GalvanettoFriction
 
 SMOOTHINGS = ("arctan", "tanh", "square-root")
@@ -244,3 +248,24 @@ def test_smoothing_in_the_table():
 def test_values_are_checked(kind, values, message):
     with pytest.raises(InputError, match=message):
         kind(**values)
+
+
+def test_ranges_in_annotations_hold_for_laws_of_ones_own():
+    @dataclass(frozen=True)
+    class Mine(MemorylessFriction):
+        high: Positive = 1.0
+        small: Annotated[PerNode, Range("at most 2", lambda x: x <= 2.0)] = 1.0
+        free: PerNode = -1.0
+
+    assert Mine((1.0, 2.0), 2).high == (1.0, 2.0)
+    with pytest.raises(InputError, match=r"Mine: high = \(1\.0, 0\.0\) must be above zero\."):
+        Mine((1.0, 0.0))
+    with pytest.raises(InputError, match=r"Mine: small = 2\.5 must be at most 2\."):
+        Mine(small=2.5)
+
+    @dataclass(frozen=True)
+    class Unknown(MemorylessFriction):
+        high: "Nowhere" = 1.0  # noqa: F821
+
+    with pytest.raises(InputError, match=r"Unknown: an annotation .*'Nowhere' is not defined"):
+        Unknown()
