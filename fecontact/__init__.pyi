@@ -6,16 +6,16 @@ from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectr
 from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
+from .bifurcation.basins import Attractor, Axis, Basins, basins
 from .bifurcation.branch import Branch
+from .bifurcation.brute_force import BruteForce, brute_force
 from .bifurcation.contact_field import contact_field
 from .bifurcation.curves import fold_curve, hopf_curve
 from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
+from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
-from .bifurcation.basins import Attractor, Axis, Basins, basins
-from .bifurcation.brute_force import BruteForce, brute_force
-from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
@@ -66,7 +66,6 @@ from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
-from .output.diagrams import plot_branches
 from .output.analysis_plots import (
     plot_friction_work,
     plot_poincare,
@@ -75,6 +74,7 @@ from .output.analysis_plots import (
     plot_spectrum,
 )
 from .output.dataset import to_xarray
+from .output.diagrams import plot_branches
 from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
