@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from fecontact.cli import about, runs, studies, sweeps
+from fecontact.cli import about, branches, runs, studies, sweeps
 
 COMMANDS: tuple[Callable[..., int | None], ...] = (
     studies.init,
@@ -16,6 +16,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     studies.modes,
     studies.run,
     sweeps.sweep,
+    branches.branch,
     runs.render,
     runs.plot,
     runs.export,
