@@ -7,8 +7,15 @@ from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .bifurcation.basins import Attractor, Axis, Basins, basins
+from .bifurcation.branch import Branch
 from .bifurcation.brute_force import BruteForce, brute_force
+from .bifurcation.contact_field import contact_field
+from .bifurcation.curves import fold_curve, hopf_curve
+from .bifurcation.equilibria import find_equilibrium
+from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
+from .bifurcation.stability_map import stability_map
+from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
@@ -67,15 +74,23 @@ from .output.analysis_plots import (
     plot_spectrum,
 )
 from .output.dataset import to_xarray
+from .output.diagrams import plot_branches
 from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
+from .output.stability_plots import plot_eigenvalues, plot_stability_map
 from .output.store import read_case, write_case
+from .output.sweep_plots import plot_sobol, plot_strobed, plot_sweep
 from .points import Patch
 from .rows import rows_from_dofs
 from .statics import static_equilibrium
 from .study import Study
+from .sweeps.executors import dask_executor
+from .sweeps.settings import Distribution, Range, Strobing, SweepSettings
+from .sweeps.statistics import SobolIndices, sobol_indices, statistics
+from .sweeps.sweep import sweep
+from .sweeps.table import SweepTable, read_table
 from .system import ContactSystem
 
 __version__: str
@@ -88,6 +103,7 @@ __all__ = [
     "Beam",
     "Block",
     "BoucWenFriction",
+    "Branch",
     "BruteForce",
     "Constant",
     "ConstantFriction",
@@ -99,6 +115,7 @@ __all__ = [
     "Crown",
     "CubicFriction",
     "DahlFriction",
+    "Distribution",
     "Drive",
     "ElasticBody",
     "Energies",
@@ -146,6 +163,7 @@ __all__ = [
     "ProductFriction",
     "Pulse",
     "RandomRoughness",
+    "Range",
     "Rayleigh",
     "RestitutionContact",
     "RigidStart",
@@ -153,39 +171,52 @@ __all__ = [
     "Sensitivity",
     "Sine",
     "SmoothingCost",
+    "SobolIndices",
     "SpeedRamp",
     "Status",
+    "Strobing",
     "Study",
     "Sweep",
+    "SweepSettings",
+    "SweepTable",
     "Tabulated",
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "VectorField",
     "amplitude_spectrum",
     "basins",
     "brute_force",
     "check_law",
+    "contact_field",
     "count_periods",
+    "dask_executor",
     "ensemble",
+    "equilibrium_branch",
     "event",
     "export_csv",
     "export_mat",
     "export_netcdf",
     "export_pvd",
+    "find_equilibrium",
     "find_impacts",
     "find_rests",
+    "fold_curve",
     "forcing_period",
     "frequency_response",
     "friction_law",
     "generate",
     "history",
+    "hopf_curve",
     "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
     "periodicity",
     "picture",
+    "plot_branches",
     "plot_contact_map",
+    "plot_eigenvalues",
     "plot_energies",
     "plot_friction_work",
     "plot_history",
@@ -193,22 +224,32 @@ __all__ = [
     "plot_phase",
     "plot_poincare",
     "plot_response",
+    "plot_sobol",
     "plot_spectrogram",
     "plot_spectrum",
+    "plot_stability_map",
+    "plot_strobed",
+    "plot_sweep",
     "power_spectral_density",
     "read_case",
     "read_matrix",
     "read_mesh",
+    "read_table",
     "read_uff",
     "render",
     "rows_from_dofs",
     "sensitivity",
     "simulate",
     "smoothing_cost",
+    "sobol_indices",
     "spectrogram",
+    "stability_map",
     "static_equilibrium",
+    "statistics",
     "strobe",
     "strobed_states",
+    "sweep",
+    "switched_branch",
     "to_xarray",
     "window",
     "write_case",

@@ -1,0 +1,189 @@
+"""Bifurcation diagrams."""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import InputError, choices
+from fecontact.output.figures import COLOURS, new_figure
+from fecontact.output.saving import save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fecontact.bifurcation.branch import Branch, BranchPoint
+
+Array = NDArray[np.float64]
+Quantity = str | int | Callable[["BranchPoint"], float]
+
+# Letters and markers of special points.
+_SPECIAL = {
+    "Hopf": ("H", "o"), "fold": ("F", "s"), "branch point": ("BP", "D"),
+    "period doubling": ("PD", "^"), "Neimark-Sacker": ("NS", "v"), "cusp": ("CP", "P"),
+    "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
+    "double Hopf": ("HH", ">"),
+}
+_DASHES = (0, (4, 2.5))
+
+
+def plot_branches(
+    branches: "Branch | Sequence[Branch]", path: str | Path, y: Quantity = 0, *,
+    x: Quantity = "parameter", x_label: str | None = None, y_label: str | None = None,
+    names: Sequence[str] = (),
+) -> Path:
+    """Plot branches: stable parts solid, unstable ones dashed, special points marked and labelled.
+
+    Parameters
+    ----------
+    branches : Branch or sequence of Branch
+        Each gets its own colour.
+    path : str or Path
+        A .png, .pdf or .svg file; it is replaced if it exists.
+    y, x : str, int or callable
+        What to draw: 'parameter', the name of a stored number, the number of a state counted from
+        0, or a function of a :class:`fecontact.bifurcation.branch.BranchPoint`.
+    x_label, y_label : str, optional
+        Labels of the axes, with units.
+    names : sequence of str
+        Names of the branches for the legend.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        For a quantity that is not stored, another suffix, or a file that cannot be written.
+    """
+    from fecontact.bifurcation.branch import Branch
+
+    several = [branches] if isinstance(branches, Branch) else list(branches)
+    return save_figure(path, lambda: branches_figure(several, y, x, x_label, y_label, names))
+
+
+def branches_figure(
+    branches: "Sequence[Branch]", y: Quantity = 0, x: Quantity = "parameter",
+    x_label: str | None = None, y_label: str | None = None, names: Sequence[str] = (),
+) -> "Figure":
+    """See :func:`plot_branches`."""
+    figure = new_figure(8.0, 5.2)
+    axis = figure.subplots()
+    known: dict[str, list[tuple[float, float]]] = {}
+    dashed = False
+    for number, branch in enumerate(branches):
+        places, heights = _values(branch, x), _values(branch, y)
+        stable = _stable_pieces(branch)
+        dashed |= not stable.all()
+        colour = COLOURS[number % len(COLOURS)]
+        for first, last in _runs(stable):
+            axis.plot(places[first : last + 1], heights[first : last + 1], color=colour,
+                      linewidth=1.8 if stable[first] else 1.2,
+                      linestyle="-" if stable[first] else _DASHES)
+        for index, point in enumerate(branch.points):
+            if point.kind is not None:
+                known.setdefault(point.kind, []).append((places[index], heights[index]))
+    axis.set_xlabel(x_label or _label(x, branches[0].name))
+    axis.set_ylabel(y_label or _label(y, branches[0].name))
+    axis.margins(x=0.02, y=0.06)
+    axis.autoscale_view()
+    _mark(axis, known)
+    _legend(axis, [COLOURS[k % len(COLOURS)] for k in range(len(branches))], names, known, dashed)
+    return figure
+
+
+def _values(branch: "Branch", quantity: Quantity) -> Array:
+    if callable(quantity):
+        return np.array([quantity(point) for point in branch.points], dtype=float)
+    if isinstance(quantity, int):
+        return np.asarray(branch.column("state")[:, quantity])
+    if quantity == "parameter":
+        return branch.parameter
+    found = branch.column(quantity)
+    if found.ndim != 1 or found.dtype.kind not in "fiub":
+        plain = [name for name, value in branch.points[0].values.items()
+                 if np.ndim(value) == 0 and not isinstance(value, complex)]
+        raise InputError(f"{quantity!r} is not one number at each point; choose from "
+                         f"{choices(plain)}, the number of a state, or give a function.")
+    return found.astype(float)
+
+
+def _stable_pieces(branch: "Branch") -> NDArray[np.bool_]:
+    """Whether each piece (N - 1,) between neighbours is stable; decided by regular points."""
+    stable = [None if point.kind is not None else bool(point.values.get("stable", True))
+              for point in branch.points]
+    pieces: list[bool] = []
+    for before, after in pairwise(stable):
+        known = [value for value in (before, after) if value is not None]
+        pieces.append(all(known) if known else (pieces[-1] if pieces else True))
+    return np.array(pieces or [True], dtype=bool)
+
+
+def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last point of each row of pieces of the same kind."""
+    edges = [0, *(np.flatnonzero(np.diff(stable)) + 1).tolist(), len(stable)]
+    return list(pairwise(edges))
+
+
+def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
+    """Markers and letters; those of points close to another one point away from it."""
+    special: list[tuple[str, str, float, float]] = []
+    for kind, places in known.items():
+        letters, marker = _SPECIAL.get(kind, ("", "."))
+        # A point that two branches share is marked once.
+        distinct: list[tuple[float, float]] = []
+        for place in places:
+            if not any(np.allclose(place, other, rtol=1e-6) for other in distinct):
+                distinct.append(place)
+        for number, (x, y) in enumerate(distinct):
+            count = str(number + 1) if letters and len(distinct) > 1 else ""
+            special.append((f"{letters or kind}{count}", marker, x, y))
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    to_axes = axis.transData + axis.transAxes.inverted()
+    seen = np.array([to_axes.transform((x, y)) for _, _, x, y in special]).reshape(-1, 2)
+    for index, (text, marker, x, y) in enumerate(special):
+        axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
+                  linestyle="none", zorder=4)
+        away = seen[index] - np.delete(seen, index, axis=0)
+        near = away[np.abs(away).max(axis=1) < 0.06]
+        left, below = (near.sum(axis=0) < 0.0) if len(near) else (False, False)
+        axis.annotate(text, (x, y), xytext=(-6.0 if left else 6.0, -6.0 if below else 6.0),
+                      ha="right" if left else "left", va="top" if below else "bottom",
+                      textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
+
+
+def _legend(
+    axis: "Axes", colours: Sequence[str], names: Sequence[str],
+    known: dict[str, list[tuple[float, float]]], dashed: bool,
+) -> None:
+    from matplotlib.lines import Line2D
+
+    handles: list[Any] = [Line2D([], [], color=colour, linewidth=1.8, label=name)
+                          for colour, name in zip(colours, names, strict=False)]
+    if dashed:
+        handles.append(Line2D([], [], color="#303030", linewidth=1.8, label="stable"))
+        handles.append(Line2D([], [], color="#303030", linewidth=1.2, linestyle=_DASHES,
+                              label="unstable"))
+    for kind in known:
+        letters, marker = _SPECIAL.get(kind, ("", "."))
+        handles.append(Line2D([], [], color="#303030", marker=marker, markerfacecolor="white",
+                              linestyle="none", markersize=7.0,
+                              label=f"{kind} ({letters})" if letters else kind))
+    if handles:
+        axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
+
+
+def _label(quantity: Quantity, parameter: str) -> str:
+    if quantity == "parameter":
+        return parameter
+    if isinstance(quantity, int):
+        return f"state {quantity}"
+    return quantity if isinstance(quantity, str) else ""
