@@ -280,7 +280,8 @@ def committed_shapes() -> dict:
     return module.SHAPES
 
 
-@pytest.mark.parametrize("name", ["beam.msh", "block.msh", "pendulum.msh"])
+@pytest.mark.parametrize("name", ["beam.msh", "block.msh", "pendulum.msh",
+                                  "impact_pendulum.msh"])
 def test_committed_meshes_are_those_of_the_generator(name: str) -> None:
     mesh, again = read_mesh(MESHES / name), generate(committed_shapes()[name])
     assert (MESHES / name).stat().st_size < 200_000
