@@ -1,3 +1,5 @@
+from .analysis.impacts import Impacts, find_impacts, find_rests
+from .analysis.periods import Periodicity, count_periods, periodicity, strobe
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
@@ -30,13 +32,7 @@ from .laws.friction import (
 )
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import (
-    BoucWenFriction,
-    DahlFriction,
-    IwanFriction,
-    JenkinsFriction,
-    LuGreFriction,
-)
+from .laws.memory import BoucWenFriction, DahlFriction, IwanFriction, JenkinsFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
@@ -92,6 +88,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "Impacts",
     "IwanFriction",
     "JenkinsFriction",
     "LinearContact",
@@ -107,6 +104,7 @@ __all__ = [
     "Patch",
     "Pendulum",
     "PerNode",
+    "Periodicity",
     "PointLoad",
     "PowerContact",
     "PowerLawContact",
@@ -127,12 +125,16 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "count_periods",
     "export_pvd",
+    "find_impacts",
+    "find_rests",
     "friction_law",
     "generate",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
+    "periodicity",
     "picture",
     "plot_contact_map",
     "plot_energies",
@@ -147,6 +149,7 @@ __all__ = [
     "rows_from_dofs",
     "simulate",
     "static_equilibrium",
+    "strobe",
     "write_case",
     "write_mesh",
 ]

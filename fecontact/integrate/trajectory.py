@@ -190,6 +190,11 @@ class Trajectory:
         return self._contact[:, :, kernels.PENETRATION]
 
     @property
+    def penetration_rate(self) -> Array:
+        """Rates u' (N, n) of the penetrations, positive towards the ground [m/s]."""
+        return self._contact[:, :, kernels.PENETRATION_RATE]
+
+    @property
     def slip_velocity(self) -> Array:
         """Slip velocities (N, n) of the body relative to the ground [m/s]."""
         return self._contact[:, :, kernels.SLIP_VELOCITY]
