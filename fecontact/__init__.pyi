@@ -4,11 +4,12 @@ from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
-from .errors import FecontactError
+from .errors import FecontactError, InputError
 from .formats.matrices import read_matrix
 from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
+from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
 from .integrate.initial import RigidStart
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
@@ -73,6 +74,7 @@ __all__ = [
     "Drive",
     "ElasticBody",
     "Energies",
+    "Ensemble",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -89,6 +91,7 @@ __all__ = [
     "Harmonics",
     "HyperbolicFriction",
     "Impacts",
+    "InputError",
     "IwanFriction",
     "JenkinsFriction",
     "LinearContact",
@@ -126,9 +129,11 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "count_periods",
+    "ensemble",
     "export_pvd",
     "find_impacts",
     "find_rests",
+    "forcing_period",
     "friction_law",
     "generate",
     "memory_friction_law",

@@ -207,7 +207,7 @@ def integrate(
     statistics: dict[str, Any] = {"method": "Rodas5P", "rtol": rtol, **run.statistics,
                                   "seconds": clock.perf_counter() - begin}
     if ended is None:
-        ended = _ENDS[result]
+        ended = ENDS[result]
         if kept is not None:
             kept.remove()
     if ended is not Status.FINISHED:
@@ -221,7 +221,7 @@ def integrate(
     return times, states, work, ended, statistics
 
 
-_ENDS = {stepping.FINISHED: Status.FINISHED, stepping.MINIMUM_STEP: Status.MINIMUM_STEP,
+ENDS = {stepping.FINISHED: Status.FINISHED, stepping.MINIMUM_STEP: Status.MINIMUM_STEP,
          stepping.NOT_FINITE: Status.NOT_FINITE}
 
 

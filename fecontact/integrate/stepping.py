@@ -159,7 +159,7 @@ def _go_on(progress, room):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.i8(SYSTEM, matrix, vector, run_arrays.CONTROL, run_arrays.PROGRESS, run_arrays.ROOM,
-                 i8, matrix, matrix))
+                 i8, matrix, matrix), nogil=True)
 def advance(  # type: ignore[no-untyped-def]
     held_system, held_shapes, held_times, held_control, held_progress, held_room, most, held_out,
     held_work,
