@@ -117,7 +117,8 @@ class Regime:
 def regime(run: Trajectory) -> Regime:
     """Periods, impacts and rests of a settled motion with resolved impacts."""
     period, begin = drive_period(run.system), float(run.time[0])
-    impacts, rests = find_impacts(run), find_rests(run)
+    # The contact is hardly damped: what is left of the rebounds dies away while it stays closed.
+    impacts, rests = find_impacts(run), find_rests(run, slower_than=0.1)
     found = periodicity(run, start=begin, largest=8)
     if found.periods is None and rests:
         found = periodicity(run, start=begin, largest=1, tolerance=0.02)

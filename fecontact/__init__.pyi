@@ -1,5 +1,5 @@
 from .analysis.impacts import Impacts, find_impacts, find_rests
-from .analysis.periods import Periodicity, count_periods, periodicity, strobe
+from .analysis.periods import Periodicity, count_periods, periodicity
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
