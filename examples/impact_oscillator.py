@@ -27,6 +27,8 @@ from fecontact import (
 )
 from fecontact.analysis.impacts import Impacts, Rest, find_impacts, find_rests
 from fecontact.analysis.periods import Periodicity, drive_period, periodicity
+from fecontact.analysis.periods import strobe as strobed_states
+from fecontact.integrate.ensemble import ensemble
 
 STUDY = Path(__file__).with_suffix(".toml")
 REDUCED_MASS = 0.092  # kg
@@ -126,31 +128,29 @@ def regime(run: Trajectory) -> Regime:
                   impacts.per_period(period, begin, float(run.time[-1])))
 
 
-def exponent(system: ContactSystem, run: Trajectory, periods: int = 300,
+def exponent(system: ContactSystem, run: Trajectory, periods: int = 60, pairs: int = 8,
              distance: float = 1e-6) -> tuple[float, float]:
-    """Largest Lyapunov exponent [1/s] from the end of a run, and its standard error.
+    """Largest Lyapunov exponent [1/s] of a settled motion, and its standard error.
 
     By the growth of the distance between two motions, put back to ``distance`` of the motion's
-    size after each drive period (Benettin et al. 1980). Distances of coordinates are measured
-    relative to the range of their motion.
+    size after each drive period (Benettin et al. 1980); the mean over some pairs that start from
+    different periods of the run. Distances of coordinates are measured relative to their range.
     """
     period = drive_period(system)
     scale = np.ptp(run.states, axis=0)
-    state, time = run.states[-1], float(run.time[-1])
-    offset = distance * scale * np.random.default_rng(0).normal(size=len(state))
-    growths = []
-    for _ in range(periods):
-        ends = [simulate(system, time + period, t_start=time, initial=given, outputs=2,
-                         rtol=1e-10).states[-1] for given in (state, state + offset)]
-        state, apart = ends[0], ends[1] - ends[0]
-        size = np.linalg.norm(apart / scale)
-        growths.append(np.log(size / np.linalg.norm(offset / scale)))
-        offset = apart * (distance / size)
-        time += period
-    late = np.array(growths[periods // 10:]) / period
-    # Growths of neighbouring periods depend on each other: the error is that of means of ten.
-    means = late[: len(late) // 10 * 10].reshape(-1, 10).mean(axis=1)
-    return float(late.mean()), float(means.std(ddof=1) / np.sqrt(len(means)))
+    state = strobed_states(run, start=float(run.time[0])).states[-pairs:]
+    offset = distance * scale * np.random.default_rng(0).normal(size=state.shape)
+    growths = np.empty((periods, pairs))
+    for number in range(periods):
+        ends = ensemble(system, [0.0, period], initial=np.vstack([state, state + offset]),
+                        rtol=1e-9).states[:, 1]
+        state, apart = ends[:pairs], ends[pairs:] - ends[:pairs]
+        size = np.linalg.norm(apart / scale, axis=1)
+        growths[number] = np.log(size / np.linalg.norm(offset / scale, axis=1)) / period
+        offset = apart * (distance / size)[:, None]
+    # The first half turns the distances into the direction that grows most.
+    means = growths[periods // 2:].mean(axis=0)
+    return float(means.mean()), float(means.std(ddof=1) / np.sqrt(pairs))
 
 
 def main() -> None:
