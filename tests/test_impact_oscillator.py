@@ -12,12 +12,12 @@ from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.simulate import simulate
 from fecontact.mesh_io import read_mesh
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
-sys.path.insert(0, str(EXAMPLES))
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 
 import impact_calibration as calibration
 import impact_oscillator as impact
 
+MESH = Path(__file__).parents[1] / "meshes" / "impact_pendulum.msh"
 PERIODS = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
 STARTS = ((0.0, 0.0), (4e-4, 0.0), (1e-4, -0.02))  # height [m], velocity [m/s]
 
@@ -73,7 +73,7 @@ def test_committed_mesh_is_calibrated():
 
 def test_calibration_finds_the_committed_mesh():
     found = calibration.calibrate()
-    mesh = read_mesh(EXAMPLES.parent / "meshes" / "impact_pendulum.msh")
+    mesh = read_mesh(MESH)
     shape = found.shape
     assert mesh.points["C"].size == 1
     assert mesh.nodes[mesh.points["C"]][0] == pytest.approx(
