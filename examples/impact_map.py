@@ -27,7 +27,7 @@ from fecontact.output.figures import COLOURS, STYLE, new_figure
 EXPECTED = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
 LARGEST = 8  # periods; more count as none
 CLASSES = ("1", "2", "3", "4", "5 to 8", "none")
-FINE, COARSE = 2e-3, 2e-2  # of the motion's range; the second where rest ends every period
+FINE, COARSE = 2e-3, 3e-2  # of the motion's range; the second where rest ends every period
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,7 +96,7 @@ class Regime:
     ----------
     periodicity : Periodicity
         Number of drive periods after which it repeats, None if never; to within 0.2 % of its
-        size, or 2 % if it comes to rest, where some vibration is left at lift-off.
+        size, or 3 % if it comes to rest, where some vibration is left at lift-off.
     impacts : Impacts
     rests : list of Rest
     per_period : (k,) integer array
@@ -123,7 +123,7 @@ def regime(run: Trajectory) -> Regime:
     impacts, rests = find_impacts(run), find_rests(run, slower_than=0.1)
     found = periodicity(run, start=begin, largest=8)
     if found.periods is None and rests:
-        found = periodicity(run, start=begin, largest=1, tolerance=0.02)
+        found = periodicity(run, start=begin, largest=1, tolerance=0.03)
     return Regime(found, impacts, rests,
                   impacts.per_period(period, begin, float(run.time[-1])))
 
