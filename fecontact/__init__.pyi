@@ -1,5 +1,9 @@
 from .analysis.impacts import Impacts, find_impacts, find_rests
 from .analysis.periods import Periodicity, count_periods, periodicity
+from .analysis.quantities import history
+from .analysis.receptance import frequency_response
+from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .body import ElasticBody, Material
@@ -46,6 +50,15 @@ from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
+from .output.analysis_plots import (
+    plot_friction_work,
+    plot_poincare,
+    plot_response,
+    plot_spectrogram,
+    plot_spectrum,
+)
+from .output.dataset import to_xarray
+from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
@@ -128,14 +141,20 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "amplitude_spectrum",
     "count_periods",
     "ensemble",
+    "export_csv",
+    "export_mat",
+    "export_netcdf",
     "export_pvd",
     "find_impacts",
     "find_rests",
     "forcing_period",
+    "frequency_response",
     "friction_law",
     "generate",
+    "history",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
@@ -143,9 +162,15 @@ __all__ = [
     "picture",
     "plot_contact_map",
     "plot_energies",
+    "plot_friction_work",
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_poincare",
+    "plot_response",
+    "plot_spectrogram",
+    "plot_spectrum",
+    "power_spectral_density",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -153,8 +178,11 @@ __all__ = [
     "render",
     "rows_from_dofs",
     "simulate",
+    "spectrogram",
     "static_equilibrium",
     "strobe",
+    "to_xarray",
+    "window",
     "write_case",
     "write_mesh",
 ]

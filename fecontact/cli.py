@@ -250,28 +250,62 @@ def render(
 
 
 @app.command(sort_key=6)
-def export(
+def plot(
     file: Annotated[Path, Parameter(help="What `fecontact run` wrote, or the study it ran.")],
+    kind: Annotated[str, Parameter(
+        help="history, phase, contact, energies, modes, spectrum, density, spectrogram, poincare, "
+        "friction_work or receptance.")],
     /,
     *,
-    format_: Annotated[Literal["pvd"], Parameter(
-        name="--format", help="PVD with VTU files, for ParaView before 5.12.")] = "pvd",
+    point: Annotated[list[str] | None, Parameter(
+        negative=(), show_default=False,
+        help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
+        "takes several.")] = None,
+    axis: Annotated[Literal["x", "y", "phi"], Parameter(help="Direction of the motion.")] = "x",
+    quantity: Annotated[str, Parameter(
+        help="Of spectra: velocity, displacement, normal_force, ...")] = "velocity",
+    highest: Annotated[float | None, Parameter(help="End of the frequencies [Hz].")] = None,
+    start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
+    end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
     output: Annotated[Path | None, Parameter(
-        name=["--output", "-o"], help="Folder for the files, of its own.")] = None,
-    frames: Annotated[int, Parameter(help="Number of fields over the body.")] = 200,
+        name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
 ) -> None:
-    """Write fields over the body in another format."""
+    """Draw a plot of a run, again or of another kind."""
     from fecontact.console import output_folder, waiting
     from fecontact.results import stored_run
 
     stored = stored_run(file)
-    from fecontact.output.pvd import export_pvd
+    from fecontact.output.redraw import Choice, point_of, redraw
 
-    folder = output or stored.path.with_name(f"{stored.path.stem}-{format_}")
-    with output_folder(folder.parent), waiting("Writing"):
-        collection = export_pvd(stored.trajectory, folder / f"{stored.path.stem}.pvd",
-                                frames=frames)
-    _say_written(collection)
+    choice = Choice(quantity, tuple(point_of(text) for text in point or ()), axis, highest)
+    target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
+    with output_folder(target.parent), waiting("Drawing"):
+        _say_written(redraw(stored.trajectory, kind, target, choice, start=start, end=end))
+    _note_age(file, stored.current)
+
+
+@app.command(sort_key=6)
+def export(
+    file: Annotated[Path, Parameter(help="What `fecontact run` wrote, or the study it ran.")],
+    /,
+    *,
+    format_: Annotated[Literal["pvd", "csv", "mat", "netcdf"], Parameter(
+        name="--format", help="`pvd` with VTU files, for ParaView before 5.12; `csv` for "
+        "spreadsheets; `mat` for MATLAB and Octave; `netcdf` for xarray.")] = "pvd",
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"], help="The file, or for pvd a folder of its own.")] = None,
+    frames: Annotated[int, Parameter(help="Number of fields over the body, for pvd.")] = 200,
+) -> None:
+    """Write a run in another format."""
+    from fecontact.console import output_folder, waiting
+    from fecontact.results import stored_run
+
+    stored = stored_run(file)
+    from fecontact.output.export import export_run
+
+    with output_folder((output or stored.path).parent), waiting("Writing"):
+        written = export_run(stored.trajectory, stored.path, format_, output, frames)
+    _say_written(written)
     _note_age(file, stored.current)
 
 

@@ -11,7 +11,6 @@ from fecontact.analysis.contact_motion import ContactMotion, Nodes
 from fecontact.analysis.periods import drive_period
 from fecontact.errors import AnalysisError, InputError, require_not_negative, require_positive
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.units import quantity
 
 Array = NDArray[np.float64]
 
@@ -216,7 +215,7 @@ def _require_resolved(motion: ContactMotion, touching: NDArray[np.bool_]) -> Non
         begin, end = motion.time[first : first + 2]
         raise AnalysisError(
             f"A contact began and ended between the output times {begin:.6g} and {end:.6g} s, "
-            f"{quantity(end - begin, 's')} apart; run with more outputs, at least ten in the "
+            f"{end - begin:.3g} s apart; run with more outputs, at least ten in the "
             f"shortest contact.")
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.analysis.quantities import Point, point_name
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.units import suitable_unit
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Point = str | int | tuple[float, float]
 
 # Colours that people with colour-blindness tell apart (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
@@ -175,15 +175,6 @@ def energies_figure(trajectory: Trajectory) -> "Figure":
     figure.align_ylabels(axes)
     axes[0].set_title(f"error of the energy balance: {energies.imbalance:.1e} of the largest term")
     return figure
-
-
-def point_name(point: Point) -> str:
-    """A point for people: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
-    if isinstance(point, str):
-        return point
-    if isinstance(point, int | np.integer):
-        return f"contact node {point}"
-    return f"({point[0]:g}, {point[1]:g}) m"
 
 
 def _usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
