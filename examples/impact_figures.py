@@ -100,22 +100,16 @@ def strobed(system: ContactSystem, count: int) -> np.ndarray:
     return np.array(contact_motion(run))
 
 
-def draw_all(system: ContactSystem, folder: Path) -> list[Path]:
-    """The three pictures, as PNG files in a folder."""
+def figures(system: ContactSystem) -> dict[str, Any]:
+    """All pictures by name: ``phase``, ``chatter`` and ``sections``."""
     driven = {w: system.with_(**{"drive.angular_frequency": w}) for w in FREQUENCIES}
     runs = {w: settled(one, periods=SHOWN_PERIODS[w]) for w, one in driven.items()}
     points = {w: strobed(one, SECTION_POINTS if w == 23.63 else 40) for w, one in driven.items()}
-    written = []
     with rc_context(STYLE):
-        for name, figure in (("impact-phase", phase_figure(runs)),
-                             ("impact-chatter", chatter_figure(runs[9.845])),
-                             ("impact-sections", section_figure(points))):
-            path = folder / f"{name}.png"
-            figure.savefig(path, dpi=90)
-            written.append(path)
-    return written
+        return {"phase": phase_figure(runs), "chatter": chatter_figure(runs[9.845]),
+                "sections": section_figure(points)}
 
 
 if __name__ == "__main__":
-    for file in draw_all(mesh_system(), Path(sys.argv[1])):
-        print(f"wrote {file}")
+    for name, figure in figures(mesh_system()).items():
+        figure.savefig(Path(sys.argv[1]) / f"impact-{name}.png", dpi=100)

@@ -25,6 +25,9 @@ from fecontact.integrate.ensemble import strobe
 from fecontact.output.figures import COLOURS, STYLE, new_figure
 
 EXPECTED = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
+SWEPT = np.linspace(5.0, 80.0, 1000)  # rad/s
+BENDINGS_HZ = np.arange(222.0, 238.1, 0.5)
+DAMPINGS = np.arange(0.010, 0.0501, 0.005)
 LARGEST = 8  # periods; more count as none
 CLASSES = ("1", "2", "3", "4", "5 to 8", "none")
 FINE, COARSE = 2e-3, 3e-2  # of the motion's range; the second where rest ends every period
@@ -141,15 +144,15 @@ def main() -> None:
     """Compute and draw both."""
     folder = Path(sys.argv[1])
     begin = time.perf_counter()
-    diagram = bifurcation(two_mode_system(), np.linspace(5.0, 80.0, 1000))
+    diagram = bifurcation(two_mode_system(), SWEPT)
     print(f"bifurcation diagram: {time.perf_counter() - begin:.0f} s", flush=True)
     begin = time.perf_counter()
-    bendings, dampings = np.arange(222.0, 238.1, 0.5), np.arange(0.010, 0.0501, 0.005)
+    bendings, dampings = BENDINGS_HZ, DAMPINGS
     periods = regime_map(bendings, dampings)
     print(f"map: {time.perf_counter() - begin:.0f} s", flush=True)
     with rc_context(STYLE):
-        bifurcation_figure(diagram).savefig(folder / "impact-bifurcation.png", dpi=90)
-        map_figure(bendings, dampings, periods).savefig(folder / "impact-map.png", dpi=90)
+        bifurcation_figure(diagram).savefig(folder / "impact-bifurcation.png", dpi=100)
+        map_figure(bendings, dampings, periods).savefig(folder / "impact-map.png", dpi=100)
 
 
 if __name__ == "__main__":

@@ -5,10 +5,10 @@ spring's end the motion repeats after one, two or four periods, never, or after 
 which rebounds accumulate until the pendulum rests on the stop. The pendulum is the finite-element
 body of impact_oscillator.toml, or its two first modes alone, given by four numbers.
 
-Usage: python examples/impact_oscillator.py [FOLDER]     (prints a table, draws into FOLDER)
+Usage: python examples/impact_oscillator.py        (prints a table, in about a minute;
+impact_figures.py and impact_map.py draw)
 """
 
-import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -152,8 +152,7 @@ def exponent(system: ContactSystem, run: Trajectory, periods: int = 60, pairs: i
 
 
 def main() -> None:
-    """Print what each frequency gives on the mesh and with two modes, and draw it."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    """Print what each frequency gives on the mesh and with two modes."""
     print("| w_E [rad/s] | source | modes | found | misfit | impacts a period | largest "
           "exponent [1/s] |\n|---|---|---|---|---|---|---|")
     for frequency, reported in FREQUENCIES.items():
@@ -166,12 +165,6 @@ def main() -> None:
             print(f"| {frequency:g} | {reported} | {system.basis.modes} | {found.name} | "
                   f"{found.periodicity.misfit:.0e} | {counts.min()} to {counts.max()} | "
                   f"{growth:+.1f} ± {error:.1f} |", flush=True)
-    if folder is not None:
-        from impact_figures import draw_all
-
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in draw_all(mesh_system(), folder):
-            print(f"wrote {path}")
 
 
 if __name__ == "__main__":
