@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fecontact.analysis.impacts import find_impacts, find_rests
+from fecontact.analysis.window import window
 from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
@@ -178,3 +179,24 @@ def test_impacts_per_period_of_a_driven_mass():
     pulled = np.trapezoid(pull[a : b + 1], run.time[a : b + 1])
     assert between.impulse.sum() == pytest.approx(0.092 * (rate[b] - rate[a]) - pulled, rel=1e-4)
     assert (between.restitution < 1.0).all()
+
+
+def test_chatter_of_the_pendulum_comes_to_rest_once_a_period():
+    """The impact oscillator of section 3 at 9.845 rad/s, with its rigid and bending mode."""
+    from test_simulate import pendulum
+
+    period = 2.0 * np.pi / 9.845
+    run = simulate(pendulum(9.845), 10.0 * period, initial=np.zeros(4), outputs=10 * 12000 + 1)
+    late = window(run, 5.0 * period)
+    rests = find_rests(late)
+    # The last rest may have been cut off by the end of the run.
+    assert len(rests) in (5, 6)
+    assert np.diff([rest.lift_off for rest in rests[:5]]) == pytest.approx(period, rel=0.1)
+    for rest in rests[1:5]:
+        assert rest.impacts >= 5
+        assert rest.touch_down < rest.at_rest < rest.lift_off
+        # The static force of drive and spring holds it down meanwhile.
+        inside = (late.time > rest.at_rest) & (late.time < rest.lift_off)
+        assert (late.normal_force[inside, 0] > 0.0).all()
+        assert np.abs(late.velocity(0)[inside, 1]).max() < 0.15 * np.nanmax(
+            find_impacts(late).impact_velocity)

@@ -146,7 +146,7 @@ def find_rests(
     nodes: Nodes = None,
     *,
     longer_than: float | None = None,
-    slower_than: float = 0.02,
+    slower_than: float = 0.1,
     shortest_flight: float = 0.0,
 ) -> list[Rest]:
     """Where a run comes to rest on the ground or a stop, as chatter does after many rebounds.

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.analysis.periods import strobe
 from fecontact.analysis.quantities import Point, history, point_name
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Array = NDArray[np.float64]
+
+_COLUMNS = 1000  # points of a line
 _DECADES = 5.0  # shown below the highest value of a logarithmic axis
 _AXES = ("x", "y")
 
@@ -35,19 +39,23 @@ def spectrum_figure(
     shown = history(trajectory, quantity, point, axis)
     make = power_spectral_density if density else amplitude_spectrum
     found = make(trajectory.time, shown.values)
-    figure = new_figure(9.0, 4.8)
+    figure = new_figure(9.0, 4.6)
     panel = figure.subplots()
     factor, symbol = (1.0, f"({shown.unit})²/Hz") if density else suitable_unit(
         float(found.values.max()), shown.unit)
-    panel.semilogy(found.frequency_hz, np.maximum(found.values, 1e-300) / factor,
+    end = highest_hz or _end_of_content(found.frequency_hz, found.values)
+    panel.semilogy(*_envelope(found.frequency_hz, np.maximum(found.values, 1e-300) / factor, end),
                    color=COLOURS[0], linewidth=1.0)
     top = float(found.values.max()) / factor
     if top > 0.0:
         panel.set_ylim(top * 10.0**-_DECADES, 4.0 * top)
-    end = highest_hz or _end_of_content(found.frequency_hz, found.values)
     panel.set_xlim(0.0, end)
-    for peak in found.peaks(6):
-        if peak.frequency_hz < end:
+    named: list[float] = []
+    for peak in found.peaks(40):
+        # Numbers need room beside those of higher peaks.
+        apart = all(abs(peak.frequency_hz - other) > 0.06 * end for other in named)
+        if peak.frequency_hz < end and apart and len(named) < 6:
+            named.append(peak.frequency_hz)
             panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value / factor),
                            xytext=(0, 4), textcoords="offset points", ha="center", fontsize=8.5)
     panel.set_xlabel("frequency [Hz]")
@@ -196,8 +204,19 @@ def _place(place: tuple[str | int, str]) -> str:
     return f"{point_name(place[0])} {place[1]}"
 
 
-def _end_of_content(frequency: np.ndarray, values: np.ndarray) -> float:
-    """Frequency up to which there is more than a ten-thousandth of the highest value."""
-    heard = np.flatnonzero(values > 1e-4 * values.max(initial=0.0))
+def _end_of_content(frequency: Array, values: Array) -> float:
+    """Frequency up to which there is more than a part of 0.002 of the highest value."""
+    heard = np.flatnonzero(values > 2e-3 * values.max(initial=0.0))
     end = 1.1 * frequency[heard[-1]] if len(heard) else frequency[-1]
     return float(min(max(end, 10.0 * frequency[1]), frequency[-1]))
+
+
+def _envelope(frequency: Array, values: Array, end: float) -> tuple[Array, Array]:
+    """A long spectrum by the highest value of every few up to ``end``."""
+    shown = int(np.searchsorted(frequency, end, side="right"))
+    few = shown // _COLUMNS
+    if few < 2:
+        return frequency[:shown], values[:shown]
+    blocks = values[: shown - shown % few].reshape(-1, few)
+    tops = np.arange(len(blocks)) * few + blocks.argmax(axis=1)
+    return frequency[tops], values[tops]
