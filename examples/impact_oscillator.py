@@ -119,8 +119,7 @@ class Regime:
 def regime(run: Trajectory) -> Regime:
     """Periods, impacts and rests of a settled motion with resolved impacts."""
     period, begin = drive_period(run.system), float(run.time[0])
-    # The contact is hardly damped: what is left of the rebounds dies away while it stays closed.
-    impacts, rests = find_impacts(run), find_rests(run, slower_than=0.1)
+    impacts, rests = find_impacts(run), find_rests(run)
     found = periodicity(run, start=begin, largest=8, tolerance=0.03 if rests else 2e-3)
     return Regime(found, impacts, rests,
                   impacts.per_period(period, begin, float(run.time[-1])))

@@ -89,13 +89,16 @@ def calibration_table() -> str:
 
 def regimes_table(rows: list[Row]) -> str:
     """Regimes of all models at all frequencies."""
+    lines = []
+    for number, row in enumerate(rows):
+        found = row.found
+        growth = "" if np.isnan(row.growth) else f"{row.growth:+.2f} ± {row.error:.2f}"
+        lines.append((f"{row.frequency:g}", model(number, row), found.name,
+                      f"{found.periodicity.misfit:.0e}", span(found.per_period),
+                      f"{len(found.rests) / len(found.per_period):g}", growth))
     return table(
         ("w_E [rad/s]", "model", "found", "misfit of the repetition", "impacts a period",
-         "rests a period", "largest Lyapunov exponent [1/s]"),
-        [(f"{row.frequency:g}", model(number, row), row.found.name,
-          f"{row.found.periodicity.misfit:.0e}", span(row.found.per_period),
-          f"{len(row.found.rests) / len(row.found.per_period):g}",
-          "" if np.isnan(row.growth) else f"{row.growth:+.2f} ± {row.error:.2f}") for number, row in enumerate(rows)])
+         "rests a period", "largest Lyapunov exponent [1/s]"), lines)
 
 
 def model(number: int, row: Row) -> str:
