@@ -26,8 +26,7 @@ from fecontact import (
     simulate,
 )
 from fecontact.analysis.impacts import Impacts, Rest, find_impacts, find_rests
-from fecontact.analysis.periods import Periodicity, drive_period, periodicity
-from fecontact.analysis.periods import strobe as strobed_states
+from fecontact.analysis.periods import Periodicity, drive_period, periodicity, strobed_states
 from fecontact.integrate.ensemble import ensemble
 
 STUDY = Path(__file__).with_suffix(".toml")

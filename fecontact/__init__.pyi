@@ -1,5 +1,5 @@
 from .analysis.impacts import Impacts, find_impacts, find_rests
-from .analysis.periods import Periodicity, count_periods, periodicity
+from .analysis.periods import Periodicity, count_periods, periodicity, strobed_states
 from .analysis.quantities import history
 from .analysis.receptance import frequency_response
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
@@ -37,7 +37,13 @@ from .laws.friction import (
 )
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import BoucWenFriction, DahlFriction, IwanFriction, JenkinsFriction, LuGreFriction
+from .laws.memory import (
+    BoucWenFriction,
+    DahlFriction,
+    IwanFriction,
+    JenkinsFriction,
+    LuGreFriction,
+)
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
@@ -181,6 +187,7 @@ __all__ = [
     "spectrogram",
     "static_equilibrium",
     "strobe",
+    "strobed_states",
     "to_xarray",
     "window",
     "write_case",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fecontact.analysis.periods import count_periods, drive_period, periodicity, strobe
+from fecontact.analysis.periods import count_periods, drive_period, periodicity, strobed_states
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.integrate.simulate import simulate
@@ -115,7 +115,7 @@ def test_strobe_of_a_linear_oscillator(outputs):
     run = simulate(system, 40.0 * 2.0 * np.pi / w, outputs=outputs, rtol=1e-8)
     steady = 1.0 / (1.0 - w**2 + 0.4j * w)
     for phase in (0.0, 0.3):
-        found = strobe(run, phase=phase)
+        found = strobed_states(run, phase=phase)
         turn = steady * np.exp(2j * np.pi * phase)
         assert found.period == pytest.approx(2.0 * np.pi / w)
         assert np.diff(found.time) == pytest.approx(found.period)
@@ -129,14 +129,14 @@ def test_strobe_says_what_it_lacks():
     still = linear_oscillator(0.0)
     run = simulate(still, 1.0, initial=np.array([0.0, 0.1]), outputs=11)
     with pytest.raises(InputError, match="has no period; give the period"):
-        strobe(run)
+        strobed_states(run)
     with pytest.raises(InputError, match="has no period"):
         drive_period(still)
     with pytest.raises(InputError, match="run it for longer"):
-        strobe(run, period=3.0)
+        strobed_states(run, period=3.0)
     with pytest.raises(InputError, match=r"phase = 1\.5"):
-        strobe(run, period=0.1, phase=1.5)
+        strobed_states(run, period=0.1, phase=1.5)
     with pytest.raises(InputError, match=r"start = 2\.0 must be a time of the run"):
-        strobe(run, period=0.1, start=2.0)
+        strobed_states(run, period=0.1, start=2.0)
     with pytest.raises(InputError, match="at least eight per period"):
         periodicity(run, period=0.1, largest=1)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.analysis.periods import strobe
+from fecontact.analysis.periods import strobed_states
 from fecontact.analysis.quantities import Point, history, point_name
 from fecontact.analysis.receptance import FrequencyResponse
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
@@ -112,7 +112,7 @@ def poincare_figure(
     if axis not in _AXES:
         raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
     row = _AXES.index(axis)
-    found = strobe(trajectory, period=period, phase=phase, start=float(trajectory.time[0]))
+    found = strobed_states(trajectory, period=period, phase=phase, start=float(trajectory.time[0]))
     basis = trajectory.system.basis
     x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
     rows = trajectory._rows(point)[row]

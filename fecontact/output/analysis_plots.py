@@ -103,7 +103,7 @@ def plot_poincare(
     axis : "x" or "y"
         Direction of the motion.
     period, phase
-        As for :func:`fecontact.analysis.periods.strobe`.
+        As for :func:`fecontact.analysis.periods.strobed_statesd_states`.
 
     Returns
     -------
