@@ -14,7 +14,9 @@ from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
 from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
+from .integrate.sensitivity import Sensitivity, sensitivity
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.contract import (
@@ -84,9 +86,11 @@ __all__ = [
     "BoucWenFriction",
     "Constant",
     "ConstantFriction",
+    "ContactEvents",
     "ContactState",
     "ContactSystem",
     "CosineSurface",
+    "Crossing",
     "Crown",
     "CubicFriction",
     "DahlFriction",
@@ -94,6 +98,8 @@ __all__ = [
     "ElasticBody",
     "Energies",
     "Ensemble",
+    "Event",
+    "Events",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -138,6 +144,7 @@ __all__ = [
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sensitivity",
     "Sine",
     "SpeedRamp",
     "Status",
@@ -150,6 +157,7 @@ __all__ = [
     "amplitude_spectrum",
     "count_periods",
     "ensemble",
+    "event",
     "export_csv",
     "export_mat",
     "export_netcdf",
@@ -183,6 +191,7 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
+    "sensitivity",
     "simulate",
     "spectrogram",
     "static_equilibrium",
