@@ -124,7 +124,7 @@ def regime(run: Trajectory) -> Regime:
                   impacts.per_period(period, begin, float(run.time[-1])))
 
 
-def exponent(system: ContactSystem, run: Trajectory, periods: int = 60, pairs: int = 8,
+def exponent(system: ContactSystem, run: Trajectory, periods: int = 64, pairs: int = 8,
              distance: float = 1e-6) -> tuple[float, float]:
     """Largest Lyapunov exponent [1/s] of a settled motion, and its standard error.
 
@@ -144,7 +144,8 @@ def exponent(system: ContactSystem, run: Trajectory, periods: int = 60, pairs: i
         size = np.linalg.norm(apart / scale, axis=1)
         growths[number] = np.log(size / np.linalg.norm(offset / scale, axis=1)) / period
         offset = apart * (distance / size)[:, None]
-    # The first half turns the distances into the direction that grows most.
+    # The first half turns the distances into the direction that grows most; the second is whole
+    # repetitions of motions that repeat after one, two or four periods.
     means = growths[periods // 2:].mean(axis=0)
     return float(means.mean()), float(means.std(ddof=1) / np.sqrt(pairs))
 

@@ -111,7 +111,7 @@ def test_another_integrator_finds_chaos_too():
 def test_exponents():
     chaotic = driven(impact.two_mode_system(), 23.63)
     run = settled_regime(chaotic)[1]
-    growth, error = impact.exponent(chaotic, run, periods=40)
+    growth, error = impact.exponent(chaotic, run)
     assert error < 0.6
     assert growth == pytest.approx(6.0, abs=1.5)
 

@@ -8,6 +8,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 
 import eigenfrequencies
 import friction_cases
+import friction_section
 import impact_section
 import normal_contact
 
@@ -29,7 +30,8 @@ def main() -> None:
     for name, make in (("eigenfrequencies", eigenfrequencies.section),
                        ("impacts of one mass", normal_contact.section),
                        ("friction of one mass", friction_cases.section),
-                       ("section 4.2", lambda: impact_section.section(images))):
+                       ("section 4.2", lambda: impact_section.section(images)),
+                       ("section 4.3", lambda: friction_section.section(images))):
         begin = time.perf_counter()
         parts.append(make())
         print(f"{name}: {time.perf_counter() - begin:.0f} s", flush=True)

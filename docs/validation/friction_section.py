@@ -12,8 +12,8 @@ from fecontact import Trajectory, periodicity, simulate, window
 from fecontact.output.figures import STYLE
 
 FIGURES = {
-    "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop, passed four times "
-                     "with small differences until it closes"),
+    "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop with one slip, which "
+                     "closes after four periods of the drive"),
     "c: three modes": ("4.3-2 c", "vibration of higher frequency after each transition from slip "
                        "to stick", "the same at B, where the elastic mode moves; the contact is "
                        "stuck and shows nothing"),
