@@ -12,6 +12,8 @@ import friction_section
 import impact_section
 import normal_contact
 
+from fecontact.console import write_text
+
 DOCS = Path(__file__).resolve().parents[1]
 HEAD = """# Validation
 
@@ -33,11 +35,10 @@ def main() -> None:
                        ("section 4.2", lambda: impact_section.section(images)),
                        ("section 4.3", lambda: friction_section.section(images))):
         begin = time.perf_counter()
+        print(f"{name} ...", end=" ", flush=True)
         parts.append(make())
-        print(f"{name}: {time.perf_counter() - begin:.0f} s", flush=True)
-    part = DOCS / "validation.md.part"
-    part.write_text(HEAD + "\n".join(parts), encoding="utf-8")
-    part.replace(DOCS / "validation.md")
+        print(f"{time.perf_counter() - begin:.0f} s", flush=True)
+    write_text(DOCS / "validation.md", HEAD + "\n".join(parts))
 
 
 if __name__ == "__main__":
