@@ -6,6 +6,9 @@ from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectr
 from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
+from .bifurcation.basins import Attractor, Axis, Basins, basins
+from .bifurcation.brute_force import BruteForce, brute_force
+from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
@@ -17,8 +20,10 @@ from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
 from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
 from .integrate.sensitivity import Sensitivity, sensitivity
+from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.check import check_law
 from .laws.contract import (
     FrictionLaw,
     NormalLaw,
@@ -28,30 +33,26 @@ from .laws.contract import (
     normal_law,
 )
 from .laws.drive import Drive, Load, PointLoad
+from .laws.fourier_series import FourierSeries
 from .laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from .laws.friction_minimum import CubicFriction, GalvanettoFriction
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import (
-    BoucWenFriction,
-    DahlFriction,
-    IwanFriction,
-    JenkinsFriction,
-    LuGreFriction,
-)
+from .laws.maxwell_slip import IwanFriction, JenkinsFriction
+from .laws.memory import BoucWenFriction, DahlFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
-from .laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from .laws.profiles import Flat, Sine
+from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
 from .laws.trace import Trace
 from .laws.transients import Pulse, Tabulated
@@ -80,10 +81,14 @@ from .system import ContactSystem
 __version__: str
 
 __all__ = [
+    "Attractor",
+    "Axis",
+    "Basins",
     "BasisReport",
     "Beam",
     "Block",
     "BoucWenFriction",
+    "BruteForce",
     "Constant",
     "ConstantFriction",
     "ContactEvents",
@@ -123,6 +128,7 @@ __all__ = [
     "Load",
     "LossFactor",
     "LuGreFriction",
+    "LyapunovExponents",
     "Material",
     "MeasuredSurface",
     "Mesh",
@@ -146,6 +152,7 @@ __all__ = [
     "RoughSurface",
     "Sensitivity",
     "Sine",
+    "SmoothingCost",
     "SpeedRamp",
     "Status",
     "Study",
@@ -155,6 +162,9 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "amplitude_spectrum",
+    "basins",
+    "brute_force",
+    "check_law",
     "count_periods",
     "ensemble",
     "event",
@@ -169,6 +179,7 @@ __all__ = [
     "friction_law",
     "generate",
     "history",
+    "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
@@ -193,6 +204,7 @@ __all__ = [
     "rows_from_dofs",
     "sensitivity",
     "simulate",
+    "smoothing_cost",
     "spectrogram",
     "static_equilibrium",
     "strobe",

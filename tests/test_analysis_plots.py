@@ -107,6 +107,21 @@ def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
     assert "There is no point 'D'" in capsys.readouterr().err
 
 
+def test_a_pendulum_is_drawn_across_the_ground(tmp_path):
+    """It has no motion along it: the drive's axis is the usual one, and zeros can be drawn."""
+    from test_simulate import pendulum
+
+    trajectory = simulate(pendulum(64.32), 0.5, outputs=801)
+    for kind in ("phase", "spectrum", "spectrogram", "receptance"):
+        redraw.redraw(trajectory, kind, tmp_path / f"{kind}.svg")
+    assert b"velocity y" in (tmp_path / "phase.svg").read_bytes()
+    for kind in ("spectrum", "spectrogram"):
+        redraw.redraw(trajectory, kind, tmp_path / f"{kind}.png",
+                      redraw.Choice("total_friction_force"))
+    with pytest.raises(InputError, match="B x does not move by a force at B x"):
+        redraw.redraw(trajectory, "receptance", tmp_path / "none.png", redraw.Choice(axis="x"))
+
+
 def test_points_of_a_command_line():
     assert redraw.point_of("B") == "B"
     assert redraw.point_of("12") == 12

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from fecontact.analysis.impacts import find_impacts, find_rests
 from fecontact.analysis.window import window
@@ -9,6 +10,8 @@ from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
 from fecontact.laws.drive import Drive, Load
+from fecontact.laws.friction import ExponentialFriction
+from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.normal_power import PowerContact
 from fecontact.laws.normal_stop import LinearContact
@@ -155,6 +158,46 @@ def test_nodes_that_do_not_exist():
         find_impacts(bouncing(outputs=301), "sole")
     with pytest.raises(InputError, match="Contact node 1 does not exist"):
         find_impacts(bouncing(outputs=301), 1)
+
+
+def test_set_valued_friction_has_impacts_and_rigid_stops_have_none():
+    rows = np.zeros((3, 2))
+    rows[0, 0] = rows[1, 1] = 1.0
+    basis = ModalBasis.from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
+                                     {"contact": rows[None], "B": rows})
+    law = LinearContact(C, 2.0 * 0.2 * np.sqrt(C * MASS))
+    q = np.linalg.solve(basis.T[2, :2], [0.0, 1e-4])
+    system = ContactSystem(basis, normal=law, friction=ExponentialFriction(0.3, 0.3))
+    run = simulate(system, 0.006, initial=np.concatenate([q, -V0 / 1e-4 * q]), outputs=601,
+                   method="set-valued")
+    assert find_impacts(run).restitution == pytest.approx([RESTITUTION], rel=1e-3)
+    assert find_impacts(run).impact_velocity == pytest.approx([V0], rel=1e-3)
+    frictionless = ball(law, weight=1.0)
+    rigid = simulate(frictionless, 0.05, initial=state(1e-4, 0.0), outputs=601, restitution=0.5,
+                     method="set-valued")
+    with pytest.raises(InputError, match="rigid stops take no time"):
+        find_impacts(rigid)
+
+
+@pytest.mark.parametrize("outputs", [200, 2000])
+def test_impact_on_ground_that_moves_up(outputs):
+    """A mass in uniform flight above a wave that passes below: the root of the two heights."""
+    height, wave, length, speed = 2e-3, 1e-3, 0.1, 2.0
+    system = ball(LinearContact(C), ground=Ground(speed=speed, amplitude=wave, wavelength=length))
+    run = simulate(system, 0.05, initial=state(height, -V0), outputs=outputs, rtol=1e-8)
+    turn = 2.0 * np.pi * speed / length
+
+    def gap(t):
+        return height - V0 * t + wave * np.sin(turn * t)
+
+    times = np.linspace(0.0, 0.05, 5001)
+    first = np.flatnonzero(gap(times) < 0.0)[0]
+    expected = brentq(gap, times[first - 1], times[first])
+    found = find_impacts(run)
+    error = 1e-5 if outputs == 2000 else 1e-3
+    assert found.touch_down[0] == pytest.approx(expected, rel=error)
+    assert found.impact_velocity[0] == pytest.approx(
+        V0 - wave * turn * np.cos(turn * expected), rel=error)
 
 
 def test_impacts_per_period_of_a_driven_mass():

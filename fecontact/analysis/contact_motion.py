@@ -99,13 +99,18 @@ class ContactMotion:
         Raises
         ------
         InputError
-            For nodes that do not exist, and for runs with set-valued contact, whose forces do not
-            follow from the motion.
+            For nodes that do not exist, and for runs with rigid stops, whose impacts take no
+            time.
         """
-        if trajectory.held_normal_force is not None:
-            raise InputError("The contact phases of a run with method = 'set-valued' cannot be "
-                             "found from its motion; run it with a normal law and method = "
-                             "'Rodas5P'.")
+        held = trajectory.held_normal_force
+        if held is not None:
+            system = trajectory.system
+            by_law = system.contact_history(trajectory.time, trajectory.states)[
+                :, :, kernels.NORMAL_FORCE]
+            if np.abs(by_law - held).max() > 1e-6 * np.abs(held).max():
+                raise InputError("The impacts of a run with rigid stops take no time, so that it "
+                                 "has no contact phases; run it without restitution, with the "
+                                 "normal law.")
         chosen = chosen_nodes(trajectory.system, nodes)
         length = trajectory.system.basis.tributary[chosen]
         return cls(trajectory, chosen, length / length.sum())

@@ -113,7 +113,7 @@ def find_impacts(
     Raises
     ------
     InputError
-        For nodes that do not exist, a negative time, or a run with set-valued contact.
+        For nodes that do not exist, a negative time, or a run with rigid stops.
     AnalysisError
         If a contact took place between two output times; more of them are needed.
     """

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
 Point = str | int | tuple[float, float]
@@ -81,6 +82,12 @@ def history(
     unit = _OF_POINTS[quantity]
     return History(motion[:, _AXES[axis]], unit.replace("m", "rad") if axis == "phi" else unit,
                    f"{title} {axis} of {point_name(point)}")
+
+
+def usual_axis(system: ContactSystem) -> str:
+    """Axis in which a system moves most: y where only this is driven, else x."""
+    drive = system.drive
+    return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"
 
 
 def point_name(point: Point) -> str:

@@ -86,7 +86,7 @@ def spectrogram_figure(
     upper.set_ylabel(f"[{symbol}]")
     upper.set_title(shown.title)
     factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
-    top = max(float(found.values.max()) / factor, 1e-300)
+    top = float(found.values.max()) / factor or 1.0
     image = lower.pcolormesh(
         found.time / time_unit, found.frequency_hz, np.maximum(found.values / factor, 1e-300),
         norm=LogNorm(top * 1e-4, top), cmap="viridis", shading="nearest", rasterized=True)
@@ -162,6 +162,10 @@ def response_figure(
     responses: Sequence[FrequencyResponse], labels: Sequence[str] = ()
 ) -> "Figure":
     """Magnitude and phase of frequency responses over frequency."""
+    if not any(response.values.any() for response in responses):
+        raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
+                         f"{_place(responses[0].excitations[0])}; choose another point or "
+                         f"direction.")
     figure = new_figure(9.0, 6.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
     number = 0

@@ -1,15 +1,16 @@
 """Plots of stored runs by name, as ``fecontact plot`` draws them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from fecontact.analysis.quantities import Point
+from fecontact.analysis.quantities import Point, usual_axis
 from fecontact.analysis.receptance import Place, frequency_response
 from fecontact.analysis.window import window
-from fecontact.errors import InputError, choices, nearest
+from fecontact.errors import AnalysisError, InputError, choices, nearest
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output import analysis_plots, plots
 
@@ -21,7 +22,7 @@ class Choice:
     Attributes
     ----------
     quantity, axis : str
-        As for :func:`fecontact.analysis.quantities.history`.
+        As for :func:`fecontact.analysis.quantities.history`; the axis by default that of the drive.
     points : tuple of points
         Named points and contact nodes; all that a history shows, of which the other plots show
         the first.
@@ -31,13 +32,19 @@ class Choice:
 
     quantity: str = "velocity"
     points: tuple[Point, ...] = ()
-    axis: str = "x"
+    axis: str | None = None
     highest_hz: float | None = None
 
     @property
     def point(self) -> Point:
         """The first point, or B."""
         return self.points[0] if self.points else "B"
+
+
+    @property
+    def direction(self) -> str:
+        """The axis, x where none is chosen."""
+        return self.axis or "x"
 
 
 Draw = Callable[[Trajectory, Path, Choice], Path]
@@ -50,10 +57,11 @@ def _receptance(run: Trajectory, path: Path, c: Choice) -> Path:
     if not isinstance(c.point, str | int):
         raise InputError(f"The receptance is one of named points and contact nodes, not of "
                          f"{c.point!r}.")
-    place: list[Place] = [(c.point, c.axis)]
+    place: list[Place] = [(c.point, c.direction)]
     found = [frequency_response(run.system, f, place)]
     labels = ["apart from the ground"]
-    if not run.system.ground.wavy and run.system.ground.friction_variation is None:
+    # Without steady sliding, as on waves, there is nothing to linearise about.
+    with suppress(AnalysisError):
         found.append(frequency_response(run.system, f, place, linearised_at="sliding"))
         labels.append("steadily sliding")
     return analysis_plots.plot_response(found, path, labels)
@@ -61,17 +69,17 @@ def _receptance(run: Trajectory, path: Path, c: Choice) -> Path:
 
 KINDS: dict[str, Draw] = {
     "history": lambda run, path, c: plots.plot_history(run, path, c.points),
-    "phase": lambda run, path, c: plots.plot_phase(run, path, c.point, c.axis),
+    "phase": lambda run, path, c: plots.plot_phase(run, path, c.point, c.direction),
     "contact": lambda run, path, c: plots.plot_contact_map(run, path),
     "energies": lambda run, path, c: plots.plot_energies(run, path),
     "modes": lambda run, path, c: plots.plot_modes(run.system.basis, path),
     "spectrum": lambda run, path, c: analysis_plots.plot_spectrum(
-        run, path, c.quantity, c.point, c.axis, highest_hz=c.highest_hz),
+        run, path, c.quantity, c.point, c.direction, highest_hz=c.highest_hz),
     "density": lambda run, path, c: analysis_plots.plot_spectrum(
-        run, path, c.quantity, c.point, c.axis, density=True, highest_hz=c.highest_hz),
+        run, path, c.quantity, c.point, c.direction, density=True, highest_hz=c.highest_hz),
     "spectrogram": lambda run, path, c: analysis_plots.plot_spectrogram(
-        run, path, c.quantity, c.point, c.axis, highest_hz=c.highest_hz),
-    "poincare": lambda run, path, c: analysis_plots.plot_poincare(run, path, c.point, c.axis),
+        run, path, c.quantity, c.point, c.direction, highest_hz=c.highest_hz),
+    "poincare": lambda run, path, c: analysis_plots.plot_poincare(run, path, c.point, c.direction),
     "friction_work": lambda run, path, c: analysis_plots.plot_friction_work(run, path),
     "receptance": _receptance,
 }
@@ -110,7 +118,10 @@ def redraw(
         raise InputError(f"There is no plot '{kind}'{nearest(kind, KINDS)}; there are: "
                          f"{choices(KINDS)}.")
     part = trajectory if start is None and end is None else window(trajectory, start, end)
-    return KINDS[kind](part, path, choice or Choice())
+    chosen = choice or Choice()
+    if chosen.axis is None:
+        chosen = replace(chosen, axis=usual_axis(part.system))
+    return KINDS[kind](part, path, chosen)
 
 
 def point_of(text: str) -> Point:
