@@ -117,8 +117,8 @@ def test_exponent_of_chaos():
     assert error < 0.5
     assert growth == pytest.approx(6.0, abs=1.2)
     found = lyapunov_exponents(chaotic, 400.0 * drive_period(chaotic), initial=run.states[-1],
-                               rtol=1e-7)
-    assert found.exponents[0] == pytest.approx(6.0, abs=1.2)
+                               rtol=1e-8)
+    assert found.exponents[0] == pytest.approx(6.0, abs=0.9)
 
 
 def test_exponent_of_an_orbit_is_that_of_its_floquet_multiplier():
