@@ -78,7 +78,8 @@ def variation_for(columns: int, modes: int, nodes: int, states: int) -> Variatio
     np.fill_diagonal(start, 1.0)
     return Variation(start, np.zeros((columns, size)), np.zeros((2, columns)),
                      np.zeros((rodas.STAGES * columns, size)), np.zeros((7, size)),
-                     np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes), *room)
+                     np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(motion.GIVEN),
+                     np.zeros(modes), np.zeros(modes), *room)
 
 
 @helper
