@@ -1,0 +1,146 @@
+"""Piecewise polynomials of collocation: their values, slopes and monitor of error.
+
+On each interval of the mesh the solution is a polynomial of degree m, given at m + 1 equally
+spaced nodes, the ends among them; it meets the equation at the m Gauss points.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.compiled import borrowed, kernel, matrix, vector
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """Polynomials of degree m on [0, 1] and the Gauss points.
+
+    Attributes
+    ----------
+    points, weights : (m,) array
+        Gauss points and weights.
+    values, slopes : (m, m + 1) array
+        The basis polynomials and their derivatives there.
+    node_weights : (m + 1,) array
+        Integrals of the basis polynomials.
+    top : (m + 1,) array
+        Derivatives of order m of the basis polynomials.
+    """
+
+    points: Array
+    weights: Array
+    values: Array
+    slopes: Array
+    node_weights: Array
+    top: Array
+
+
+@cache
+def rule(degree: int) -> Rule:
+    """The rule with m = ``degree`` Gauss points."""
+    roots, weights = np.polynomial.legendre.leggauss(degree)
+    points = (roots + 1.0) / 2.0
+    nodes = np.linspace(0.0, 1.0, degree + 1)
+    basis = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
+    basis = [p / p(node) for p, node in zip(basis, nodes, strict=True)]
+    return Rule(
+        points, weights / 2.0,
+        np.array([[p(x) for p in basis] for x in points]),
+        np.array([[p.deriv()(x) for p in basis] for x in points]),
+        np.array([p.integ()(1.0) - p.integ()(0.0) for p in basis]),
+        np.array([p.deriv(degree)(0.0) for p in basis]))
+
+
+@kernel(types.void(matrix, matrix, matrix, matrix, matrix))
+def at_points(nodes, values, slopes, x, rates):  # type: ignore[no-untyped-def]
+    """Fill x and rates (N m, d), values and interval-scaled slopes, from nodes (N m, d)."""
+    nodes, x, rates = borrowed(nodes), borrowed(x), borrowed(rates)
+    m = len(values)
+    total, d = nodes.shape
+    for j in range(total // m):
+        for point in range(m):
+            row = j * m + point
+            for i in range(d):
+                x[row, i] = 0.0
+                rates[row, i] = 0.0
+            for k in range(m + 1):
+                node = j * m + k
+                if node == total:
+                    node = 0
+                value, slope = values[point, k], slopes[point, k]
+                for i in range(d):
+                    x[row, i] += value * nodes[node, i]
+                    rates[row, i] += slope * nodes[node, i]
+
+
+@kernel(types.void(matrix, matrix, vector, matrix))
+def to_nodes(at_points, values, widths, out):  # type: ignore[no-untyped-def]
+    """Fill out (N m, d), the nodes' weights in sum_j h_j sum_c values_ck at_points_jc x_jk."""
+    at_points, out = borrowed(at_points), borrowed(out)
+    m = len(values)
+    total, d = out.shape
+    out[:] = 0.0
+    for j in range(total // m):
+        for point in range(m):
+            row = j * m + point
+            for k in range(m + 1):
+                node = j * m + k
+                if node == total:
+                    node = 0
+                weight = widths[j] * values[point, k]
+                for i in range(d):
+                    out[node, i] += weight * at_points[row, i]
+
+
+def interpolate(mesh: Array, nodes: Array, degree: int, times: Array) -> Array:
+    """Values (k, d) at times (k,) in [0, 1] of the periodic solution with nodes (N m, d)."""
+    closed = np.concatenate([nodes, nodes[:1]])
+    interval = np.clip(np.searchsorted(mesh, times, side="right") - 1, 0, len(mesh) - 2)
+    place = (times - mesh[interval]) / np.diff(mesh)[interval]
+    grid = np.linspace(0.0, 1.0, degree + 1)
+    result = np.zeros((len(times), nodes.shape[1]))
+    for k in range(degree + 1):
+        others = np.delete(grid, k)
+        weight = np.prod((place[:, None] - others) / (grid[k] - others), axis=1)
+        result += weight[:, None] * closed[interval * degree + k]
+    return result
+
+
+def node_times(mesh: Array, degree: int) -> Array:
+    """Times (N m,) of the nodes, without the last one."""
+    return (mesh[:-1, None] + np.diff(mesh)[:, None] * np.arange(degree) / degree).reshape(-1)
+
+
+def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> Array:
+    """A mesh on which each interval has the same share of the error of interpolation.
+
+    The error on an interval of width h is h^(m+1) |x^(m+1)|; its root of order m + 1 is spread
+    evenly (de Boor). The derivative of order m + 1 comes from the jumps of that of order m.
+    Each state counts by its own range over the orbit.
+    """
+    widths = np.diff(mesh)
+    scale = np.ptp(nodes, axis=0)
+    scale = np.maximum(scale, 1e-6 * scale.max() + 1e-300)
+    closed = np.concatenate([nodes, nodes[:1]]) / scale
+    N = len(widths)
+    patches = closed[np.arange(N)[:, None] * degree + np.arange(degree + 1)]
+    top = np.einsum("k,jkd->jd", rule(degree).top, patches) / widths[:, None]**degree
+    jumps = np.roll(top, -1, axis=0) - top
+    spacing = (widths + np.roll(widths, -1)) / 2.0
+    steep = np.abs(jumps / spacing[:, None])
+    size = np.sum((steep + np.roll(steep, 1, axis=0)) / 2.0, axis=1)**(1.0 / (degree + 1))
+    share = widths * size
+    total = share.sum()
+    if not 0.0 < total < np.inf:
+        return np.linspace(0.0, 1.0, intervals + 1)
+    # A part is spread evenly over time: no interval gets longer than ten times the mean.
+    share = share / total + 0.1 * widths
+    cumulative = np.concatenate([[0.0], np.cumsum(share)])
+    result = np.interp(np.linspace(0.0, cumulative[-1], intervals + 1), cumulative, mesh)
+    result[0], result[-1] = 0.0, 1.0
+    return result
