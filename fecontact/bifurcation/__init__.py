@@ -1,0 +1,1 @@
+"""Equilibria, periodic orbits, their stability and bifurcations, followed over parameters."""
