@@ -1,0 +1,97 @@
+"""Floquet multipliers of a periodic orbit, and what they say of its stability."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.collocation import Linearised
+from fecontact.bifurcation.periodic_schur import eigenvalues_of_product, transitions
+from fecontact.errors import AnalysisError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Floquet:
+    """Stability of an orbit.
+
+    A disturbance of the orbit grows by the factor mu in one period for each multiplier.
+
+    Attributes
+    ----------
+    multipliers : (d,) complex array
+        By falling modulus, the trivial one too.
+    trivial : int or None
+        Place of the multiplier that is one because the orbit may be shifted in time; None for
+        forced systems.
+    """
+
+    multipliers: NDArray[np.complex128]
+    trivial: int | None
+
+    @property
+    def others(self) -> NDArray[np.complex128]:
+        """All multipliers but the trivial one."""
+        if self.trivial is None:
+            return self.multipliers
+        return np.delete(self.multipliers, self.trivial)
+
+    @property
+    def trivial_error(self) -> float:
+        """Distance of the trivial multiplier from one: a measure of the orbit's accuracy."""
+        if self.trivial is None:
+            return 0.0
+        return float(abs(self.multipliers[self.trivial] - 1.0))
+
+    @property
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle."""
+        return int(np.sum(np.abs(self.others) > 1.0))
+
+    @property
+    def stable(self) -> bool:
+        """Whether all disturbances die away."""
+        return self.unstable == 0
+
+    def doubling_test(self) -> float:
+        """Product of mu + 1, scaled: changes sign where a multiplier passes -1."""
+        mu = self.others
+        return float(np.prod((mu + 1.0) / (np.abs(mu) + 1.0)).real)
+
+    def torus_test(self) -> float:
+        """Product of mu_i mu_k - 1 over pairs, scaled: changes sign where a pair passes the circle.
+
+        So it does where the product of two real multipliers passes one (neutral saddle).
+        """
+        mu = self.others
+        first, second = np.triu_indices(len(mu), 1)
+        product = mu[first] * mu[second]
+        return float(np.prod((product - 1.0) / (np.abs(product) + 1.0)).real)
+
+
+def floquet(linearised: Linearised) -> Floquet:
+    """Floquet multipliers of a periodic orbit found by collocation.
+
+    They are the eigenvalues of the product of the transitions over the intervals, found without
+    multiplying these (see :mod:`fecontact.bifurcation.periodic_schur`): small and large ones
+    side by side are accurate.
+
+    Raises
+    ------
+    AnalysisError
+        If they cannot be found.
+    """
+    factors = linearised.factors
+    d = factors.end.shape[0]
+    M = np.empty((len(factors.local), d, d))
+    transitions(factors, M)
+    try:
+        multipliers = eigenvalues_of_product(M)
+    except ArithmeticError as error:
+        raise AnalysisError(f"The Floquet multipliers were not found ({error}); use more "
+                            f"intervals.") from None
+    trivial = None
+    if linearised.problem.autonomous:
+        trivial = int(np.argmin(np.abs(multipliers - 1.0)))
+    return Floquet(multipliers, trivial)
