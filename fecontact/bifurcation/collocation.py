@@ -11,6 +11,7 @@ from fecontact.bifurcation.interpolation import (
     Rule,
     at_points,
     equidistributed,
+    fill_residual,
     interpolate,
     node_times,
     rule,
@@ -178,6 +179,7 @@ class Linearised:
 
     def __init__(self, problem: Collocation, u: Array) -> None:
         self.problem, self.u = problem, u
+        self._last: tuple[Array, float, Bordered] | None = None
 
     @cached_property
     def _points(self) -> tuple[Array, Array]:
@@ -197,11 +199,11 @@ class Linearised:
             f = self.derivatives[0]
         else:
             f = problem.field.rates(problem.times * self.period, x, problem.parameters(self.u))
-        steps = np.repeat(problem.widths * self.period, problem.degree)
-        rows = (slopes - steps[:, None] * f).reshape(-1)
-        if not problem.autonomous:
-            return rows
-        return np.append(rows, problem.phase_row @ self.u[: problem.size])
+        out = np.empty(problem.size + problem.common - 1)
+        fill_residual(slopes, f, problem.widths, self.period, out)
+        if problem.autonomous:
+            out[-1] = problem.phase_row @ self.u[: problem.size]
+        return out
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array, Array]:
@@ -246,16 +248,19 @@ class Linearised:
         """The condensed equations."""
         return self._factorised[0]
 
-    def reduced(self, row: Array, rhs: Array, closing: float = 1.0) -> "Reduced":
-        """The system [[G_u], [row]] du = rhs, reduced to x_0 and the common unknowns.
+    @cached_property
+    def _phase(self) -> "Border":
+        row = np.concatenate([self.problem.phase_row, np.zeros(self.problem.common)])
+        return Border(self.factors, row)
 
-        ``closing`` = -1 is for x(1) = -x(0).
-        """
-        problem = self.problem
-        rows = [row]
-        if problem.autonomous:
-            rows.insert(0, np.concatenate([problem.phase_row, np.zeros(problem.common)]))
-        return Reduced(self.factors, np.array(rows), rhs, closing)
+    def bordered(self, row: Array, closing: float = 1.0) -> "Bordered":
+        """The matrix [[G_u], [row]]; ``closing`` = -1 is for x(1) = -x(0)."""
+        if self._last is not None and self._last[0] is row and self._last[1] == closing:
+            return self._last[2]
+        borders = [self._phase] if self.problem.autonomous else []
+        bordered = Bordered(self.factors, [*borders, Border(self.factors, row)], closing)
+        self._last = row, closing, bordered
+        return bordered
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs.
@@ -265,41 +270,62 @@ class Linearised:
         numpy.linalg.LinAlgError
             If the matrix is singular.
         """
-        reduced = self.reduced(row, rhs)
-        return reduced.expand(np.linalg.solve(reduced.matrix, reduced.side))
+        return self.bordered(row).solve(rhs)
 
     def determinant(self, row: Array) -> float:
         """A number with the sign of the determinant of [[G_u], [row]], zero with it."""
-        reduced = self.reduced(row, np.zeros(len(self.u)))
-        scale = np.abs(reduced.matrix).max(axis=1)
-        return self._factorised[1] * float(np.linalg.det(reduced.matrix / scale[:, None]))
+        matrix = self.bordered(row).matrix
+        scale = np.abs(matrix).max(axis=1)
+        return self._factorised[1] * float(np.linalg.det(matrix / scale[:, None]))
 
 
-class Reduced:
-    """A bordered system reduced to ``matrix`` [x_0, common] = ``side``."""
+class Border:
+    """A further row, reduced to x_0, x_N and the common unknowns."""
+
+    def __init__(self, factors: elimination.Factors, row: Array) -> None:
+        N, _, _ = factors.local.shape
+        d = factors.end.shape[0]
+        self.local = np.empty((N, factors.local_pivots.shape[1]))
+        self.chain = np.empty((N - 1, d))
+        self.small = np.empty(factors.end.shape[1])
+        elimination.reduce_border(factors, row, self.local, self.chain, self.small)
+
+
+class Bordered:
+    """A bordered system, reduced to ``matrix`` [x_0, common] = side."""
 
     def __init__(
-        self, factors: elimination.Factors, rows: Array, rhs: Array, closing: float
+        self, factors: elimination.Factors, borders: list[Border], closing: float
     ) -> None:
-        N, size, width = factors.local.shape
         d = factors.end.shape[0]
-        self.common = factors.end.shape[1] - 2 * d
-        small = np.empty((d + len(rows), 2 * d + self.common))
-        self.side = np.empty(d + len(rows))
-        self._factors, self._closing, self._d = factors, closing, d
-        self._parts = np.empty((N, size)), np.empty((N - 1, 2 * d))
-        elimination.reduce(factors, rhs, rows, small, *self._parts, self.side)
+        small = np.vstack([factors.end, *(border.small for border in borders)])
         self.matrix = np.hstack([small[:, :d] + closing * small[:, d : 2 * d], small[:, 2 * d :]])
+        self._factors, self._closing = factors, closing
+        self._local = np.array([border.local for border in borders])
+        self._chain = np.array([border.chain for border in borders])
+
+    def solve(self, rhs: Array) -> Array:
+        """All unknowns for a right side of all rows."""
+        N, size, _ = self._factors.local.shape
+        d = self._factors.end.shape[0]
+        parts = np.empty((N, size)), np.empty((N - 1, 2 * d))
+        side = np.empty(len(self.matrix))
+        elimination.reduce_side(self._factors, rhs, self._local, self._chain, *parts, side)
+        return self._expand(parts, np.linalg.solve(self.matrix, side))
 
     def expand(self, solution: Array) -> Array:
-        """All unknowns from x_0 and the common ones."""
-        d = self._d
-        start, common = solution[:d], solution[d:]
+        """All unknowns from x_0 and the common ones where the right side is zero."""
         N, size, _ = self._factors.local.shape
-        out = np.empty(N * size + self.common)
-        out[N * size :] = common
-        elimination.expand(self._factors, *self._parts, start, self._closing * start, common,
-                           out[: N * size])
+        d = self._factors.end.shape[0]
+        return self._expand((np.zeros((N, size)), np.zeros((N - 1, 2 * d))), solution)
+
+    def _expand(self, parts: tuple[Array, Array], solution: Array) -> Array:
+        N, size, _ = self._factors.local.shape
+        d = self._factors.end.shape[0]
+        out = np.empty(N * size + len(solution) - d)
+        out[N * size :] = solution[d:]
+        elimination.expand(self._factors, *parts, solution[:d], self._closing * solution[:d],
+                           solution[d:], out[: N * size])
         return out
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import block, borrowed, f8, helper, i8, integers, kernel, matrix, vector
+from fecontact.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
 
 Array = NDArray[np.float64]
 
@@ -108,16 +108,14 @@ def forward(a, count, pivots, r):  # type: ignore[no-untyped-def]
 
 
 @helper
-def reduce_row(a, count, r, row):  # type: ignore[no-untyped-def]
-    """Eliminate the first entries of a further row (columns,); returns the change of its side."""
+def _reduce_row(a, count, row, weights):  # type: ignore[no-untyped-def]
+    """Eliminate the first entries of a further row (columns,); ``weights`` (count,) says how."""
     columns = len(row)
-    change = 0.0
     for k in range(count):
         factor = row[k] * a[k, k]
-        change -= factor * r[k]
+        weights[k] = factor
         for c in range(k + 1, columns):
             row[c] -= factor * a[k, c]
-    return change
 
 
 @kernel(types.f8(block, matrix, block, vector, f8, matrix, matrix, i8, FACTORS))
@@ -183,23 +181,68 @@ def condense(J, f, P, widths, T, values, slopes, with_period, factors):  # type:
     return sign
 
 
-@kernel(types.void(FACTORS, vector, matrix, matrix, matrix, matrix, vector))
-def reduce(factors, rhs, rows, small, reduced, chained, side):  # type: ignore[no-untyped-def]
-    """Reduce right side and borders to x_0, x_N and the common unknowns.
+@kernel(types.void(FACTORS, vector, matrix, matrix, vector))
+def reduce_border(factors, given, local_weights, chain_weights, small):  # type: ignore[no-untyped-def]
+    """Reduce a border ``given`` (N m d + e,) to x_0, x_N and the common unknowns.
 
-    ``rhs`` (N m d + b,) is that of the collocation rows and the b borders ``rows`` (b, N m d + e).
-    Fills ``small`` (d + b, 2 d + e) with rows of x_0, x_N, common, ``side`` (d + b,), and what
-    :func:`expand` needs: ``reduced`` (N, m d), ``chained`` (N - 1, 2 d).
+    Fills ``small`` (2 d + e,), and with ``local_weights`` (N, (m - 1) d) and ``chain_weights``
+    (N - 1, d) what its right side loses by it, as multiples of the reduced right sides.
     """
-    rhs, rows, factors = borrowed(rhs), borrowed(rows), borrowed(factors)
-    small, reduced, chained, side = (borrowed(small), borrowed(reduced), borrowed(chained),
-                                     borrowed(side))
-    local, chain, end = factors.local, factors.chain, factors.end
+    factors, given, small = borrowed(factors), borrowed(given), borrowed(small)
+    local_weights, chain_weights = borrowed(local_weights), borrowed(chain_weights)
+    local, chain = factors.local, factors.chain
     N, size, width = local.shape
     inner = factors.local_pivots.shape[1]
     d = size - inner
     e = width - inner - 2 * d
-    b = len(rows)
+    row, link = np.empty(width), np.zeros(3 * d + e)
+    for c in range(d):
+        link[d + c] = given[c]
+    for c in range(e):
+        link[3 * d + c] = given[N * size + c]
+    for j in range(N):
+        first = j * size + d
+        for c in range(inner):
+            row[c] = given[first + c]
+        for c in range(d):
+            # Until its interval is reached, x_j stands in the place of x_(j+1).
+            row[inner + c] = link[2 * d + c]
+            row[inner + d + c] = 0.0
+        for c in range(e):
+            row[inner + 2 * d + c] = link[3 * d + c]
+        _reduce_row(local[j], inner, row, local_weights[j])
+        for c in range(e):
+            link[3 * d + c] = row[inner + 2 * d + c]
+        for c in range(d):
+            link[2 * d + c] = 0.0
+        if j == 0:
+            for c in range(d):
+                link[d + c] += row[inner + c]
+        else:
+            for c in range(d):
+                link[c] = row[inner + c] + given[j * size + c]
+            _reduce_row(chain[j - 1], d, link, chain_weights[j - 1])
+        for c in range(d):
+            link[2 * d + c] += row[inner + d + c]
+    for c in range(2 * d + e):
+        small[c] = link[d + c]
+
+
+@kernel(types.void(FACTORS, vector, block, block, matrix, matrix, vector))
+def reduce_side(factors, rhs, local_weights, chain_weights, reduced, chained, side):  # type: ignore[no-untyped-def]
+    """Reduce the right side ``rhs`` (N m d + b,) of the collocation rows and b borders.
+
+    Fills ``side`` (d + b,), that of the d rows of ``factors.end`` and of the reduced borders, and
+    what :func:`expand` needs: ``reduced`` (N, m d), ``chained`` (N - 1, 2 d). The weights (b, ..)
+    are those of :func:`reduce_border`.
+    """
+    factors, rhs, side = borrowed(factors), borrowed(rhs), borrowed(side)
+    reduced, chained = borrowed(reduced), borrowed(chained)
+    local_weights, chain_weights = borrowed(local_weights), borrowed(chain_weights)
+    local, chain = factors.local, factors.chain
+    N, size, _ = local.shape
+    inner = factors.local_pivots.shape[1]
+    d = size - inner
     for j in range(N):
         r = reduced[j]
         for i in range(size):
@@ -207,8 +250,6 @@ def reduce(factors, rhs, rows, small, reduced, chained, side):  # type: ignore[n
         forward(local[j], inner, factors.local_pivots[j], r)
     for i in range(d):
         side[i] = reduced[0, inner + i]
-        for c in range(2 * d + e):
-            small[i, c] = end[i, c]
     for j in range(1, N):
         r = chained[j - 1]
         for i in range(d):
@@ -217,44 +258,14 @@ def reduce(factors, rhs, rows, small, reduced, chained, side):  # type: ignore[n
         forward(chain[j - 1], d, factors.chain_pivots[j - 1], r)
         for i in range(d):
             side[i] = r[d + i]
-    row, link = np.empty(width), np.empty(3 * d + e)
-    for index in range(b):
-        given = rows[index]
+    for index in range(len(side) - d):
         total = rhs[N * size + index]
-        link[:] = 0.0
-        for c in range(d):
-            link[d + c] = given[c]
-        for c in range(e):
-            link[3 * d + c] = given[N * size + c]
         for j in range(N):
-            first = j * size + d
-            for c in range(inner):
-                row[c] = given[first + c]
-            for c in range(d):
-                # Entries of x_j wait in the place of x_(j+1) until this interval is reached.
-                row[inner + c] = link[2 * d + c] if j > 0 else 0.0
-                row[inner + d + c] = 0.0
-            for c in range(e):
-                row[inner + 2 * d + c] = link[3 * d + c]
-            total += reduce_row(local[j], inner, reduced[j], row)
-            if j == 0:
-                for c in range(d):
-                    link[d + c] += row[inner + c]
-            else:
-                for c in range(d):
-                    link[c] = row[inner + c] + given[j * size + c]
-                    link[2 * d + c] = 0.0
-            for c in range(e):
-                link[3 * d + c] = row[inner + 2 * d + c]
-            if j > 0:
-                total += reduce_row(chain[j - 1], d, chained[j - 1], link)
-                for c in range(d):
-                    link[2 * d + c] += row[inner + d + c]
-            else:
-                for c in range(d):
-                    link[2 * d + c] = row[inner + d + c]
-        for c in range(2 * d + e):
-            small[d + index, c] = link[d + c]
+            for k in range(inner):
+                total -= local_weights[index, j, k] * reduced[j, k]
+        for j in range(N - 1):
+            for k in range(d):
+                total -= chain_weights[index, j, k] * chained[j, k]
         side[d + index] = total
 
 

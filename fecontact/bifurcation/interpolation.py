@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import borrowed, kernel, matrix, vector
+from fecontact.compiled import borrowed, f8, kernel, matrix, vector
 
 Array = NDArray[np.float64]
 
@@ -76,6 +76,19 @@ def at_points(nodes, values, slopes, x, rates):  # type: ignore[no-untyped-def]
                 for i in range(d):
                     x[row, i] += value * nodes[node, i]
                     rates[row, i] += slope * nodes[node, i]
+
+
+@kernel(types.void(matrix, matrix, vector, f8, vector))
+def fill_residual(slopes, f, widths, T, out):  # type: ignore[no-untyped-def]
+    """Fill the first N m d entries of out with slopes - h T f."""
+    slopes, f, out = borrowed(slopes), borrowed(f), borrowed(out)
+    total, d = f.shape
+    m = total // len(widths)
+    for j in range(len(widths)):
+        step = widths[j] * T
+        for row in range(j * m, (j + 1) * m):
+            for i in range(d):
+                out[row * d + i] = slopes[row, i] - step * f[row, i]
 
 
 @kernel(types.void(matrix, matrix, vector, matrix))
