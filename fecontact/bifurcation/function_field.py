@@ -44,6 +44,7 @@ class FunctionField(VectorField):
         self._scales, self._period = scales, period
 
     def rates(self, t: Array, x: Array, values: Array) -> Array:
+        """Rates (N, d); see :meth:`VectorField.rates`."""
         f = np.empty_like(x)
         kernels.batch_rates(self._rates.address, t, x, values, f)
         return f
@@ -51,6 +52,7 @@ class FunctionField(VectorField):
     def derivatives(
         self, t: Array, x: Array, values: Array, active: Iterable[int] = ()
     ) -> tuple[Array, Array, Array]:
+        """Rates and their derivatives; see :meth:`VectorField.derivatives`."""
         chosen = np.array(tuple(active), dtype=np.int64)
         n, d = x.shape
         f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(chosen)))
@@ -67,11 +69,13 @@ class FunctionField(VectorField):
         return f, J, P
 
     def forcing_period(self, values: Array) -> float | None:
+        """Period as the user gives it [s]; None where f does not depend on t."""
         if self._period is None:
             return None
         return float(self._period(dict(zip(self.parameters, values.tolist(), strict=True))))
 
     def state_scales(self, values: Array) -> Array:
+        """Typical sizes (d,) as the user gives them."""
         return self._scales
 
 

@@ -31,13 +31,13 @@ class VectorField(ABC):
 
     @abstractmethod
     def rates(self, t: Array, x: Array, values: Array) -> Array:
-        """f (N, d) at times t (N,) and states x (N, d), for parameter values (k,)."""
+        """Rates f (N, d) at times t (N,) and states x (N, d), for parameter values (k,)."""
 
     @abstractmethod
     def derivatives(
         self, t: Array, x: Array, values: Array, active: Iterable[int] = ()
     ) -> tuple[Array, Array, Array]:
-        """f (N, d), df/dx (N, d, d) and df/dp (N, d, a) to the parameters of indices ``active``.
+        """Rates f (N, d), df/dx (N, d, d) and df/dp (N, d, a) to parameters of indices ``active``.
 
         All are C-contiguous.
         """
@@ -47,7 +47,7 @@ class VectorField(ABC):
         return None
 
     def state_scales(self, values: Array) -> Array:
-        """Size (d,) below which a change of each state is small; ones where nothing is known."""
+        """Typical size (d,) of each state; ones where nothing is known."""
         return np.ones(self.dimension)
 
     @property
