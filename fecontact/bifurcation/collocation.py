@@ -2,31 +2,31 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation import elimination
+from fecontact.bifurcation.continuation import Problem
 from fecontact.bifurcation.interpolation import (
     Rule,
     at_points,
     equidistributed,
-    fill_residual,
+    extremes,
     interpolate,
     node_times,
     rule,
     to_nodes,
 )
+from fecontact.bifurcation.linearised import Linearised
 from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
 
-_DIFFERENCE = 1e-5  # relative step in a parameter that moves the period of the forcing
-
 
 @dataclass(frozen=True, eq=False)
-class Collocation:
+class Collocation(Problem):
     """Equations of a periodic orbit of x' = f(t, x, p), one parameter free.
 
     With time scaled to [0, 1], x is a polynomial of degree m on each of N intervals, continuous
@@ -50,6 +50,9 @@ class Collocation:
         m.
     reference : (N m, d) array
         Nodes of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        What counts as one in the length of a step: of each state (root mean square over the
+        orbit), of the period, of the parameter.
     periods : int
         Periods of the forcing in one of the orbit.
     age : int
@@ -64,9 +67,12 @@ class Collocation:
     mesh: Array
     degree: int
     reference: Array
+    scales: Array
     periods: int = 1
     age: int = 0
     renewal: int = 3
+
+    keeps_matrix: ClassVar[bool] = True
 
     @property
     def autonomous(self) -> bool:
@@ -140,15 +146,44 @@ class Collocation:
         values[self.free] = u[-1]
         return values
 
-    def linearise(self, u: Array) -> "Linearised":
+    def linearise(self, u: Array) -> Linearised:
         """Residual and linearisation at u; what is not asked for is not computed."""
         return Linearised(self, u)
 
     def weights(self) -> Array:
-        """Weights of the arclength: mean square of the states, and T and the parameter."""
-        scale = self.field.state_scales(self.values)
-        nodal = np.repeat(self.widths / self.degree, self.degree)[:, None] / scale**2
-        return np.concatenate([nodal.reshape(-1), np.full(self.common, 1.0)])
+        """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""
+        return self._weights
+
+    @cached_property
+    def _weights(self) -> Array:
+        d = self.field.dimension
+        times = np.repeat(self.widths / self.degree, self.degree)
+        nodal = (times[:, None] / self.scales[:d] ** 2).reshape(-1)
+        return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
+
+    def tests(
+        self, u: Array, linearisation: Linearised, tangent: Array
+    ) -> dict[str, float]:
+        """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
+        stability = linearisation.floquet
+        return {"period doubling": stability.doubling_test(), "torus": stability.torus_test(),
+                "branch point": linearisation.determinant()}
+
+    def point(self, u: Array, linearisation: Linearised, tangent: Array) -> dict[str, Any]:
+        """Period, stability, mesh and the extremes of the states."""
+        stability = linearisation.floquet
+        low, high = extremes(self.nodes(u), self.degree)
+        return {"period": self.period(u), "multipliers": stability.multipliers,
+                "unstable": stability.unstable, "trivial_error": stability.trivial_error,
+                "mesh": self.mesh, "minimum": low, "maximum": high}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Linearised, tangent: Array
+    ) -> dict[str, Any] | None:
+        """Details of a special point; None for a neutral saddle."""
+        from fecontact.bifurcation.orbit_normal_forms import examined
+
+        return examined(kind, self, u, linearisation)
 
     def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
@@ -162,171 +197,12 @@ class Collocation:
         """Problem, u and tangent on another mesh."""
         times = node_times(mesh, self.degree)
         moved = [np.concatenate([
-            interpolate(self.mesh, self.nodes(given), self.degree, times).reshape(-1),
+            interpolate(self.mesh, self.nodes(given), times).reshape(-1),
             given[self.size:]]) for given in (u, tangent)]
         problem = replace(self, mesh=mesh, age=0,
                           reference=moved[0][: len(times) * self.field.dimension].reshape(
                               len(times), -1).copy())
         return problem, moved[0], moved[1]
-
-
-class Linearised:
-    """Residual of the collocation equations at u, and solutions of systems with their derivative.
-
-    Residual: the collocation rows (N m d), interval by interval, Gauss point by Gauss point, and
-    the phase condition where the period is unknown.
-    """
-
-    def __init__(self, problem: Collocation, u: Array) -> None:
-        self.problem, self.u = problem, u
-        self._last: tuple[Array, float, Bordered] | None = None
-
-    @cached_property
-    def _points(self) -> tuple[Array, Array]:
-        return self.problem.at_gauss_points(self.problem.nodes(self.u))
-
-    @cached_property
-    def period(self) -> float:
-        """Period T [s]."""
-        return self.problem.period(self.u)
-
-    @cached_property
-    def residual(self) -> Array:
-        """Residual (N m d + 1,), without the last entry for forced systems."""
-        problem = self.problem
-        x, slopes = self._points
-        if "derivatives" in self.__dict__:
-            f = self.derivatives[0]
-        else:
-            f = problem.field.rates(problem.times * self.period, x, problem.parameters(self.u))
-        out = np.empty(problem.size + problem.common - 1)
-        fill_residual(slopes, f, problem.widths, self.period, out)
-        if problem.autonomous:
-            out[-1] = problem.phase_row @ self.u[: problem.size]
-        return out
-
-    @cached_property
-    def derivatives(self) -> tuple[Array, Array, Array]:
-        """Rates and their derivatives to state and parameter at the Gauss points."""
-        problem, T = self.problem, self.period
-        x, _ = self._points
-        values = problem.parameters(self.u)
-        f, J, P = problem.field.derivatives(problem.times * T, x, values, (problem.free,))
-        if not problem.autonomous:
-            self._add_forcing(x, values, P)
-        return f, J, P
-
-    def _add_forcing(self, x: Array, values: Array, P: Array) -> None:
-        """Let P be the derivative of T f(T tau, x, p) / T where the parameter moves T."""
-        problem, T = self.problem, self.period
-        h = _DIFFERENCE * max(abs(values[problem.free]), 1e-3)
-        sides = []
-        for sign in (1.0, -1.0):
-            beside = values.copy()
-            beside[problem.free] += sign * h
-            period = problem.field.forcing_period(beside)
-            assert period is not None
-            sides.append((beside, problem.periods * period))
-        if sides[0][1] == T == sides[1][1]:
-            return
-        up, down = (period * problem.field.rates(problem.times * period, x, beside)
-                    for beside, period in sides)
-        P[:, :, 0] = (up - down) / (2.0 * h * T)
-
-    @cached_property
-    def _factorised(self) -> tuple[elimination.Factors, float]:
-        problem = self.problem
-        f, J, P = self.derivatives
-        factors = elimination.factors_for(problem.intervals, problem.degree, f.shape[1],
-                                          problem.common)
-        sign = elimination.condense(J, f, P, problem.widths, self.period, problem.rule.values,
-                                    problem.rule.slopes, int(problem.autonomous), factors)
-        return factors, sign
-
-    @property
-    def factors(self) -> elimination.Factors:
-        """The condensed equations."""
-        return self._factorised[0]
-
-    @cached_property
-    def _phase(self) -> "Border":
-        row = np.concatenate([self.problem.phase_row, np.zeros(self.problem.common)])
-        return Border(self.factors, row)
-
-    def bordered(self, row: Array, closing: float = 1.0) -> "Bordered":
-        """The matrix [[G_u], [row]]; ``closing`` = -1 is for x(1) = -x(0)."""
-        if self._last is not None and self._last[0] is row and self._last[1] == closing:
-            return self._last[2]
-        borders = [self._phase] if self.problem.autonomous else []
-        bordered = Bordered(self.factors, [*borders, Border(self.factors, row)], closing)
-        self._last = row, closing, bordered
-        return bordered
-
-    def solve(self, row: Array, rhs: Array) -> Array:
-        """Solution of [[G_u], [row]] du = rhs.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the matrix is singular.
-        """
-        return self.bordered(row).solve(rhs)
-
-    def determinant(self, row: Array) -> float:
-        """A number with the sign of the determinant of [[G_u], [row]], zero with it."""
-        matrix = self.bordered(row).matrix
-        scale = np.abs(matrix).max(axis=1)
-        return self._factorised[1] * float(np.linalg.det(matrix / scale[:, None]))
-
-
-class Border:
-    """A further row, reduced to x_0, x_N and the common unknowns."""
-
-    def __init__(self, factors: elimination.Factors, row: Array) -> None:
-        N, _, _ = factors.local.shape
-        d = factors.end.shape[0]
-        self.local = np.empty((N, factors.local_pivots.shape[1]))
-        self.chain = np.empty((N - 1, d))
-        self.small = np.empty(factors.end.shape[1])
-        elimination.reduce_border(factors, row, self.local, self.chain, self.small)
-
-
-class Bordered:
-    """A bordered system, reduced to ``matrix`` [x_0, common] = side."""
-
-    def __init__(
-        self, factors: elimination.Factors, borders: list[Border], closing: float
-    ) -> None:
-        d = factors.end.shape[0]
-        small = np.vstack([factors.end, *(border.small for border in borders)])
-        self.matrix = np.hstack([small[:, :d] + closing * small[:, d : 2 * d], small[:, 2 * d :]])
-        self._factors, self._closing = factors, closing
-        self._local = np.array([border.local for border in borders])
-        self._chain = np.array([border.chain for border in borders])
-
-    def solve(self, rhs: Array) -> Array:
-        """All unknowns for a right side of all rows."""
-        N, size, _ = self._factors.local.shape
-        d = self._factors.end.shape[0]
-        parts = np.empty((N, size)), np.empty((N - 1, 2 * d))
-        side = np.empty(len(self.matrix))
-        elimination.reduce_side(self._factors, rhs, self._local, self._chain, *parts, side)
-        return self._expand(parts, np.linalg.solve(self.matrix, side))
-
-    def expand(self, solution: Array) -> Array:
-        """All unknowns from x_0 and the common ones where the right side is zero."""
-        N, size, _ = self._factors.local.shape
-        d = self._factors.end.shape[0]
-        return self._expand((np.zeros((N, size)), np.zeros((N - 1, 2 * d))), solution)
-
-    def _expand(self, parts: tuple[Array, Array], solution: Array) -> Array:
-        N, size, _ = self._factors.local.shape
-        d = self._factors.end.shape[0]
-        out = np.empty(N * size + len(solution) - d)
-        out[N * size :] = solution[d:]
-        elimination.expand(self._factors, *parts, solution[:d], self._closing * solution[:d],
-                           solution[d:], out[: N * size])
-        return out
 
 
 def require_mesh(intervals: int, degree: int) -> None:

@@ -39,6 +39,9 @@ class Linearisation(Protocol):
 class Problem(Protocol):
     """What is continued. Subclass it to get the defaults of the optional methods."""
 
+    # Whether Newton's method goes on with the matrix it has while that is good enough.
+    keeps_matrix: bool = False
+
     def linearise(self, u: Array) -> Linearisation:
         """The equations about u.
 
@@ -248,17 +251,23 @@ def _corrected(
     problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int
 ) -> tuple[Array, Linearisation, int] | None:
     """Newton's method at right angles to a row, from a guess; None where it does not converge."""
-    u, before = guess, np.inf
+    u, before, kept = guess, np.inf, None
     for count in range(1, iterations + 1):
         linearisation = problem.linearise(u)
         rhs = np.append(-linearisation.residual, -(row @ (u - guess)))
-        change = linearisation.solve(row, rhs)
+        change = (kept or linearisation).solve(row, rhs)
         size = _norm(problem, change)
         if not np.isfinite(size) or (count > 2 and size > before):
             return None
         u = u + change
-        if size <= tolerance * (1.0 + _norm(problem, u)):
+        scale = 1.0 + _norm(problem, u)
+        # With a matrix that is kept the error falls by the same factor each time, not squared.
+        if kept is not None and size * size / before <= max(1e-2 * tolerance, 1e-13) * scale:
+            return u, problem.linearise(u), max(1, count - 2)
+        if kept is None and size <= tolerance * scale:
             return u, linearisation, count
+        if problem.keeps_matrix:
+            kept = (kept or linearisation) if kept is None or size < 0.2 * before else None
         before = size
     return None
 

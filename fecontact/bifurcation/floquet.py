@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.collocation import Linearised
+from fecontact.bifurcation.elimination import Factors
 from fecontact.bifurcation.periodic_schur import eigenvalues_of_product, transitions
 from fecontact.errors import AnalysisError
 
@@ -70,8 +70,8 @@ class Floquet:
         return float(np.prod((product - 1.0) / (np.abs(product) + 1.0)).real)
 
 
-def floquet(linearised: Linearised) -> Floquet:
-    """Floquet multipliers of a periodic orbit found by collocation.
+def floquet_of(factors: Factors, autonomous: bool) -> Floquet:
+    """Floquet multipliers from the condensed equations of a periodic orbit.
 
     They are the eigenvalues of the product of the transitions over the intervals, found without
     multiplying these (see :mod:`fecontact.bifurcation.periodic_schur`): small and large ones
@@ -82,7 +82,6 @@ def floquet(linearised: Linearised) -> Floquet:
     AnalysisError
         If they cannot be found.
     """
-    factors = linearised.factors
     d = factors.end.shape[0]
     M = np.empty((len(factors.local), d, d))
     transitions(factors, M)
@@ -91,7 +90,5 @@ def floquet(linearised: Linearised) -> Floquet:
     except ArithmeticError as error:
         raise AnalysisError(f"The Floquet multipliers were not found ({error}); use more "
                             f"intervals.") from None
-    trivial = None
-    if linearised.problem.autonomous:
-        trivial = int(np.argmin(np.abs(multipliers - 1.0)))
+    trivial = int(np.argmin(np.abs(multipliers - 1.0))) if autonomous else None
     return Floquet(multipliers, trivial)

@@ -30,6 +30,8 @@ class Rule:
         Integrals of the basis polynomials.
     top : (m + 1,) array
         Derivatives of order m of the basis polynomials.
+    fine : (k, m + 1) array
+        The basis polynomials at many places in order.
     """
 
     points: Array
@@ -38,6 +40,7 @@ class Rule:
     slopes: Array
     node_weights: Array
     top: Array
+    fine: Array
 
 
 @cache
@@ -53,7 +56,8 @@ def rule(degree: int) -> Rule:
         np.array([[p(x) for p in basis] for x in points]),
         np.array([[p.deriv()(x) for p in basis] for x in points]),
         np.array([p.integ()(1.0) - p.integ()(0.0) for p in basis]),
-        np.array([p.deriv(degree)(0.0) for p in basis]))
+        np.array([p.deriv(degree)(0.0) for p in basis]),
+        np.array([[p(x) for p in basis] for x in np.linspace(0.0, 1.0, 8 * degree + 1)]))
 
 
 @kernel(types.void(matrix, matrix, matrix, matrix, matrix))
@@ -110,18 +114,86 @@ def to_nodes(at_points, values, widths, out):  # type: ignore[no-untyped-def]
                     out[node, i] += weight * at_points[row, i]
 
 
-def interpolate(mesh: Array, nodes: Array, degree: int, times: Array) -> Array:
+@kernel(types.void(vector, matrix, vector, matrix))
+def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
+    """Fill out (k, d); the times need not be in order."""
+    mesh, nodes, times, out = borrowed(mesh), borrowed(nodes), borrowed(times), borrowed(out)
+    N = len(mesh) - 1
+    total, d = nodes.shape
+    m = total // N
+    weights = np.empty(m + 1)
+    j = 0
+    for row in range(len(times)):
+        t = times[row]
+        while j > 0 and t < mesh[j]:
+            j -= 1
+        while j < N - 1 and t >= mesh[j + 1]:
+            j += 1
+        place = (t - mesh[j]) / (mesh[j + 1] - mesh[j]) * m
+        for k in range(m + 1):
+            weight = 1.0
+            for other in range(m + 1):
+                if other != k:
+                    weight *= (place - other) / (k - other)
+            weights[k] = weight
+        out[row] = 0.0
+        for k in range(m + 1):
+            node = j * m + k
+            if node == total:
+                node = 0
+            for i in range(d):
+                out[row, i] += weights[k] * nodes[node, i]
+
+
+def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
     """Values (k, d) at times (k,) in [0, 1] of the periodic solution with nodes (N m, d)."""
-    closed = np.concatenate([nodes, nodes[:1]])
-    interval = np.clip(np.searchsorted(mesh, times, side="right") - 1, 0, len(mesh) - 2)
-    place = (times - mesh[interval]) / np.diff(mesh)[interval]
-    grid = np.linspace(0.0, 1.0, degree + 1)
-    result = np.zeros((len(times), nodes.shape[1]))
-    for k in range(degree + 1):
-        others = np.delete(grid, k)
-        weight = np.prod((place[:, None] - others) / (grid[k] - others), axis=1)
-        result += weight[:, None] * closed[interval * degree + k]
+    result = np.empty((len(times), nodes.shape[1]))
+    _interpolate(mesh, nodes, times, result)
     return result
+
+
+@kernel(types.void(matrix, matrix, vector, vector))
+def _extremes(nodes, fine, low, high):  # type: ignore[no-untyped-def]
+    """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k places."""
+    nodes, fine = borrowed(nodes), borrowed(fine)
+    total, d = nodes.shape
+    m = fine.shape[1] - 1
+    for i in range(d):
+        low[i], high[i] = nodes[0, i], nodes[0, i]
+    for node in range(total):
+        for i in range(d):
+            low[i] = min(low[i], nodes[node, i])
+            high[i] = max(high[i], nodes[node, i])
+    values = np.empty(len(fine))
+    for i in range(d):
+        # The top of a polynomial lies near the highest of its nodes: only those intervals count.
+        margin = 0.02 * (high[i] - low[i])
+        top, bottom = high[i], low[i]
+        for j in range(total // m):
+            near = False
+            for k in range(m + 1):
+                value = nodes[(j * m + k) % total, i]
+                near = near or value > top - margin or value < bottom + margin
+            if not near:
+                continue
+            for row in range(len(fine)):
+                value = 0.0
+                for k in range(m + 1):
+                    value += fine[row, k] * nodes[(j * m + k) % total, i]
+                values[row] = value
+            for row in range(1, len(fine) - 1):
+                left, here, right = values[row - 1], values[row], values[row + 1]
+                bend = left - 2.0 * here + right
+                if (here - left) * (right - here) <= 0.0 and bend != 0.0:
+                    peak = here - (right - left) ** 2 / (8.0 * bend)
+                    high[i], low[i] = max(high[i], peak), min(low[i], peak)
+
+
+def extremes(nodes: Array, degree: int) -> tuple[Array, Array]:
+    """Smallest and largest value (d,) of each state over the orbit with nodes (N m, d)."""
+    low, high = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
+    _extremes(nodes, rule(degree).fine, low, high)
+    return low, high
 
 
 def node_times(mesh: Array, degree: int) -> Array:
