@@ -181,7 +181,7 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
 
 
 def doubled(
-    problem: Collocation, u: Array, tangent: Array | None = None, intervals: int | None = None
+    problem: Collocation, u: Array, intervals: int | None = None
 ) -> Start:
     """Orbits of twice the period, born at the period doubling u.
 
