@@ -30,8 +30,11 @@ class Bordered:
         small = np.vstack([factors.end, *(border.small for border in borders)])
         self.matrix = np.hstack([small[:, :d] + closing * small[:, d : 2 * d], small[:, 2 * d :]])
         self._factors, self._closing = factors, closing
-        self._local = np.array([border.local for border in borders])
-        self._chain = np.array([border.chain for border in borders])
+        count, N = len(borders), len(factors.local)
+        self._local = np.empty((count, N, factors.local_pivots.shape[1]))
+        self._chain = np.empty((count, N - 1, d))
+        for index, border in enumerate(borders):
+            self._local[index], self._chain[index] = border.local, border.chain
 
     def solve(self, rhs: Array) -> Array:
         """All unknowns for a right side of all rows."""

@@ -8,15 +8,19 @@ On the centre manifold, with time in periods of the orbit and its phase moving w
 where A = T df/dx along the orbit. The doubled orbit, or the torus, is stable and lies beyond the
 point if c, or Re D, is negative (supercritical); else it is unstable and lies before it. The
 coefficients follow from the terms up to third order (Kuznetsov, Govaerts, Doedel and Dhooge, SIAM
-J. Numer. Anal. 43, 2005), with the adjoint functions as left null vectors of the collocation
-equations. The second and third derivatives of f are differences of its Jacobian along directions.
+J. Numer. Anal. 43, 2005); what has to stand at right angles to the adjoint functions is found as the
+coefficient that makes the collocation equations solvable. The second and third derivatives of f are differences of its Jacobian along directions.
 """
 
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.bordered import Border, Bordered
+from fecontact.bifurcation.elimination import condense, factors_for
+from fecontact.bifurcation.interpolation import to_nodes
 from fecontact.bifurcation.linearised import Linearised
 
 if TYPE_CHECKING:
@@ -54,7 +58,7 @@ def examined(
             return None
         angle = float(np.angle(nearest))
         return {"kind": "Neimark-Sacker", "angle": angle,
-                **_judged(lambda step: Expansion(problem, u, linearised).torus(angle, step))}
+                **_judged(partial(Expansion(problem, u, linearised).torus, angle))}
     return {}
 
 
@@ -78,9 +82,9 @@ class Expansion:
         self._times = problem.times * self._T
         nodes = problem.nodes(u)
         self._x, slopes = problem.at_gauss_points(nodes)
-        scales = problem.scales[: nodes.shape[1]]
-        size = np.ptp(nodes, axis=0) / scales
-        self._range = np.maximum(size, 0.1 * size.max()) * scales
+        self._scales = problem.scales[: nodes.shape[1]]
+        size = np.ptp(nodes, axis=0) / self._scales
+        self._range = np.maximum(size, 0.1 * size.max()) * self._scales
         self._f, J, _ = linearised.derivatives
         self._J = self._T * J
         self._h = np.repeat(problem.widths, problem.degree)[:, None]
@@ -88,104 +92,106 @@ class Expansion:
 
     def doubling(self, step: float) -> float:
         """c of a period doubling, with differences over ``step``."""
-        v, left = self._null_vectors(0.0, -1.0)
-        V = self._at_points(v, -1.0).real
+        V = self._doubling_function
         bend = self._second(V, V, step)
-        h2, drift = self._response(bend, 2.0)
-        H = self._at_points(h2, 1.0).real
-        third = self._third(V, V, V, step) / 6.0 + self._second(H, V, step) / 2.0
-        third = third - drift * self._along(V, 0.0)
-        return float((self._projected(left, third) / self._projected(left, V)).real)
+        h2, drift = self._response(bend)
+        third = (self._third(V, V, V, step) / 6.0 + self._second(h2, V, step) / 2.0
+                 - drift / 2.0 * self._along(V))
+        return float(self._share(self._J, V[:, :, None], V, third, -1.0)[0])
 
     def torus(self, angle: float, step: float) -> float:
         """Re D of a Neimark-Sacker point with multipliers exp(+- i angle)."""
-        v, left = self._null_vectors(1j * angle, 1.0)
-        V = self._at_points(v, 1.0)
+        V = self._torus_function(angle)
         W = V.conj()
-        h11, drift = self._response(self._second(V, W, step), 1.0)
-        h20 = self._solve(self._matrix(2j * angle, 1.0), self._h * self._second(V, V, step))
-        third = (self._third(V, V, W, step) / 2.0
-                 + self._second(self._at_points(h11, 1.0), V, step)
-                 + self._second(self._at_points(h20, 1.0), W, step) / 2.0)
-        third = third - drift * self._along(V, 1j * angle)
-        return float((self._projected(left, third) / self._projected(left, V)).real)
+        h11, drift = self._response(self._second(V, W, step).real)
+        h20 = self._oscillating(2.0 * angle, self._second(V, V, step))
+        third = (self._third(V, V, W, step) / 2.0 + self._second(h11 + 0j, V, step)
+                 + self._second(h20, W, step) / 2.0
+                 - drift * (self._along(V) - 1j * angle * V))
+        columns = np.stack([_split(V), _split(1j * V)], axis=2)
+        return float(self._share(self._turned(angle), columns, _split(V), _split(third), 1.0)[0])
 
-    def _response(self, bend: Array, share: float) -> tuple[Array, float]:
-        """Periodic h with h' - A h = bend - share a x', and a: how the phase is sped up."""
-        matrix = self._matrix(0.0, 1.0)
-        if not self._problem.autonomous:
-            return self._solve(matrix, self._h * bend), 0.0
-        _, left = self._null_vectors(0.0, 1.0)
-        total = self._projected(left, bend) / self._projected(left, self._motion)
-        rest = self._h * (bend - total * self._motion)
-        shift = self._nodes_of_motion()
-        return self._bordered_solve(matrix, left, shift, rest), float(total.real) / share
+    @cached_property
+    def _doubling_function(self) -> Array:
+        """Eigenfunction of the multiplier -1 at the points (N m, d)."""
+        system = self._bordered(self._J, np.zeros((*self._x.shape, 0)), [], -1.0)
+        return self._normalised(self._function(system, -1.0))
 
-    def _nodes_of_motion(self) -> Array:
-        """x' as nodal values, the kernel of the periodic equations."""
-        v, _ = self._null_vectors(0.0, 1.0)
-        return v
+    def _torus_function(self, angle: float) -> Array:
+        """Eigenfunction v of the multiplier exp(i angle) at the points, complex (N m, d)."""
+        turned = self._turned(angle)
+        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [], 1.0)
+        return self._normalised(_joined(self._function(system, 1.0)))
 
-    def _along(self, V: Array, exponent: complex) -> Array:
-        return np.einsum("cij,cj->ci", self._J, V) - exponent * V
+    def _function(self, system: Bordered, closing: float) -> Array:
+        _, _, vectors = np.linalg.svd(system.matrix)
+        return self._at_points(system.expand(vectors[-1]), len(vectors[-1]), closing)
 
-    def _projected(self, left: Array, g: Array) -> complex:
-        return complex(left.conj() @ (self._h * g).reshape(-1))
+    def _normalised(self, V: Array) -> Array:
+        weights = (np.tile(self._problem.rule.weights, self._problem.intervals)[:, None] * self._h)
+        return V / np.sqrt(np.sum(weights * np.abs(V / self._scales) ** 2))
 
-    def _matrix(self, exponent: complex, closing: float) -> Any:
-        """Collocation rows of w' - A w + exponent w, with w(1) = closing w(0)."""
-        from scipy.sparse import csc_matrix
+    def _response(self, bend: Array) -> tuple[Array, float]:
+        """Periodic h with h' - A h = bend - a x' at the points, and a: how the phase is sped up."""
+        motion = self._motion[:, :, None] if self._problem.autonomous else np.zeros(
+            (*self._x.shape, 0))
+        rows = [np.append(self._problem.phase_row, 0.0)] if self._problem.autonomous else []
+        system = self._bordered(self._J, motion, rows, 1.0)
+        found = system.solve(np.append((self._h * bend).reshape(-1), np.zeros(len(rows))))
+        h = self._at_points(found[: self._x.size], self._x.shape[1], 1.0)
+        return h, float(found[-1]) if rows else 0.0
 
+    def _oscillating(self, angle: float, bend: Array) -> Array:
+        """Periodic h with h' + i angle h - A h = bend at the points, complex."""
+        turned = self._turned(angle)
+        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [], 1.0)
+        found = system.solve(_split(self._h * bend).reshape(-1))
+        return _joined(self._at_points(found, turned.shape[1], 1.0))
+
+    def _share(self, A: Array, columns: Array, kernel: Array, g: Array, closing: float) -> Array:
+        """Coefficients c with which w' - A w = g - columns c has a solution.
+
+        The equations without the columns have the solution ``kernel``.
+        """
+        problem, D = self._problem, A.shape[1]
+        row = np.empty((len(A), D))
+        to_nodes(np.ascontiguousarray(kernel), problem.rule.weights[:, None] * problem.rule.values,
+                 problem.widths, row)
+        if closing < 0.0:
+            row[0] = 0.0
+        rows = [np.append(row.reshape(-1), np.zeros(columns.shape[2]))]
+        if columns.shape[2] == 2:
+            other = _split(1j * _joined(row))
+            rows.append(np.append(other.reshape(-1), np.zeros(2)))
+        system = self._bordered(A, columns, rows, closing)
+        side = np.append((self._h * g).reshape(-1), np.zeros(len(rows)))
+        return system.solve(side)[len(A) * D :]
+
+    def _bordered(self, A: Array, columns: Array, rows: list[Array], closing: float) -> Bordered:
+        """Equations of w' - A w + columns c, with further rows and w(1) = closing w(0)."""
         problem = self._problem
-        rule, N, m, d = problem.rule, problem.intervals, problem.degree, self._x.shape[1]
-        h = problem.widths[:, None, None, None, None]
-        eye = np.eye(d)
-        inner = exponent * eye - self._J.reshape(N, m, 1, d, d)
-        blocks = (rule.slopes[None, :, :, None, None] * eye
-                  + h * rule.values[None, :, :, None, None] * inner)
-        blocks[-1, :, -1] *= closing
-        j, c, k, i, l = np.indices(blocks.shape, sparse=True)
-        rows = np.broadcast_to((j * m + c) * d + i, blocks.shape)
-        columns = np.broadcast_to((j * m + k) % (N * m) * d + l, blocks.shape)
-        return csc_matrix((blocks.reshape(-1), (rows.reshape(-1), columns.reshape(-1))),
-                          shape=(N * m * d, N * m * d))
+        N, m, (_, D, q) = problem.intervals, problem.degree, columns.shape
+        factors = factors_for(N, m, D, q)
+        condense(np.ascontiguousarray(A), np.zeros((N * m, D)), np.ascontiguousarray(-columns),
+                 problem.widths, 1.0, problem.rule.values, problem.rule.slopes, 0, factors)
+        return Bordered(factors, [Border(factors, row) for row in rows], closing)
 
-    def _null_vectors(self, exponent: complex, closing: float) -> tuple[Array, Array]:
-        """Right (N m d,) and left null vector of the matrix, by bordering."""
-        matrix = self._matrix(exponent, closing)
-        size = matrix.shape[0]
-        rng = np.random.default_rng(0)
-        right, left = rng.normal(size=size) + 0j, rng.normal(size=size) + 0j
-        for _ in range(3):
-            factors = _factors(matrix, left, right)
-            unit = np.zeros(size + 1, dtype=complex)
-            unit[-1] = 1.0
-            right, left = factors.solve(unit)[:-1], factors.solve(unit, trans="H")[:-1]
-            right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
-        points = self._at_points(right, closing)
-        scales = self._problem.scales[: points.shape[1]]
-        mean = np.sum(np.repeat(self._problem.widths, self._problem.degree)[:, None]
-                      * np.abs(points / scales) ** 2
-                      * np.tile(self._problem.rule.weights, self._problem.intervals)[:, None])
-        if exponent == 0.0:
-            right = right / (right[np.argmax(np.abs(right))] / np.abs(right).max())
-        return right / np.sqrt(mean), left
+    def _turned(self, angle: float) -> Array:
+        """A - i angle as a real matrix of twice the size."""
+        n, d, _ = self._J.shape
+        result = np.zeros((n, 2 * d, 2 * d))
+        result[:, :d, :d] = result[:, d:, d:] = self._J
+        result[:, :d, d:] = angle * np.eye(d)
+        result[:, d:, :d] = -angle * np.eye(d)
+        return result
 
-    @staticmethod
-    def _solve(matrix: Any, rhs: Array) -> Array:
-        from scipy.sparse.linalg import splu
+    def _along(self, V: Array) -> Array:
+        return np.einsum("cij,cj->ci", self._J, V)
 
-        return np.asarray(splu(matrix.astype(complex)).solve(rhs.reshape(-1).astype(complex)))
-
-    @staticmethod
-    def _bordered_solve(matrix: Any, left: Array, right: Array, rhs: Array) -> Array:
-        side = np.append(rhs.reshape(-1), 0.0).astype(complex)
-        return np.asarray(_factors(matrix, left, right).solve(side)[:-1])
-
-    def _at_points(self, nodes: Array, closing: float) -> Array:
+    def _at_points(self, nodes: Array, D: int, closing: float) -> Array:
         problem = self._problem
         m = problem.degree
-        shaped = nodes.reshape(-1, self._x.shape[1])
+        shaped = nodes[: len(self._x) * D].reshape(-1, D)
         closed = np.concatenate([shaped, closing * shaped[:1]])
         patches = closed[np.arange(problem.intervals)[:, None] * m + np.arange(m + 1)]
         return np.einsum("ck,jkd->jcd", problem.rule.values, patches).reshape(shaped.shape)
@@ -229,10 +235,11 @@ class Expansion:
         return np.asarray((16.0 * near - far - 30.0 * self._J) / (12.0 * h * h))
 
 
-def _factors(matrix: Any, left: Array, right: Array) -> Any:
-    """Factors of [[matrix, left], [right^H, 0]]."""
-    from scipy.sparse import bmat
-    from scipy.sparse.linalg import splu
+def _split(V: Array) -> Array:
+    """Real and imaginary parts side by side."""
+    return np.concatenate([V.real, V.imag], axis=-1)
 
-    return splu(bmat([[matrix, left[:, None]], [right.conj()[None], None]],
-                     format="csc").astype(complex))
+
+def _joined(V: Array) -> Array:
+    half = V.shape[-1] // 2
+    return V[..., :half] + 1j * V[..., half:]
