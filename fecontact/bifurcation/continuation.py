@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.branch import BranchPoint, Status
-from fecontact.errors import FecontactError, InputError, require_positive
+from fecontact.errors import AnalysisError, FecontactError, InputError, require_positive
 
 Array = NDArray[np.float64]
 
@@ -218,8 +218,8 @@ def continuation(
         if adapted is not None:
             problem, moved, turned = adapted
             turned = turned / _norm(problem, turned)
+            fixed_mesh = fixed_mesh and np.array_equal(moved, here.u)
             here = _Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
-            fixed_mesh = False
     return End(Status.POINTS)
 
 
@@ -279,7 +279,11 @@ def _finished(
     unit = np.zeros(len(u))
     unit[-1] = 1.0
     tangent = linearisation.solve(row, unit)
-    tangent = tangent / _norm(problem, tangent)
+    size = _norm(problem, tangent)
+    if not (np.isfinite(size) and size > 0.0):
+        raise AnalysisError("The branch has no direction there: its equations grow beyond all "
+                            "numbers.")
+    tangent = tangent / size
     values = problem.point(u, linearisation, tangent)
     return _Solution(u, linearisation, tangent, iterations, values,
                      _tests(problem, u, linearisation, tangent, values, settings))
@@ -402,7 +406,9 @@ def _zero(
                            2 * settings.iterations)
         if found is None:
             raise _LostError
-        at = _finished(problem, *found, row, settings)
+        # The test functions are those of this very point, not of the last Newton step.
+        u, _, count = found
+        at = _finished(problem, u, problem.linearise(u), count, row, settings)
         result = test(at)
         best.append((abs(result), at))
         return result
@@ -421,4 +427,5 @@ class _LostError(Exception):
 
 
 def _norm(problem: Problem, vector: Array) -> float:
-    return float(np.sqrt(problem.weights() * vector @ vector))
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.sqrt(problem.weights() * vector @ vector))
