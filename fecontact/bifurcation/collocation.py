@@ -59,6 +59,8 @@ class Collocation(Problem):
         Steps since the mesh was made.
     renewal : int
         Steps from one mesh to the next, 0 for never.
+    limits : (d,) array, optional
+        Up to these the scales of the states grow with the orbit; without limits they stay.
     """
 
     field: VectorField
@@ -71,6 +73,7 @@ class Collocation(Problem):
     periods: int = 1
     age: int = 0
     renewal: int = 3
+    limits: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -187,11 +190,21 @@ class Collocation(Problem):
 
     def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
-        age = self.age + 1
-        if not self.renewal or age < self.renewal:
-            return replace(self, reference=self.nodes(u).copy(), age=age), u, tangent
-        mesh = equidistributed(self.mesh, self.nodes(u), self.degree, self.intervals)
-        return self.on_mesh(mesh, u, tangent)
+        problem = replace(self, age=self.age + 1, scales=self._grown(u))
+        if self.renewal and problem.age >= self.renewal:
+            mesh = equidistributed(self.mesh, self.nodes(u), self.degree, self.intervals)
+            return problem.on_mesh(mesh, u, tangent)
+        return replace(problem, reference=self.nodes(u).copy()), u, tangent
+
+    def _grown(self, u: Array) -> Array:
+        """Scales of states, period and parameter, larger where the orbit has outgrown them."""
+        d = self.field.dimension
+        if self.limits is None:
+            return self.scales
+        larger = np.clip(np.ptp(self.nodes(u), axis=0) / 2.0, self.scales[:d], self.limits)
+        if (larger <= 1.5 * self.scales[:d]).all():
+            return self.scales
+        return np.concatenate([larger, self.scales[d:]])
 
     def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """Problem, u and tangent on another mesh."""

@@ -20,14 +20,25 @@ _CORRECTIONS = 25
 
 
 def from_hopf(
-    field: VectorField, values: Array, free: int, state: Array,
-    angular_frequency: float, vector: ArrayLike, intervals: int = 50, degree: int = 4,
-    scales: Array | None = None, amplitude: float = 1e-3,
+    field: VectorField, values: Array, free: int, state: Array, angular_frequency: float,
+    vector: ArrayLike, intervals: int, degree: int, scales: Array, amplitude: float = 1e-3,
 ) -> Start:
     """Orbits that are born at a Hopf point, x = state + eps Re(vector exp(i w t)).
 
-    ``vector`` (d,) is the complex eigenvector of the pair on the imaginary axis, ``state`` the
-    equilibrium. ``amplitude`` is that of the first guess, in the problem's inner product.
+    Parameters
+    ----------
+    field, values, free
+        Parameter values (k,) at the Hopf point, and the index of the free one.
+    state : (d,) array
+        The equilibrium.
+    angular_frequency, vector
+        w and the complex eigenvector (d,) of the pair on the imaginary axis.
+    intervals, degree : int
+        Collocation at ``degree`` points on each of so many intervals.
+    scales : (d + 1,) array
+        What counts as one in the length of a step: for the states and the parameter.
+    amplitude : float
+        That of the first guess, in the problem's inner product.
 
     Raises
     ------
@@ -41,7 +52,7 @@ def from_hopf(
     shape = np.array((np.exp(phase)[:, None] * np.asarray(vector)).real, order="C")
     period = 2.0 * np.pi / angular_frequency
     problem = Collocation(field, values.copy(), free, mesh, degree, shape,
-                          _scales(field, values, period, scales))
+                          _with_period(scales, period))
     leaving = np.concatenate([shape.reshape(-1), [0.0, 0.0]])
     leaving /= np.sqrt(problem.weights() @ leaving**2)
     u = np.concatenate([np.tile(np.asarray(state, dtype=float), len(shape)),
@@ -52,8 +63,7 @@ def from_hopf(
 
 def from_samples(
     field: VectorField, values: Array, free: int, times: ArrayLike, states: ArrayLike,
-    period: float | None = None, intervals: int = 50, degree: int = 4, periods: int = 1,
-    scales: Array | None = None,
+    period: float | None, intervals: int, degree: int, periods: int, scales: Array,
 ) -> tuple[Collocation, Array]:
     """Problem and first guess from a nearly periodic motion.
 
@@ -61,9 +71,11 @@ def from_samples(
     ----------
     times, states : (k,) and (k, d) array
         Samples over at least one period; the last period counts.
-    period : float, optional
-        Period of the motion [s]; without it the last return to where the motion ends. Forced
+    period : float or None
+        Period of the motion [s]; None is the last return to where the motion ends. Forced
         systems take ``periods`` times the period of the forcing.
+
+    The others are those of :func:`from_hopf`.
 
     Raises
     ------
@@ -84,30 +96,25 @@ def from_samples(
     if t[-1] - t[0] < T * (1.0 - 1e-9):
         raise InputError(f"The samples cover {t[-1] - t[0]:g} s, but the period is {T:g} s; give "
                          f"at least one period.")
-    # Forced systems need the true time: the orbit starts at a multiple of the period.
-    start = T * np.floor((t[-1] - T * (1.0 - 1e-9)) / T) if forcing is not None else t[-1] - T
-    if start < t[0] - 1e-9 * T:
-        start = t[-1] - T
-    mesh = np.linspace(0.0, 1.0, 4 * intervals + 1)
+    # The phase of forced systems counts from t = 0.
+    phases = node_times(np.linspace(0.0, 1.0, 4 * intervals + 1), degree)
 
-    def sampled(mesh: Array) -> Array:
-        place = start + T * node_times(mesh, degree)
-        place = np.where(place > t[-1], place - T, place)
+    def sampled(phases: Array) -> Array:
+        offset = 0.0 if forcing is not None else t[-1] / T
+        place = t[-1] - T * np.mod(t[-1] / T - offset - phases, 1.0)
         return np.stack([np.interp(place, t, column) for column in x.T], axis=1)
 
-    mesh = equidistributed(mesh, sampled(mesh), degree, intervals)
-    nodes = sampled(mesh)
+    mesh = equidistributed(np.linspace(0.0, 1.0, 4 * intervals + 1), sampled(phases), degree,
+                           intervals)
+    nodes = sampled(node_times(mesh, degree))
     problem = Collocation(field, values.copy(), free, mesh, degree, nodes,
-                          _scales(field, values, T, scales), periods)
+                          _with_period(scales, T), periods)
     return problem, np.concatenate([nodes.reshape(-1), [T] if forcing is None else [],
                                     [values[free]]])
 
 
-def _scales(field: VectorField, values: Array, period: float, given: Array | None) -> Array:
-    """Scales (d + 2,) of states, period and parameter; ``given`` are those of states, parameter."""
-    if given is None:
-        given = np.append(field.state_scales(values), 1.0)
-    return np.concatenate([given[:-1], [period, given[-1]]])
+def _with_period(scales: Array, period: float) -> Array:
+    return np.concatenate([scales[:-1], [period, scales[-1]]])
 
 
 def _return_time(t: Array, x: Array) -> float:

@@ -10,85 +10,99 @@ from fecontact.bifurcation import orbit_starts
 from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.continuation import Settings
+from fecontact.bifurcation.equilibria import Equilibrium
+from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.vector_field import VectorField
-from fecontact.errors import InputError
+from fecontact.errors import InputError, require_positive
 
 Array = NDArray[np.float64]
 
 
 def orbits_from_hopf(
-    field: VectorField, name: str, values: Array, state: Array, settings: Settings, *,
-    intervals: int = 50, degree: int = 4, scales: ArrayLike | None = None,
+    field: VectorField, branch: Branch, point: BranchPoint, *, settings: Settings | None = None,
+    bounds: tuple[float, float] | None = None, intervals: int = 50, degree: int = 4,
+    scales: ArrayLike | None = None, width: float | None = None,
 ) -> Branch:
     """The branch of orbits that is born at a Hopf point.
 
     Parameters
     ----------
     field : VectorField
-    name : str
-        The parameter.
-    values : (k,) array
-        All parameters at the Hopf point.
-    state : (d,) array
-        The equilibrium there; its Jacobian has a pair i w, whose eigenvector gives the first
-        orbits.
-    settings : Settings
+    branch, point : Branch, BranchPoint
+        A branch of equilibria, and a special point of the kind 'Hopf' on it.
+    settings : Settings, optional
         How the branch is followed.
+    bounds : (float, float), optional
+        Range of the parameter, as in the settings.
     intervals, degree : int
         Collocation at ``degree`` Gauss points on each of so many intervals.
-    scales : (d + 1,) sequence, optional
-        What counts as one in the length of a step: amplitudes of the states, and the parameter.
-        Without it those of the field, and the width of the settings' bounds.
+    scales : (d,) sequence, optional
+        Amplitudes of the states that count as one in the length of a step. Without them they are
+        those of the field, and grow with the orbits.
+    width : float, optional
+        Width of the diagram in the parameter; by default that of the bounds.
 
     Returns
     -------
     Branch
-        Stored of each orbit: period, Floquet multipliers, number outside the unit circle, mesh,
-        minimum and maximum of each state. Special points: 'fold', 'period doubling',
-        'Neimark-Sacker', 'branch point'.
+        Stored of each orbit: 'period' [s], 'multipliers' (d,), 'unstable' (number of those
+        outside the unit circle), 'trivial_error' (distance from one of the multiplier that is
+        one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
+
+        - 'fold',
+        - 'period doubling' and 'Neimark-Sacker': with coefficient and criticality, see
+          :mod:`fecontact.bifurcation.orbit_normal_forms`,
+        - 'branch point': where two branches of orbits cross.
 
     Raises
     ------
     InputError
-        If the Jacobian has no pair near the imaginary axis, or there are no orbits near.
+        If the point is no Hopf point, or there are no orbits near it.
     """
-    free = field.index(name)
-    _, J, _ = field.derivatives(np.zeros(1), np.array([state], dtype=float), values)
-    roots, vectors = np.linalg.eig(J[0])
-    pairs = np.flatnonzero(roots.imag > 0.0)
-    if not len(pairs):
-        raise InputError(f"At {name} = {values[free]:.6g} no eigenvalues of the equilibrium are "
-                         f"complex; orbits are born at Hopf points.")
-    best = pairs[np.argmin(np.abs(roots[pairs].real))]
-    if abs(roots[best].real) > 1e-4 * abs(roots[best]):
-        raise InputError(f"At {name} = {values[free]:.6g} the eigenvalue nearest the imaginary "
-                         f"axis is {roots[best]:.6g}; this is no Hopf point.")
-    start = orbit_starts.from_hopf(field, values, free, state, float(roots[best].imag),
-                                   vectors[:, best], intervals, degree,
-                                   _scales(field, values, settings, scales))
-    return _followed(start, settings)
+    if point.kind != "Hopf":
+        raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is "
+                         f"{point.kind or 'a regular point'!r}, but orbits are born at points of "
+                         f"the kind 'Hopf'.")
+    free = field.index(branch.name)
+    values = np.array(branch.attributes["parameter_values"], dtype=float)
+    values[free] = point.parameter
+    state = np.ascontiguousarray(point.u[:-1])
+    chosen = _settings(settings, bounds)
+    sizes, limits = _sizes(scales, default_scales(Equilibrium(field, values, state)))
+    start = orbit_starts.from_hopf(
+        field, values, free, state, float(point.details["angular_frequency"]),
+        point.details["eigenvector"], intervals, degree,
+        np.append(sizes, _width(width, chosen, point.parameter)))
+    return _followed(start, chosen, limits)
 
 
 def orbits_from_motion(
-    field: VectorField, name: str, values: Array, times: ArrayLike, states: ArrayLike,
-    settings: Settings, *, period: float | None = None, periods: int = 1, intervals: int = 50,
-    degree: int = 4, scales: ArrayLike | None = None, direction: float = 1.0, both: bool = False,
+    field: VectorField, parameter: str, times: ArrayLike, states: ArrayLike, *,
+    values: ArrayLike | None = None, period: float | None = None, periods: int = 1,
+    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
+    intervals: int = 50, degree: int = 4, scales: ArrayLike | None = None,
+    width: float | None = None, direction: float = 1.0, both: bool = False,
 ) -> Branch:
     """The branch through the orbit to which a motion has settled.
 
     Parameters
     ----------
+    parameter : str
+        The one that is varied.
     times, states : (k,) and (k, d) array
         The motion, over at least one period; its end counts.
+    values : (k,) sequence, optional
+        Parameters of the motion, the base values of the field by default.
     period : float, optional
         Its period [s]; without it the last return to where the motion ends.
     periods : int
         Periods of the forcing in one of the orbit, for forced systems.
     direction, both
-        See :func:`fecontact.bifurcation.follow.follow`.
+        Sign of the first change of the parameter; whether to go to both sides.
 
-    Other parameters and the result are those of :func:`orbits_from_hopf`.
+    Other parameters and the result are those of :func:`orbits_from_hopf`; the scales are the
+    amplitudes of the motion by default.
 
     Raises
     ------
@@ -97,23 +111,27 @@ def orbits_from_motion(
     AnalysisError
         If Newton's method finds no orbit near them.
     """
-    free = field.index(name)
-    problem, u = orbit_starts.from_samples(
-        field, values, free, times, states, period, intervals, degree, periods,
-        _scales(field, values, settings, scales))
-    problem, u = orbit_starts.corrected(problem, u)
-    return _followed((problem, u, None), settings, direction=direction, both=both)
+    free = field.index(parameter)
+    given = field.values if values is None else np.array(values, dtype=float)
+    chosen = _settings(settings, bounds)
+    amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
+    sizes, limits = _sizes(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
+    problem, u = orbit_starts.corrected(*orbit_starts.from_samples(
+        field, given, free, times, states, period, intervals, degree, periods,
+        np.append(sizes, _width(width, chosen, given[free]))))
+    return _followed((problem, u, None), chosen, limits, direction=direction, both=both)
 
 
 def orbits_beyond(
-    field: VectorField, branch: Branch, point: BranchPoint, settings: Settings, *,
-    intervals: int | None = None, direction: float = 1.0,
+    field: VectorField, branch: Branch, point: BranchPoint, *, settings: Settings | None = None,
+    bounds: tuple[float, float] | None = None, intervals: int | None = None,
+    direction: float = 1.0,
 ) -> Branch:
     """The other branch at a special point of a branch of orbits.
 
     At a 'period doubling' it is that of the orbits of twice the period (with twice the intervals,
     unless ``intervals`` says otherwise), at a 'branch point' the one that crosses. ``direction``
-    chooses the half of a branch that crosses.
+    chooses the half of a branch that crosses. The others are those of :func:`orbits_from_hopf`.
 
     Raises
     ------
@@ -121,17 +139,18 @@ def orbits_beyond(
         If no other orbits begin at a point of this kind.
     """
     problem, u, tangent = restored(field, branch, point)
+    chosen = _settings(settings, bounds)
     if point.kind == "period doubling":
-        start = orbit_starts.doubled(problem, u, intervals)
+        problem, u, tangent = orbit_starts.doubled(problem, u, intervals)
     elif point.kind == "branch point":
-        start = orbit_starts.crossing(problem, u, tangent)
+        problem, u, tangent = orbit_starts.crossing(problem, u, tangent)
     else:
-        raise InputError(f"At the point of kind {point.kind!r} no other orbits begin; choose one "
-                         f"of kind 'period doubling' or 'branch point'.")
-    problem, u, tangent = start
+        raise InputError(f"At the point at {branch.name} = {point.parameter:.6g}, "
+                         f"{point.kind or 'a regular point'!r}, no other orbits begin; choose one "
+                         f"of the kind 'period doubling' or 'branch point'.")
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
-    # A little off the point, where the branches are apart.
-    return _followed((problem, u + settings.step * tangent, tangent), settings)
+    # The first step leaves the point, where the branches cannot be told apart.
+    return _followed((problem, u + chosen.step * tangent, tangent), chosen, None)
 
 
 def restored(
@@ -139,9 +158,10 @@ def restored(
 ) -> tuple[Collocation, Array, Array]:
     """Problem, unknowns and tangent of a point of a branch of orbits, to go on from."""
     known = branch.attributes
-    if "values" not in known or "mesh" not in point.values:
+    if "degree" not in known or "mesh" not in point.values:
         raise InputError("The branch is not one of periodic orbits.")
-    mesh, values = np.asarray(point.values["mesh"]), np.array(known["values"], dtype=float)
+    mesh, values = np.asarray(point.values["mesh"]), np.array(known["parameter_values"],
+                                                                  dtype=float)
     values[field.index(branch.name)] = point.parameter
     degree, d = int(known["degree"]), field.dimension
     nodes = point.u[: (len(mesh) - 1) * degree * d].reshape(-1, d).copy()
@@ -150,25 +170,40 @@ def restored(
     return problem, point.u, point.tangent
 
 
-def _scales(
-    field: VectorField, values: Array, settings: Settings, given: ArrayLike | None
-) -> Array:
+def _settings(settings: Settings | None, bounds: tuple[float, float] | None) -> Settings:
+    chosen = settings or Settings()
+    return chosen if bounds is None else replace(chosen, bounds=bounds)
+
+
+def _sizes(given: ArrayLike | None, found: Array) -> tuple[Array, Array | None]:
+    """Scales (d,) of the states, and up to where they grow with the orbit."""
+    if given is None:
+        return found, 100.0 * found
+    sizes = np.asarray(given, dtype=float)
+    if sizes.shape != found.shape or not (sizes > 0.0).all():
+        raise InputError(f"scales = {given!r} must hold {len(found)} numbers above zero, one for "
+                         f"each state.")
+    return sizes, None
+
+
+def _width(given: float | None, settings: Settings, value: float) -> float:
     if given is not None:
-        scales = np.asarray(given, dtype=float)
-        if scales.shape != (field.dimension + 1,) or not (scales > 0.0).all():
-            raise InputError(f"scales = {given!r} must hold {field.dimension + 1} numbers above "
-                             f"zero: one for each state, and one for the parameter.")
-        return scales
-    width = settings.bounds[1] - settings.bounds[0]
-    return np.append(field.state_scales(values), width if np.isfinite(width) else 1.0)
+        require_positive("orbits", width=given)
+        return given
+    span = settings.bounds[1] - settings.bounds[0]
+    return float(span) if np.isfinite(span) else abs(float(value)) or 1.0
 
 
 def _followed(
-    start: tuple[Collocation, Array, Array | None], settings: Settings, **options: Any
+    start: tuple[Collocation, Array, Array | None], settings: Settings, limits: Array | None,
+    **options: Any,
 ) -> Branch:
     problem, u, tangent = start
-    attributes: dict[str, Any] = {"values": problem.values, "scales": problem.scales,
-                                  "degree": problem.degree, "periods": problem.periods}
-    branch = follow(problem, u, settings, name=list(problem.field.parameters)[problem.free],
-                    tangent=tangent, attributes=attributes, **options)
-    return replace(branch, attributes=attributes)
+    field = problem.field
+    attributes: dict[str, Any] = {
+        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
+        "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
+        "periods": problem.periods}
+    return follow(replace(problem, limits=limits), u, settings,
+                  name=list(field.parameters)[problem.free], tangent=tangent,
+                  attributes=attributes, **options)
