@@ -72,7 +72,7 @@ class Collocation(Problem):
     scales: Array
     periods: int = 1
     age: int = 0
-    renewal: int = 3
+    renewal: int = 1
     limits: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True

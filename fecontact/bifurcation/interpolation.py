@@ -201,6 +201,38 @@ def node_times(mesh: Array, degree: int) -> Array:
     return (mesh[:-1, None] + np.diff(mesh)[:, None] * np.arange(degree) / degree).reshape(-1)
 
 
+@kernel(types.void(vector, matrix, vector, vector))
+def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
+    """Fill share (N,) with h |x^(m+1)|^(1/(m+1)) of each interval."""
+    mesh, nodes, top, share = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(share)
+    N = len(share)
+    total, d = nodes.shape
+    m = total // N
+    derivative, steep = np.empty(N), np.zeros(N)
+    for i in range(d):
+        low, high = nodes[0, i], nodes[0, i]
+        for node in range(total):
+            low, high = min(low, nodes[node, i]), max(high, nodes[node, i])
+        if high <= low:
+            continue
+        for j in range(N):
+            value = 0.0
+            for k in range(m + 1):
+                value += top[k] * nodes[(j * m + k) % total, i]
+            derivative[j] = value / (mesh[j + 1] - mesh[j]) ** m
+        for j in range(N):
+            after = (j + 1) % N
+            spacing = (mesh[j + 1] - mesh[j] + mesh[after + 1] - mesh[after]) / 2.0
+            jump = abs(derivative[after] - derivative[j]) / (spacing * (high - low))
+            steep[j] += jump / 2.0
+            steep[after] += jump / 2.0
+    for j in range(N):
+        steep[j] = steep[j] ** (1.0 / (m + 1))
+    for j in range(N):
+        mean = (steep[j - 1] + 2.0 * steep[j] + steep[(j + 1) % N]) / 4.0
+        share[j] = mean * (mesh[j + 1] - mesh[j])
+
+
 def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> Array:
     """A mesh on which each interval has the same share of the error of interpolation.
 
@@ -209,17 +241,8 @@ def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> A
     Each state counts by its own range over the orbit.
     """
     widths = np.diff(mesh)
-    scale = np.ptp(nodes, axis=0)
-    scale = np.maximum(scale, 1e-6 * scale.max() + 1e-300)
-    closed = np.concatenate([nodes, nodes[:1]]) / scale
-    N = len(widths)
-    patches = closed[np.arange(N)[:, None] * degree + np.arange(degree + 1)]
-    top = np.einsum("k,jkd->jd", rule(degree).top, patches) / widths[:, None]**degree
-    jumps = np.roll(top, -1, axis=0) - top
-    spacing = (widths + np.roll(widths, -1)) / 2.0
-    steep = np.abs(jumps / spacing[:, None])
-    size = np.sum((steep + np.roll(steep, 1, axis=0)) / 2.0, axis=1)**(1.0 / (degree + 1))
-    share = widths * size
+    share = np.zeros(len(widths))
+    _monitor(mesh, nodes, rule(degree).top, share)
     total = share.sum()
     if not 0.0 < total < np.inf:
         return np.linspace(0.0, 1.0, intervals + 1)

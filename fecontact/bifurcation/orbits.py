@@ -9,14 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.bifurcation import orbit_starts
 from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.bifurcation.collocation import Collocation
-from fecontact.bifurcation.continuation import Settings
+from fecontact.bifurcation.continuation import Settings, continuation
 from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
+from fecontact.bifurcation.interpolation import equidistributed
 from fecontact.bifurcation.vector_field import VectorField
-from fecontact.errors import InputError, require_positive
+from fecontact.errors import FecontactError, InputError, require_positive
 
 Array = NDArray[np.float64]
+
+# Special points of a branch, and the distance to both sides over which they are located again.
+_KINDS = ("fold", "period doubling", "Neimark-Sacker", "branch point")
+_NEAR = 1e-3
 
 
 def orbits_from_hopf(
@@ -204,6 +209,25 @@ def _followed(
         "state_names": list(field.state_names), "parameter_names": list(field.parameters),
         "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
         "periods": problem.periods}
-    return follow(replace(problem, limits=limits), u, settings,
-                  name=list(field.parameters)[problem.free], tangent=tangent,
-                  attributes=attributes, **options)
+    name = list(field.parameters)[problem.free]
+    branch = follow(replace(problem, limits=limits), u, settings, name=name, tangent=tangent,
+                    attributes=attributes, **options)
+    points = tuple(_sharpened(field, branch, point) if point.kind in _KINDS else point
+                   for point in branch.points)
+    return replace(branch, points=points)
+
+
+def _sharpened(field: VectorField, branch: Branch, point: BranchPoint) -> BranchPoint:
+    """A special point located once more, on the mesh that suits its own orbit."""
+    problem, u, tangent = restored(field, branch, point)
+    mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, problem.intervals)
+    problem, u, tangent = problem.on_mesh(mesh, u, tangent)
+    settings = Settings(step=2.0 * _NEAR, largest_step=2.0 * _NEAR, points=2)
+    try:
+        for found in continuation(replace(problem, renewal=0), u - _NEAR * tangent, settings,
+                                  tangent=tangent):
+            if found.kind == point.kind:
+                return found
+    except FecontactError:
+        pass
+    return point
