@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation import elimination
+from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]
 
@@ -37,13 +38,22 @@ class Bordered:
             self._local[index], self._chain[index] = border.local, border.chain
 
     def solve(self, rhs: Array) -> Array:
-        """All unknowns for a right side of all rows."""
+        """All unknowns for a right side of all rows.
+
+        Raises
+        ------
+        AnalysisError
+            If the matrix is singular.
+        """
         N, size, _ = self._factors.local.shape
         d = self._factors.end.shape[0]
         parts = np.empty((N, size)), np.empty((N - 1, 2 * d))
         side = np.empty(len(self.matrix))
         elimination.reduce_side(self._factors, rhs, self._local, self._chain, *parts, side)
-        return self._expand(parts, np.linalg.solve(self.matrix, side))
+        try:
+            return self._expand(parts, np.linalg.solve(self.matrix, side))
+        except np.linalg.LinAlgError:
+            raise AnalysisError("The equations of the orbit are singular there.") from None
 
     def expand(self, solution: Array) -> Array:
         """All unknowns from x_0 and the common ones where the right side is zero."""

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation import Problem
+from fecontact.bifurcation.problem import Problem
 from fecontact.bifurcation.interpolation import (
     Rule,
     at_points,

@@ -173,10 +173,10 @@ def newton(field: VectorField, start: Array, values: Array, tolerance: float) ->
             step = np.linalg.solve(J[0], -f[0])
         except np.linalg.LinAlgError:
             step = np.linalg.lstsq(J[0], -f[0], rcond=None)[0]
-        size = np.linalg.norm(step)
+        size = float(np.linalg.norm(step))
         if not np.isfinite(size):
             return None
-        if size <= max(tolerance * np.linalg.norm(x), least):
+        if size <= max(tolerance * float(np.linalg.norm(x)), least):
             return np.asarray(x + step)
         part = 1.0
         while part > 1e-6:

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
-from fecontact.bifurcation.continuation import End, Problem, Settings, continuation, start_of
+from fecontact.bifurcation.continuation import End, continuation, start_of
+from fecontact.bifurcation.problem import Problem, Settings
 from fecontact.console import progress_bar
 
 Array = NDArray[np.float64]

@@ -116,7 +116,7 @@ class Linearised:
 
         Raises
         ------
-        numpy.linalg.LinAlgError
+        AnalysisError
             If the matrix is singular.
         """
         return self.bordered(row).solve(rhs)

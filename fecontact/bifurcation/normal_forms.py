@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.directional import bend
 from fecontact.bifurcation.vector_field import VectorField
+from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -41,39 +42,54 @@ class Hopf:
         return "supercritical" if self.first_lyapunov < 0.0 else "subcritical"
 
 
-def critical_pair(J: Array) -> tuple[complex, ComplexArray, ComplexArray]:
-    """Eigenvalue with positive imaginary part nearest to the imaginary axis, q, and p.
+def critical_pair(
+    J: Array, near: complex | None = None
+) -> tuple[complex, ComplexArray, ComplexArray]:
+    """Eigenvalue with positive imaginary part, q, and p.
 
-    ``J q = l q``, ``J^T p = conj(l) p``, ``|q| = 1``, ``conj(p) q = 1``.
+    ``J q = l q``, ``J^T p = conj(l) p``, ``|q| = 1``, ``conj(p) q = 1``. It is the one nearest to
+    the imaginary axis, or nearest to a given number.
+
+    Raises
+    ------
+    AnalysisError
+        If all eigenvalues are real.
     """
     from scipy.linalg import eig
 
     eigenvalues, left, right = eig(J, left=True, right=True)
-    complex_ones = np.flatnonzero(eigenvalues.imag > 0.0)
-    at = complex_ones[np.argmin(np.abs(eigenvalues[complex_ones].real))]
+    pairs = np.flatnonzero(eigenvalues.imag > 0.0)
+    if not len(pairs):
+        raise AnalysisError("All eigenvalues are real; there is no Hopf point here.")
+    distance = np.abs(eigenvalues[pairs].real if near is None else eigenvalues[pairs] - near)
+    at = pairs[np.argmin(distance)]
     q = right[:, at] / np.linalg.norm(right[:, at])
     p = left[:, at]
     return complex(eigenvalues[at]), q, p / np.conj(np.vdot(p, q))
 
 
-def hopf(field: VectorField, x: Array, values: Array, scales: Array) -> Hopf:
+def hopf(
+    field: VectorField, x: Array, values: Array, scales: Array, near: complex | None = None
+) -> Hopf:
     r"""Normal form at a Hopf point x for parameter values (k,).
 
     .. math:: l_1 = \frac{1}{2 w} \mathrm{Re}\, p^H \big[ C(q, q, \bar q)
         - 2 B(q, J^{-1} B(q, \bar q)) + B(\bar q, (2 i w - J)^{-1} B(q, q)) \big]
 
     with the second and third derivatives B and C from :func:`fecontact.bifurcation.directional.
-    bend`. They describe a neighbourhood in which the friction law is close to its Taylor
-    polynomial: for smoothed sign functions with slopes of 1e6 s/m and equilibria of slow sliding
-    that may be a few micrometres per second, and the orbit that is seen in practice, which
-    sticks, is not the one that is born here. Follow the orbits to know.
+    bend`, for the pair nearest to the imaginary axis or to ``near``.
+
+    It describes a neighbourhood in which the friction law is close to its Taylor polynomial. For
+    smoothed sign functions with slopes of 1e6 s/m and slow sliding that may be a few micrometres
+    per second, and the orbit that is seen in practice, which sticks, is not the one that is born
+    here: follow the orbits to know.
 
     References
     ----------
     Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 5.4.
     """
     _, J, _ = field.derivatives(np.zeros(1), x[None], values)
-    eigenvalue, q, p = critical_pair(J[0])
+    eigenvalue, q, p = critical_pair(J[0], near)
     w = eigenvalue.imag
     one = np.eye(len(x))
     along, across = (bend(field, x, values, part, scales)

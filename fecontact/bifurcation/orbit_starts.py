@@ -163,7 +163,7 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
     for _ in range(_CORRECTIONS):
         try:
             step = linearised.solve(row, -np.append(linearised.residual, 0.0))
-        except np.linalg.LinAlgError:
+        except AnalysisError:
             break
         factor = 1.0
         while True:
