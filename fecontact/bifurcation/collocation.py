@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.problem import Problem
 from fecontact.bifurcation.interpolation import (
     Rule,
     at_points,
@@ -19,6 +18,7 @@ from fecontact.bifurcation.interpolation import (
     to_nodes,
 )
 from fecontact.bifurcation.linearised import Linearised
+from fecontact.bifurcation.problem import Problem
 from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
 
@@ -165,14 +165,14 @@ class Collocation(Problem):
         return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
 
     def tests(
-        self, u: Array, linearisation: Linearised, tangent: Array
+        self, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, float]:
         """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
         stability = linearisation.floquet
         return {"period doubling": stability.doubling_test(), "torus": stability.torus_test(),
                 "branch point": linearisation.determinant()}
 
-    def point(self, u: Array, linearisation: Linearised, tangent: Array) -> dict[str, Any]:
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, mesh and the extremes of the states."""
         stability = linearisation.floquet
         low, high = extremes(self.nodes(u), self.degree)
@@ -181,7 +181,7 @@ class Collocation(Problem):
                 "mesh": self.mesh, "minimum": low, "maximum": high}
 
     def examine(
-        self, kind: str, u: Array, linearisation: Linearised, tangent: Array
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
         """Details of a special point; None for a neutral saddle."""
         from fecontact.bifurcation.orbit_normal_forms import examined

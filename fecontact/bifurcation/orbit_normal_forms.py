@@ -8,8 +8,8 @@ On the centre manifold, with time in periods of the orbit and its phase moving w
 where A = T df/dx along the orbit. The doubled orbit, or the torus, is stable and lies beyond the
 point if c, or Re D, is negative (supercritical); else it is unstable and lies before it. The
 coefficients follow from the terms up to third order (Kuznetsov, Govaerts, Doedel and Dhooge, SIAM
-J. Numer. Anal. 43, 2005); what has to stand at right angles to the adjoint functions is found as the
-coefficient that makes the collocation equations solvable. The second and third derivatives of f are differences of its Jacobian along directions.
+J. Numer. Anal. 43, 2005), as those that make the collocation equations solvable. The second and
+third derivatives of f are differences of its Jacobian along directions.
 """
 
 from functools import cached_property, partial
@@ -91,7 +91,7 @@ class Expansion:
         self._motion = slopes / self._h
 
     def doubling(self, step: float) -> float:
-        """c of a period doubling, with differences over ``step``."""
+        """Coefficient c of a period doubling, with differences over ``step``."""
         V = self._doubling_function
         bend = self._second(V, V, step)
         h2, drift = self._response(bend)
@@ -100,7 +100,7 @@ class Expansion:
         return float(self._share(self._J, V[:, :, None], V, third, -1.0)[0])
 
     def torus(self, angle: float, step: float) -> float:
-        """Re D of a Neimark-Sacker point with multipliers exp(+- i angle)."""
+        """Coefficient Re D of a Neimark-Sacker point with multipliers exp(+- i angle)."""
         V = self._torus_function(angle)
         W = V.conj()
         h11, drift = self._response(self._second(V, W, step).real)

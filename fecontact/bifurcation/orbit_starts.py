@@ -75,7 +75,8 @@ def from_samples(
         Period of the motion [s]; None is the last return to where the motion ends. Forced
         systems take ``periods`` times the period of the forcing.
 
-    The others are those of :func:`from_hopf`.
+    field, values, free, intervals, degree, periods, scales
+        See :func:`from_hopf`.
 
     Raises
     ------
@@ -128,13 +129,15 @@ def _return_time(t: Array, x: Array) -> float:
     if not len(near):
         raise InputError("The samples do not come back to where they end; give more than one "
                          "period, or the period.")
-    last = near[-1]
-    first = near[np.flatnonzero(np.diff(near) > 1)[-1] + 1] if (np.diff(near) > 1).any() else near[0]
-    best = first + int(np.argmin(away[first : last + 1]))
+    gaps = np.flatnonzero(np.diff(near) > 1)
+    first = near[gaps[-1] + 1] if len(gaps) else near[0]
+    best = first + int(np.argmin(away[first : near[-1] + 1]))
     return float(t[-1] - t[best])
 
 
-def corrected(problem: Collocation, u: Array, tolerance: float = 1e-10) -> tuple[Collocation, Array]:
+def corrected(
+    problem: Collocation, u: Array, tolerance: float = 1e-10
+) -> tuple[Collocation, Array]:
     """The orbit near u, with the parameter held, on a mesh that suits it.
 
     Raises
@@ -159,7 +162,7 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
     where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
     size = np.linalg.norm(np.ptp(problem.nodes(u), axis=0))
     linearised = problem.linearise(u)
-    norm = np.linalg.norm(linearised.residual)
+    norm = float(np.linalg.norm(linearised.residual))
     for _ in range(_CORRECTIONS):
         try:
             step = linearised.solve(row, -np.append(linearised.residual, 0.0))
@@ -168,7 +171,7 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
         factor = 1.0
         while True:
             trial = problem.linearise(u + factor * step)
-            found = np.linalg.norm(trial.residual) if trial.period > 0.0 else np.inf
+            found = float(np.linalg.norm(trial.residual)) if trial.period > 0.0 else np.inf
             if found < (1.0 - 0.1 * factor) * norm or found < tolerance * (1.0 + size):
                 break
             factor /= 2.0

@@ -34,6 +34,7 @@ def orbits_from_hopf(
     Parameters
     ----------
     field : VectorField
+        The system, with the parameters by which it was followed before.
     branch, point : Branch, BranchPoint
         A branch of equilibria, and a special point of the kind 'Hopf' on it.
     settings : Settings, optional
@@ -106,8 +107,9 @@ def orbits_from_motion(
     direction, both
         Sign of the first change of the parameter; whether to go to both sides.
 
-    Other parameters and the result are those of :func:`orbits_from_hopf`; the scales are the
-    amplitudes of the motion by default.
+    field, settings, bounds, intervals, degree, scales, width
+        See :func:`orbits_from_hopf`, and there for the result; the scales are the amplitudes of
+        the motion by default.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.elimination import FACTORS
-from fecontact.compiled import block, borrowed, helper, i8, kernel, vector
+from fecontact.compiled import block, borrowed, helper, kernel, vector
 
 _complex = types.complex128
 _complex_block = types.Array(_complex, 3, "C")
@@ -26,7 +26,7 @@ _STEPS = 60  # shifted steps for one eigenvalue before it is given up
 
 @helper
 def _solve(a, b, size):  # type: ignore[no-untyped-def]
-    """b := a^-1 b with row interchanges; a is used up."""
+    """Replace b by a^-1 b, with row interchanges; a is used up."""
     for k in range(size):
         row = k
         for i in range(k + 1, size):
@@ -111,7 +111,7 @@ def merge(M):  # type: ignore[no-untyped-def]
 
 @helper
 def _rotation(x, y):  # type: ignore[no-untyped-def]
-    """c real, s complex with [[c, s], [-s', c]] [x, y] = [r, 0]."""
+    """Real c and complex s with [[c, s], [-s', c]] [x, y] = [r, 0]."""
     size = math.hypot(abs(x), abs(y))
     if size == 0.0 or abs(y) == 0.0:
         return 1.0, 0.0 + 0.0j
