@@ -12,6 +12,9 @@ from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]
 
+# Steps of this relative size that grow again are rounding, as next to branch points.
+_ROUNDING = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -35,6 +38,8 @@ def corrected(
         rhs = np.append(-linearisation.residual, -(row @ (u - guess)))
         change = (kept or linearisation).solve(row, rhs)
         size = norm(problem, change)
+        if count > 2 and size > before and before <= _ROUNDING * (1.0 + norm(problem, u)):
+            return u, linearisation, count
         if not np.isfinite(size) or (count > 2 and size > before):
             return None
         u = u + change

@@ -59,6 +59,11 @@ class Floquet:
         mu = self.others
         return float(np.prod((mu + 1.0) / (np.abs(mu) + 1.0)).real)
 
+    def unit_test(self) -> float:
+        """Product of mu - 1, scaled: changes sign where a multiplier passes 1."""
+        mu = self.others
+        return float(np.prod((mu - 1.0) / (np.abs(mu) + 1.0)).real)
+
     def torus_test(self) -> float:
         """Product of mu_i mu_k - 1 over pairs, scaled: changes sign where a pair passes the circle.
 

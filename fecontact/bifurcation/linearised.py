@@ -121,16 +121,6 @@ class Linearised:
         """
         return self.bordered(row).solve(rhs)
 
-    def determinant(self) -> float:
-        """A number with the sign of the determinant of the last bordered matrix, zero with it.
-
-        It is zero at branch points, and keeps its sign at folds.
-        """
-        assert self._last is not None
-        matrix = self._last[2].matrix
-        scale = np.abs(matrix).max(axis=1)
-        return self._factorised[1] * float(np.linalg.det(matrix / scale[:, None]))
-
     @cached_property
     def floquet(self) -> Floquet:
         """Multipliers and stability."""

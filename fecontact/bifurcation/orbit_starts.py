@@ -225,14 +225,19 @@ def doubled(
     return result.on_mesh(mesh, start, leaving)
 
 
-def crossing(problem: Collocation, u: Array, tangent: Array) -> Start:
-    """The other branch of orbits through the branch point u; ``tangent`` is that of the first."""
-    row = problem.weights() * tangent
+def crossing(problem: Collocation, u: Array, incoming: Array) -> Start:
+    """The other branch of orbits through the branch point u.
+
+    ``incoming`` is the direction of the first branch nearby: at the point itself the equations
+    have two directions, and do not tell which is which.
+    """
+    row = problem.weights() * incoming
     bordered = problem.linearise(u).bordered(row)
-    matrix = bordered.matrix
-    scale = np.abs(matrix).max(axis=1)
-    _, _, vectors = np.linalg.svd(matrix / scale[:, None])
-    return replace(problem, reference=problem.nodes(u).copy()), u, bordered.expand(vectors[-1])
+    equations = bordered.matrix[:-1]
+    _, _, vectors = np.linalg.svd(equations / np.abs(equations).max(axis=1)[:, None])
+    first, second = (bordered.expand(vector) for vector in vectors[-2:])
+    other = (row @ second) * first - (row @ first) * second
+    return replace(problem, reference=problem.nodes(u).copy()), u, other
 
 
 def at_phase(problem: Collocation, u: Array, phases: Array) -> Array:

@@ -214,14 +214,20 @@ def _followed(
     name = list(field.parameters)[problem.free]
     branch = follow(replace(problem, limits=limits), u, settings, name=name, tangent=tangent,
                     attributes=attributes, **options)
-    points = tuple(_sharpened(field, branch, point) if point.kind in _KINDS else point
-                   for point in branch.points)
+    points = tuple(_sharpened(field, branch, index) if point.kind in _KINDS else point
+                   for index, point in enumerate(branch.points))
     return replace(branch, points=points)
 
 
-def _sharpened(field: VectorField, branch: Branch, point: BranchPoint) -> BranchPoint:
+def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
     """A special point located once more, on the mesh that suits its own orbit."""
-    problem, u, tangent = restored(field, branch, point)
+    point = branch.points[index]
+    problem, u, _ = restored(field, branch, point)
+    # At branch points the tangent is not defined; that of a neighbour serves for all kinds.
+    near = next((other for other in branch.points[index::-1] if other.kind is None),
+                branch.points[-1])
+    before, start, direction = restored(field, branch, near)
+    tangent = before.on_mesh(problem.mesh, start, direction)[2]
     mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, problem.intervals)
     problem, u, tangent = problem.on_mesh(mesh, u, tangent)
     settings = Settings(step=2.0 * _NEAR, largest_step=2.0 * _NEAR, points=2)
@@ -229,7 +235,7 @@ def _sharpened(field: VectorField, branch: Branch, point: BranchPoint) -> Branch
         for found in continuation(replace(problem, renewal=0), u - _NEAR * tangent, settings,
                                   tangent=tangent):
             if found.kind == point.kind:
-                return found
+                return replace(found, tangent=tangent)
     except FecontactError:
         pass
     return point
