@@ -253,6 +253,19 @@ def _step(H, first, last, exceptional):  # type: ignore[no-untyped-def]
         _upward(H, k, cosine, sine)
 
 
+@helper
+def _plain_step(H, first, last, cosines, sines):  # type: ignore[no-untyped-def]
+    """One step without a shift; it parts eigenvalues that are decades apart."""
+    d = H.shape[1]
+    for k in range(first, last):
+        c, s = _rotation(H[0, k, k], H[0, k + 1, k])
+        cosines[k], sines[k] = c, s
+        _rows(H[0], k, c, s, k, d)
+        H[0, k + 1, k] = 0.0
+    for k in range(first, last):
+        _upward(H, k, cosines[k], sines[k])
+
+
 @kernel(types.i8(_complex_block, _complex_vector, vector))
 def product_eigenvalues(H, mantissas, exponents):  # type: ignore[no-untyped-def]
     """Fill the d eigenvalues mantissa * 2^exponent of H[K - 1] ... H[0] (K, d, d), used up.
@@ -263,6 +276,7 @@ def product_eigenvalues(H, mantissas, exponents):  # type: ignore[no-untyped-def
     K, d, _ = H.shape
     _to_hessenberg(H)
     h = H[0]
+    cosines, sines = np.empty(d), np.empty(d, dtype=np.complex128)
     last, tries = d - 1, 0
     while last > 0:
         first = last
@@ -279,7 +293,10 @@ def product_eigenvalues(H, mantissas, exponents):  # type: ignore[no-untyped-def
         tries += 1
         if tries > _STEPS:
             return d - 1 - last
-        _step(H, first, last, tries % 10 == 0)
+        if tries == 1:
+            _plain_step(H, first, last, cosines, sines)
+        else:
+            _step(H, first, last, tries % 10 == 0)
     for i in range(d):
         value, exponent = 1.0 + 0.0j, 0
         for j in range(K):
