@@ -1,15 +1,16 @@
 """A contact system as a vector field of some of its parameters."""
 
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation import contact_field_kernels as kernels
+from fecontact.bifurcation.forcing import forcing_period
 from fecontact.bifurcation.system_family import SystemFamily
 from fecontact.bifurcation.vector_field import Array, VectorField
-from fecontact.errors import AnalysisError
 from fecontact.system import ContactSystem
 
 # Step of central differences in a parameter, relative to its value.
@@ -33,11 +34,8 @@ class ContactField(VectorField):
                               for k in range(base.memory)))
         self._affine = [False] * len(self.parameters)
         self._calls = [0] * len(self.parameters)
-        self._period: float | None = None
         varying = family.varying
         self._constant_period = varying is not None and not self._moves_forcing(varying)
-        if self._constant_period:
-            self._period = forcing_period(self.system(self.values))
 
     def _moves_forcing(self, varying: frozenset[str]) -> bool:
         moved = varying & _FORCING
@@ -107,9 +105,9 @@ class ContactField(VectorField):
         h = _STEP * (value if value > 0.0 else 1.0)
         name = list(self.parameters)[index]
         if name == "ground.speed":
-            return min(h, 0.005 * self._family.base.velocity_scale)
+            return max(min(h, 0.005 * self._family.base.velocity_scale), 1e-8 * value)
         if name == "gap":
-            return min(h, 0.002 * self._family.base.penetration_scale)
+            return max(min(h, 0.002 * self._family.base.penetration_scale), 1e-8 * value)
         return h
 
     def forcing_period(self, values: Array) -> float | None:
@@ -120,9 +118,11 @@ class ContactField(VectorField):
         AnalysisError
             If what is given in time has no common period.
         """
-        if self._constant_period:
-            return self._period
-        return forcing_period(self.system(values))
+        return self._base_period if self._constant_period else forcing_period(self.system(values))
+
+    @cached_property
+    def _base_period(self) -> float | None:
+        return forcing_period(self.system())
 
     def displacement_row(self, point: str | int, direction: str = "x") -> Array:
         """Row (d,) that gives the displacement of a point [m] from a state.
@@ -162,53 +162,3 @@ def contact_field(
         If there is no such parameter, or it has a value per node.
     """
     return ContactField(SystemFamily(system, parameters))
-
-
-def forcing_period(system: ContactSystem) -> float | None:
-    """Common period [s] of all that is given in time; None for an autonomous system.
-
-    Raises
-    ------
-    AnalysisError
-        If something is not periodic, or the periods have no common multiple up to 1000 of the
-        longest.
-    """
-    drive, ground = system.drive, system.ground
-    given: list[tuple[str, Any]] = [
-        (f"drive.motion_{axis}", motion)
-        for axis, stiffness, motion in zip("xy", (drive.stiffness_x, drive.stiffness_y),
-                                           drive.motions, strict=True) if stiffness]
-    given += [(f"load.forces.{k}", force.signal) for k, force in enumerate(system.load.forces)]
-    periods = []
-    for name, source in given:
-        if source.shortest_period is None:
-            continue
-        if source.frequency_hz is None:
-            raise AnalysisError(f"{name} is not periodic; periodic orbits need a drive and loads "
-                                f"that repeat.")
-        periods.append(1.0 / source.frequency_hz)
-    if ground.motion is not None:
-        raise AnalysisError("ground.motion gives a speed that changes in time; periodic orbits "
-                            "are computed for constant speed.")
-    if ground.wavy or ground.friction_variation is not None:
-        length = ground.shortest_wavelength
-        for part in (ground.profile, ground.friction_variation):
-            length = getattr(part, "length", getattr(part, "wavelength", length))
-        if ground.speed == 0.0:
-            length = None
-        if length is not None:
-            periods.append(float(length) / abs(ground.speed))
-    return _common(periods)
-
-
-def _common(periods: list[float]) -> float | None:
-    if not periods:
-        return None
-    longest = max(periods)
-    for count in range(1, 1001):
-        ratios = np.array([count * longest / period for period in periods])
-        if (np.abs(ratios - np.round(ratios)) <= 1e-9 * ratios).all():
-            return count * longest
-    listed = ", ".join(f"{period:.6g} s" for period in periods)
-    raise AnalysisError(f"The periods of drive, loads and ground ({listed}) have no common "
-                        f"multiple; choose frequencies in the ratio of whole numbers.")

@@ -160,11 +160,16 @@ def find_equilibrium(
                             f"the largest rate is {rate:.3g}; give a start that is nearer, for "
                             f"example from a run that comes to rest, or follow one from other "
                             f"parameters.")
-    return Equilibrium(field, values, found)
+    return Equilibrium(field, values, found[0])
 
 
-def newton(field: VectorField, start: Array, values: Array, tolerance: float) -> Array | None:
-    """Newton's method with steps that are halved until the next step is shorter."""
+def newton(
+    field: VectorField, start: Array, values: Array, tolerance: float
+) -> tuple[Array, Array] | None:
+    """Newton's method with steps that are halved until the next step is shorter.
+
+    Gives x (d,) and the Jacobian (d, d) about it, from before the last step.
+    """
     x, t = start, np.zeros(1)
     least = 1e-14 * float(np.linalg.norm(field.state_scales(values)))
     for _ in range(_ITERATIONS):
@@ -177,7 +182,7 @@ def newton(field: VectorField, start: Array, values: Array, tolerance: float) ->
         if not np.isfinite(size):
             return None
         if size <= max(tolerance * float(np.linalg.norm(x)), least):
-            return np.asarray(x + step)
+            return x + step, J[0]
         part = 1.0
         while part > 1e-6:
             trial = x + part * step
@@ -188,7 +193,7 @@ def newton(field: VectorField, start: Array, values: Array, tolerance: float) ->
             part *= 0.5
         else:
             # Only rounding is left where the rates are as small as they can be.
-            return x if size <= 1e-7 * np.linalg.norm(x) else None
+            return (x, J[0]) if size <= 1e-7 * np.linalg.norm(x) else None
         x = trial
     return None
 

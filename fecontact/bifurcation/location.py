@@ -18,8 +18,9 @@ _EXACT = 1e-10
 
 def changed(here: Solution, there: Solution) -> list[str]:
     """Names of the test functions that change sign from one point to the next."""
-    return [name for name, value in there.tests.items()
-            if here.tests.get(name, np.nan) * value < 0.0]
+    return [name for name, after in there.tests.items()
+            if (before := here.tests.get(name, 0.0)) * after < 0.0
+            or (after == 0.0 and before != 0.0)]
 
 
 def between(problem: Problem, here: Solution, there: Solution, along: float) -> Array:
@@ -53,8 +54,7 @@ def located_between(
     for bound in settings.bounds:
         before, after = here.u[-1] - bound, there.u[-1] - bound
         if before * after < 0.0 or (after == 0.0 and before != 0.0):
-            located = (there if after == 0.0 else
-                       _zero(problem, here, there, settings, _distance_to(bound), before, after))
+            located = _zero(problem, here, there, settings, _distance_to(bound), before, after)
             if located is not None:
                 found.append(BranchPoint(located.u, located.tangent, located.values))
     return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
@@ -75,6 +75,8 @@ def _zero(
     """The solution between two others at which a test function is zero; None at a pole or jump."""
     from scipy.optimize import brentq
 
+    if after == 0.0:
+        return there
     row = problem.weights() * here.tangent
     length = float(row @ (there.u - here.u))
     best: list[tuple[float, Solution]] = []

@@ -100,13 +100,13 @@ def stability_map(
             x = row_start
             for j in range(shape[1]):
                 values[indices] = axes[0][i], axes[1][j]
-                x = _equilibrium(field, values, x)
-                if x is not None:
-                    states[i, j] = x
-                    jacobians[i, j] = field.derivatives(np.zeros(1), x[None], values)[1][0]
+                found = _equilibrium(field, values, x)
+                x = None if found is None else found[0]
+                if found is not None:
+                    states[i, j], jacobians[i, j] = found
                 if j == 0 and x is not None:
                     row_start = x
-                show(i * shape[1] + j + 1)
+            show((i + 1) * shape[1])
     eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
     order = np.lexsort((-eigenvalues.imag, -eigenvalues.real), axis=-1)
     critical = np.take_along_axis(eigenvalues, order[..., :1], axis=-1)[..., 0]
@@ -116,15 +116,18 @@ def stability_map(
     return StabilityMap((names[0], names[1]), axes[0], axes[1], states, critical, unstable)
 
 
-def _equilibrium(field: VectorField, values: Array, near: Array | None) -> Array | None:
+def _equilibrium(
+    field: VectorField, values: Array, near: Array | None
+) -> tuple[Array, Array] | None:
     if near is not None:
-        found = newton(field, near, values, 1e-10)
-        if found is not None:
-            return found
+        close = newton(field, near, values, 1e-9)
+        if close is not None:
+            return close
     if not isinstance(field, ContactField):
         return None
     parameters = dict(zip(field.parameters, values.tolist(), strict=True))
     try:
-        return find_equilibrium(field, parameters).state
+        found = find_equilibrium(field, parameters)
+        return found.state, found.jacobian
     except AnalysisError:
         return None

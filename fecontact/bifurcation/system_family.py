@@ -52,6 +52,7 @@ class SystemFamily:
         self._made: OrderedDict[bytes, ContactSystem] = OrderedDict()
         self._size = system.size
         values = np.array(list(self.parameters.values()), dtype=float)
+        self._latest: tuple[bytes, SystemArrays] | None = None
         self._corners: _Corners | None = None
         if 0 < len(values) <= _MOST_PARAMETERS:
             self._corners = _first_corners(self, values)
@@ -85,12 +86,15 @@ class SystemFamily:
         """Arrays of the system for the kernels."""
         if self._fixed is not None:
             return self._fixed
+        key = values.tobytes()
+        if self._latest is not None and self._latest[0] == key:
+            return self._latest[1]
         corners = self._corners
         if corners is not None and not corners.hold(values):
             self._corners = corners = corners.grown(self, values)
-        if corners is None:
-            return self.system(values).arrays
-        return corners.at(values)
+        found = self.system(values).arrays if corners is None else corners.at(values)
+        self._latest = (key, found)
+        return found
 
     def beside(self, values: Array, index: int, step: float) -> SystemArrays:
         """Arrays for one value changed by a small step, which may leave the allowed range."""
@@ -160,14 +164,14 @@ class _Corners:
         return True
 
     def grown(self, family: SystemFamily, values: Array) -> "_Corners | None":
-        """A box that holds the values too, and some more; None where nothing is affine there."""
+        """A box twice as wide that holds the values too; None where nothing is affine there."""
         family.system(values)  # raises for values out of range
-        for more in (1.0, 0.0):
-            low = np.minimum(self.low, values - more * (self.low - values))
-            high = np.maximum(self.high, values + more * (values - self.high))
+        width = self.high - self.low
+        for more in (1.0, 0.1, 0.0):
+            low = np.where(values < self.low, values - more * width, self.low)
+            high = np.where(values > self.high, values + more * width, self.high)
             try:
-                return _corners(family, np.where(values < self.low, low, self.low),
-                                np.where(values > self.high, high, self.high))
+                return _corners(family, low, high)
             except _NotAffineError:
                 return None
             except FecontactError:
