@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation import elimination
-from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]
 
@@ -22,50 +21,43 @@ class Border:
 
 
 class Bordered:
-    """A bordered system, reduced to ``matrix`` [x_0, common] = side."""
+    """A bordered system, with x(1) = closing x(0)."""
 
     def __init__(
         self, factors: elimination.Factors, borders: list[Border], closing: float
     ) -> None:
-        d = factors.end.shape[0]
-        small = np.vstack([factors.end, *(border.small for border in borders)])
-        self.matrix = np.hstack([small[:, :d] + closing * small[:, d : 2 * d], small[:, 2 * d :]])
         self._factors, self._closing = factors, closing
-        count, N = len(borders), len(factors.local)
+        count, N, d = len(borders), len(factors.local), len(factors.end)
         self._local = np.empty((count, N, factors.local_pivots.shape[1]))
         self._chain = np.empty((count, N - 1, d))
+        self._small = np.empty((d + count, factors.end.shape[1]))
+        self._small[:d] = factors.end
         for index, border in enumerate(borders):
             self._local[index], self._chain[index] = border.local, border.chain
+            self._small[d + index] = border.small
+
+    @property
+    def matrix(self) -> Array:
+        """The system reduced to x_0 and the common unknowns (d + b, d + e)."""
+        d, small = len(self._factors.end), self._small
+        return np.hstack([small[:, :d] + self._closing * small[:, d : 2 * d], small[:, 2 * d :]])
 
     def solve(self, rhs: Array) -> Array:
-        """All unknowns for a right side of all rows.
-
-        Raises
-        ------
-        AnalysisError
-            If the matrix is singular.
-        """
+        """All unknowns for a right side of all rows; not finite where the system is singular."""
         N, size, _ = self._factors.local.shape
-        d = self._factors.end.shape[0]
-        parts = np.empty((N, size)), np.empty((N - 1, 2 * d))
-        side = np.empty(len(self.matrix))
-        elimination.reduce_side(self._factors, rhs, self._local, self._chain, *parts, side)
-        try:
-            return self._expand(parts, np.linalg.solve(self.matrix, side))
-        except np.linalg.LinAlgError:
-            raise AnalysisError("The equations of the orbit are singular there.") from None
+        d = len(self._factors.end)
+        out = np.empty(N * size + self._small.shape[1] - 2 * d)
+        elimination.solve(self._factors, rhs, self._local, self._chain, self._small,
+                          self._closing, out)
+        return out
 
     def expand(self, solution: Array) -> Array:
         """All unknowns from x_0 and the common ones where the right side is zero."""
         N, size, _ = self._factors.local.shape
-        d = self._factors.end.shape[0]
-        return self._expand((np.zeros((N, size)), np.zeros((N - 1, 2 * d))), solution)
-
-    def _expand(self, parts: tuple[Array, Array], solution: Array) -> Array:
-        N, size, _ = self._factors.local.shape
-        d = self._factors.end.shape[0]
+        d = len(self._factors.end)
         out = np.empty(N * size + len(solution) - d)
         out[N * size :] = solution[d:]
-        elimination.expand(self._factors, *parts, solution[:d], self._closing * solution[:d],
-                           solution[d:], out[: N * size])
+        elimination.expand(self._factors, np.zeros((N, size)), np.zeros((N - 1, 2 * d)),
+                           solution[:d], self._closing * solution[:d], solution[d:],
+                           out[: N * size])
         return out

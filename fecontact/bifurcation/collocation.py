@@ -61,6 +61,9 @@ class Collocation(Problem):
         Steps from one mesh to the next, 0 for never.
     limits : (d,) array, optional
         Up to these the scales of the states grow with the orbit; without limits they stay.
+    precision : float
+        Part of a step to which special points are located. Above 1e-6 their normal forms are
+        left out.
     """
 
     field: VectorField
@@ -74,6 +77,7 @@ class Collocation(Problem):
     age: int = 0
     renewal: int = 1
     limits: Array | None = None
+    precision: float = 1e-12
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -187,7 +191,7 @@ class Collocation(Problem):
         """Details of a special point; None for a neutral saddle."""
         from fecontact.bifurcation.orbit_normal_forms import examined
 
-        return examined(kind, self, u, linearisation)
+        return examined(kind, self, u, linearisation, self.precision < 1e-6)
 
     def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """The problem for the next step: the phase fixed by u, from time to time a new mesh."""

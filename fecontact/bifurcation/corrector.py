@@ -33,17 +33,17 @@ def corrected(
 ) -> tuple[Array, Linearisation, int] | None:
     """Newton's method at right angles to a row, from a guess; None where it does not converge."""
     u, before, kept = guess, np.inf, None
+    scale = 1.0 + norm(problem, guess)
     for count in range(1, iterations + 1):
         linearisation = problem.linearise(u)
         rhs = np.append(-linearisation.residual, -(row @ (u - guess)))
         change = (kept or linearisation).solve(row, rhs)
         size = norm(problem, change)
-        if count > 2 and size > before and before <= _ROUNDING * (1.0 + norm(problem, u)):
+        if count > 2 and size > before and before <= _ROUNDING * scale:
             return u, linearisation, count
         if not np.isfinite(size) or (count > 2 and size > before):
             return None
         u = u + change
-        scale = 1.0 + norm(problem, u)
         if kept is None and size <= tolerance * scale:
             return u, linearisation, count
         # With a matrix that is kept the error falls by the same factor each time, not squared.

@@ -309,3 +309,36 @@ def expand(factors, reduced, chained, start, end, common, out):  # type: ignore[
             known[k] = total * a[k, k]
         for c in range(inner):
             out[j * size + d + c] = known[c]
+
+
+@kernel(types.void(FACTORS, vector, block, block, matrix, f8, vector))
+def solve(factors, rhs, local_weights, chain_weights, small, closing, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` (N m d + e,) with the solution for a right side of all rows.
+
+    ``small`` (d + b, 2 d + e) are the reduced rows, those of ``factors.end`` first, and x_N is
+    ``closing`` times x_0. The solution of a singular system is not finite.
+    """
+    N, size, _ = factors.local.shape
+    d = len(factors.end)
+    rows, columns = small.shape[0], small.shape[1] - d
+    reduced, chained = np.empty((N, size)), np.empty((N - 1, 2 * d))
+    side, end = np.empty(rows), np.empty(d)
+    reduce_side(factors, rhs, local_weights, chain_weights, reduced, chained, side)
+    a, pivots = np.empty((rows, columns)), np.empty(rows, dtype=np.int64)
+    for i in range(rows):
+        for c in range(d):
+            a[i, c] = small[i, c] + closing * small[i, d + c]
+        for c in range(d, columns):
+            a[i, c] = small[i, d + c]
+    eliminate(a, rows, pivots)
+    forward(a, rows, pivots, side)
+    for k in range(rows - 1, -1, -1):
+        total = side[k]
+        for c in range(k + 1, rows):
+            total -= a[k, c] * side[c]
+        side[k] = total * a[k, k]
+    for c in range(d):
+        end[c] = closing * side[c]
+    for c in range(d, columns):
+        out[N * size + c - d] = side[c]
+    expand(factors, reduced, chained, side[:d], end, side[d:], out[: N * size])

@@ -167,7 +167,7 @@ def _extremes(nodes, fine, low, high):  # type: ignore[no-untyped-def]
     values = np.empty(len(fine))
     for i in range(d):
         # The top of a polynomial lies near the highest of its nodes: only those intervals count.
-        margin = 0.02 * (high[i] - low[i])
+        margin = 0.002 * (high[i] - low[i])
         top, bottom = high[i], low[i]
         for j in range(total // m):
             near = False

@@ -112,13 +112,7 @@ class Linearised:
         return bordered
 
     def solve(self, row: Array, rhs: Array) -> Array:
-        """Solution of [[G_u], [row]] du = rhs.
-
-        Raises
-        ------
-        AnalysisError
-            If the matrix is singular.
-        """
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
         return self.bordered(row).solve(rhs)
 
     @cached_property

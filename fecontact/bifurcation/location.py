@@ -80,11 +80,12 @@ def _zero(
     row = problem.weights() * here.tangent
     length = float(row @ (there.u - here.u))
     best: list[tuple[float, Solution]] = []
+    exact = max(_EXACT, 1e-2 * problem.precision)
 
     def value(along: float) -> float:
         if along <= 0.0 or along >= length:
             return before if along <= 0.0 else after
-        found = corrected(problem, between(problem, here, there, along), row, _EXACT,
+        found = corrected(problem, between(problem, here, there, along), row, exact,
                            2 * settings.iterations)
         if found is None:
             raise _LostError
@@ -96,7 +97,7 @@ def _zero(
         return result
 
     try:
-        brentq(value, 0.0, length, xtol=1e-12 * length, rtol=1e-14, maxiter=60, disp=False)
+        brentq(value, 0.0, length, xtol=problem.precision * length, rtol=1e-14, maxiter=60, disp=False)
     except (_LostError, FecontactError):
         if not best:
             return None

@@ -34,13 +34,13 @@ _AGREEMENT = 0.02
 
 
 def examined(
-    kind: str, problem: "Collocation", u: Array, linearised: Linearised
+    kind: str, problem: "Collocation", u: Array, linearised: Linearised, details: bool = True
 ) -> dict[str, Any] | None:
     """Details of a special point of a branch of orbits; None if it is none.
 
     'coefficient' is c or Re D for eigenfunctions of mean square one in the scaled states,
     'criticality' its meaning: 'supercritical', 'subcritical', or 'uncertain' where differences
-    over smaller and smaller steps do not agree.
+    over smaller and smaller steps do not agree. Without ``details`` these are left out.
     """
     stability = linearised.floquet
     mu = stability.others
@@ -48,7 +48,7 @@ def examined(
         nearest = mu[np.argmin(np.abs(mu + 1.0))]
         if abs(nearest + 1.0) > 1e-2:
             return None
-        return _judged(Expansion(problem, u, linearised).doubling)
+        return _judged(Expansion(problem, u, linearised).doubling) if details else {}
     if kind == "torus":
         complex_pairs = mu[mu.imag > 1e-6]
         if not len(complex_pairs):
@@ -57,8 +57,10 @@ def examined(
         if abs(abs(nearest) - 1.0) > 1e-2:
             return None
         angle = float(np.angle(nearest))
-        return {"kind": "Neimark-Sacker", "angle": angle,
-                **_judged(partial(Expansion(problem, u, linearised).torus, angle))}
+        found: dict[str, Any] = {"kind": "Neimark-Sacker", "angle": angle}
+        if details:
+            found |= _judged(partial(Expansion(problem, u, linearised).torus, angle))
+        return found
     return {}
 
 

@@ -164,9 +164,8 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
     linearised = problem.linearise(u)
     norm = float(np.linalg.norm(linearised.residual))
     for _ in range(_CORRECTIONS):
-        try:
-            step = linearised.solve(row, -np.append(linearised.residual, 0.0))
-        except AnalysisError:
+        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        if not np.isfinite(step).all():
             break
         factor = 1.0
         while True:

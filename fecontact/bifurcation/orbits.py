@@ -212,8 +212,9 @@ def _followed(
         "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
         "periods": problem.periods}
     name = list(field.parameters)[problem.free]
-    branch = follow(replace(problem, limits=limits), u, settings, name=name, tangent=tangent,
-                    attributes=attributes, **options)
+    # What is special is located once more below, on a mesh of its own.
+    branch = follow(replace(problem, limits=limits, precision=1e-3), u, settings, name=name,
+                    tangent=tangent, attributes=attributes, **options)
     points = tuple(_sharpened(field, branch, index) if point.kind in _KINDS else point
                    for index, point in enumerate(branch.points))
     return replace(branch, points=points)

@@ -31,9 +31,12 @@ class Problem(Protocol):
     keeps_matrix : bool
         Whether Newton's method goes on with the matrix that it has as long as that serves; for
         problems whose factorisation costs far more than a residual and a solution.
+    precision : float
+        Part of a step to which special points are located on it.
     """
 
     keeps_matrix: ClassVar[bool] = False
+    precision: float = 1e-12
 
     def linearise(self, u: Array) -> Linearisation:
         """The equations about u.
