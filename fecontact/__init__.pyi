@@ -1,5 +1,12 @@
 from .basis import ModalBasis
 from .basis_report import BasisReport
+from .bifurcation.branch import Branch
+from .bifurcation.contact_field import contact_field
+from .bifurcation.curves import fold_curve, hopf_curve
+from .bifurcation.equilibria import find_equilibrium
+from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
+from .bifurcation.stability_map import stability_map
+from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError
@@ -49,6 +56,7 @@ from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
+from .output.diagrams import plot_branches, plot_eigenvalues, plot_stability_map
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
@@ -66,6 +74,7 @@ __all__ = [
     "Beam",
     "Block",
     "BoucWenFriction",
+    "Branch",
     "Constant",
     "ConstantFriction",
     "ContactState",
@@ -127,18 +136,27 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "VectorField",
+    "contact_field",
+    "equilibrium_branch",
     "export_pvd",
+    "find_equilibrium",
+    "fold_curve",
     "friction_law",
     "generate",
+    "hopf_curve",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
     "picture",
+    "plot_branches",
     "plot_contact_map",
+    "plot_eigenvalues",
     "plot_energies",
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_stability_map",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -146,7 +164,9 @@ __all__ = [
     "render",
     "rows_from_dofs",
     "simulate",
+    "stability_map",
     "static_equilibrium",
+    "switched_branch",
     "write_case",
     "write_mesh",
 ]

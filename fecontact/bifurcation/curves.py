@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.bifurcation.branch import Branch, BranchPoint
+from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.curve_problems import FoldCurve, HopfCurve, PlaneCurve, hopf_borders
 from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
@@ -136,17 +136,22 @@ def _followed(
     chosen = settings or Settings()
     first = parameters[0]
     events = dict(chosen.events)
+    borders: list[str] = []
     stops = [chosen.stop_at] if isinstance(chosen.stop_at, str) else [*chosen.stop_at]
     for bound in (bounds or {}).get(first, ()):
         if np.isfinite(bound):
             name = f"{first} = {bound:g}"
             events[name] = _distance(first, bound)
-            stops.append(name)
-    chosen = replace(chosen, events=events, stop_at=(*stops, *ends),
+            borders.append(name)
+    chosen = replace(chosen, events=events, stop_at=(*stops, *borders, *ends),
                      bounds=(bounds or {}).get(parameters[1], chosen.bounds))
     field = problem.field
-    return follow(problem, u, chosen, name=parameters[1], both=both, attributes={
+    branch = follow(problem, u, chosen, name=parameters[1], both=both, attributes={
         "parameters": list(parameters), "state_names": list(field.state_names)})
+    points = tuple(replace(point, kind=None) if point.kind in borders else point
+                   for point in branch.points)
+    reached = branch.points[-1].kind in borders
+    return replace(branch, points=points, status=Status.BOUND if reached else branch.status)
 
 
 def _distance(name: str, bound: float) -> Any:
