@@ -81,15 +81,16 @@ def main(repetitions: int) -> None:
         seconds, branch = timed(task, repetitions)
         fold = branch.of_kind("fold")[0].parameter / FOLD - 1.0
         doubling = branch.of_kind("period doubling")[0].parameter / DOUBLING - 1.0
-        print(f"{intervals:9}  {len(branch):6}  {seconds:6.3f} s  {1e3 * seconds / len(branch):6.2f}"
-              f" ms   {1e3 * AUTO[intervals] / AUTO_POINTS:11.2f} ms   {fold:9.1e} {doubling:9.1e}")
+        each, other = 1e3 * seconds / len(branch), 1e3 * AUTO[intervals] / AUTO_POINTS
+        print(f"{intervals:9}  {len(branch):6}  {seconds:6.3f} s  {each:6.2f} ms   {other:11.2f} ms"
+              f"   {fold:9.1e} {doubling:9.1e}")
     large = chain(20)
     sliding = equilibrium_branch(large, "B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]
     settings = Settings(step=0.002, largest_step=0.02, points=20)
     seconds, branch = timed(lambda: orbits_from_hopf(
         large, sliding, hopf, settings=settings, bounds=(0.1, 3.0), intervals=100), 1)
-    print(f"40 states, 100 intervals: {len(branch)} points, {seconds / len(branch):.3f} s per point")
+    print(f"40 states, 100 intervals: {len(branch)} points, {seconds / len(branch):.3f} s a point")
 
 
 if __name__ == "__main__":

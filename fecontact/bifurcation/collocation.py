@@ -182,8 +182,9 @@ class Collocation(Problem):
         stability = linearisation.floquet
         low, high = extremes(self.nodes(u), self.degree)
         return {"period": self.period(u), "multipliers": stability.multipliers,
-                "unstable": stability.unstable, "trivial_error": stability.trivial_error,
-                "mesh": self.mesh, "minimum": low, "maximum": high}
+                "unstable": stability.unstable, "stable": stability.stable,
+                "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
+                "maximum": high}
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array

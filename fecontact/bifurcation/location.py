@@ -43,7 +43,7 @@ def located_between(
     found = []
     for name in changed(here, there):
         located = _zero(problem, here, there, settings, _test_value(name),
-                        here.tests[name], there.tests[name])
+                        here.tests[name], there.tests[name], problem.precision)
         if located is None:
             continue
         details = problem.examine(name, located.u, located.linearisation, located.tangent)
@@ -54,7 +54,8 @@ def located_between(
     for bound in settings.bounds:
         before, after = here.u[-1] - bound, there.u[-1] - bound
         if before * after < 0.0 or (after == 0.0 and before != 0.0):
-            located = _zero(problem, here, there, settings, _distance_to(bound), before, after)
+            located = _zero(problem, here, there, settings, _distance_to(bound), before, after,
+                            1e-12)
             if located is not None:
                 found.append(BranchPoint(located.u, located.tangent, located.values))
     return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
@@ -70,7 +71,7 @@ def _distance_to(bound: float) -> Callable[[Solution], float]:
 
 def _zero(
     problem: Problem, here: Solution, there: Solution, settings: Settings,
-    test: Callable[[Solution], float], before: float, after: float,
+    test: Callable[[Solution], float], before: float, after: float, precision: float,
 ) -> Solution | None:
     """The solution between two others at which a test function is zero; None at a pole or jump."""
     from scipy.optimize import brentq
@@ -80,7 +81,7 @@ def _zero(
     row = problem.weights() * here.tangent
     length = float(row @ (there.u - here.u))
     best: list[tuple[float, Solution]] = []
-    exact = max(_EXACT, 1e-2 * problem.precision)
+    exact = max(_EXACT, 1e-2 * precision)
 
     def value(along: float) -> float:
         if along <= 0.0 or along >= length:
@@ -97,7 +98,8 @@ def _zero(
         return result
 
     try:
-        brentq(value, 0.0, length, xtol=problem.precision * length, rtol=1e-14, maxiter=60, disp=False)
+        brentq(value, 0.0, length, xtol=precision * length, rtol=1e-14, maxiter=60,
+               disp=False)
     except (_LostError, FecontactError):
         if not best:
             return None
