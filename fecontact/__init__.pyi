@@ -9,12 +9,15 @@ from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
-from .errors import FecontactError
+from .errors import FecontactError, InputError
 from .formats.matrices import read_matrix
 from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
+from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
+from .integrate.sensitivity import Sensitivity, sensitivity
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.contract import (
@@ -77,15 +80,20 @@ __all__ = [
     "Branch",
     "Constant",
     "ConstantFriction",
+    "ContactEvents",
     "ContactState",
     "ContactSystem",
     "CosineSurface",
+    "Crossing",
     "Crown",
     "CubicFriction",
     "DahlFriction",
     "Drive",
     "ElasticBody",
     "Energies",
+    "Ensemble",
+    "Event",
+    "Events",
     "ExponentialContact",
     "ExponentialFriction",
     "FecontactError",
@@ -101,6 +109,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "InputError",
     "IwanFriction",
     "JenkinsFriction",
     "LinearContact",
@@ -127,6 +136,7 @@ __all__ = [
     "RestitutionContact",
     "RigidStart",
     "RoughSurface",
+    "Sensitivity",
     "Sine",
     "SpeedRamp",
     "Status",
@@ -138,10 +148,13 @@ __all__ = [
     "TwoSidedStop",
     "VectorField",
     "contact_field",
+    "ensemble",
     "equilibrium_branch",
+    "event",
     "export_pvd",
     "find_equilibrium",
     "fold_curve",
+    "forcing_period",
     "friction_law",
     "generate",
     "hopf_curve",
@@ -163,9 +176,11 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
+    "sensitivity",
     "simulate",
     "stability_map",
     "static_equilibrium",
+    "strobe",
     "switched_branch",
     "write_case",
     "write_mesh",

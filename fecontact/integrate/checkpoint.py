@@ -33,7 +33,8 @@ class Checkpoint:
     def of(cls, path: Path, run: "Run", state: Array) -> "Checkpoint":
         """The checkpoint of a run that has not begun, from a state."""
         mark = hashlib.sha256()
-        for item in (*_leaves(run.arrays), *_leaves(run.control), run.times, state):
+        for item in (*_leaves(run.arrays), *_leaves(run.control), run.times, state,
+                     run.watch.own_parameters, run.watch.stick_speed):
             # Addresses of laws are integers, and differ from process to process.
             if np.asarray(item).dtype.kind == "f":
                 mark.update(np.ascontiguousarray(item).tobytes())
@@ -55,8 +56,9 @@ class Checkpoint:
                     raise InputError(f"{self.path} is the checkpoint of another run (other system, "
                                      f"start, output times or tolerance); remove it or name "
                                      f"another file.")
-                for index, item in enumerate(_leaves(self.run.progress)):
+                for index, item in enumerate(self._parts()):
                     item[...] = stored[f"part{index}"]
+                self.run.found.append((stored["found"], stored["found_states"]))
                 for name in ("states", "work"):
                     getattr(self.run, name)[: self.run.outputs] = stored[name]
         except (OSError, KeyError, BadZipFile, EOFError) as error:
@@ -66,6 +68,11 @@ class Checkpoint:
             if isinstance(error, InputError):
                 raise
             raise InputError(f"{self.path} is not a checkpoint of fecontact.") from None
+
+    def _parts(self) -> list[Any]:
+        """The arrays from which a run goes on."""
+        watch = self.run.watch
+        return [*_leaves(self.run.progress), watch.zones, watch.own_values]
 
     def keep(self) -> None:
         """Write the file if the last time was some while ago."""
@@ -78,10 +85,12 @@ class Checkpoint:
         try:
             with open(part, "wb") as file:
                 done = self.run.outputs
+                rows = [np.zeros((0, 3)), *(rows for rows, _ in self.run.found)]
+                states = [self.run.states[:0], *(states for _, states in self.run.found)]
                 np.savez(file, mark=self.mark, states=self.run.states[:done],
-                         work=self.run.work[:done], **{
-                             f"part{index}": item
-                             for index, item in enumerate(_leaves(self.run.progress))})
+                         work=self.run.work[:done], found=np.vstack(rows),
+                         found_states=np.vstack(states), **{
+                             f"part{index}": item for index, item in enumerate(self._parts())})
             os.replace(part, self.path)
         except OSError as error:
             raise InputError(f"The checkpoint {self.path} cannot be written: "

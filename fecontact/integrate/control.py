@@ -1,10 +1,10 @@
 """Running the compiled integrator: tolerances, pieces of a run, interrupts, checkpoints."""
 
 import time as clock
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,13 @@ from fecontact.contact_energy import POWERS
 from fecontact.errors import InputError
 from fecontact.integrate import run_arrays, stepping
 from fecontact.integrate.checkpoint import Checkpoint
+from fecontact.integrate.events import Events, Watched
 from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
 from fecontact.integrate.scipy_solvers import energy_scale
 from fecontact.integrate.trajectory import Status
+from fecontact.integrate.variation import Variation, variation_for
+from fecontact.integrate.watch_arrays import watch_for
+from fecontact.integrate.watching import FOUND, Watch
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -27,6 +31,19 @@ _SLIP_PART = 0.01
 _SLOW = 20.0
 
 
+class Vary(NamedTuple):
+    """Derivatives that go with a run, see :mod:`fecontact.integrate.variation`.
+
+    ``transitions`` (N, k, size) holds, for each output time, the columns since the one before.
+    """
+
+    above: Any
+    below: Any
+    width: float
+    variation: Variation
+    transitions: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A run of the compiled integrator that can be left and taken up again.
@@ -34,13 +51,17 @@ class Run:
     Attributes
     ----------
     status : int
-        ``stepping.RUNNING`` while output times are left, ``FINISHED``, ``MINIMUM_STEP`` or
-        ``NOT_FINITE``.
+        ``stepping.RUNNING`` while output times are left, ``FINISHED``, ``MINIMUM_STEP``,
+        ``NOT_FINITE``, or ``STOPPED`` at an event.
+    variation : Vary
+        Derivatives that go with the run.
     states, work : arrays (N, 2 m + n s), (N, 8 + n)
         At the output times; rows from ``outputs`` on are not filled yet. Work of the powers
         :data:`fecontact.contact_energy.POWERS`, then friction work of each node [J].
     progress : Progress
         All that is needed to go on.
+    watch : Watch
+        What is watched for; what was found is in ``events``.
     """
 
     arrays: Any
@@ -51,6 +72,16 @@ class Run:
     room: Room
     states: Array
     work: Array
+    variation: Vary
+    watch: Watch
+    found: list[tuple[Array, Array]] = field(default_factory=list)
+
+    @property
+    def events(self) -> Events:
+        """Events so far."""
+        rows = [np.zeros((0, 3)), *(rows for rows, _ in self.found)]
+        states = [np.zeros((0, self.states.shape[1])), *(states for _, states in self.found)]
+        return Events.of_rows(np.vstack(rows), np.vstack(states))
 
     @property
     def outputs(self) -> int:
@@ -73,8 +104,14 @@ class Run:
 
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""
-        return int(stepping.advance(self.arrays, self.shapes, self.times, self.control,
-                                    self.progress, self.room, steps, self.states, self.work))
+        status = stepping.advance(self.arrays, self.shapes, self.times, self.control,
+                                  self.progress, self.room, steps, self.states, self.work,
+                                  *self.variation, self.watch)
+        found = int(self.watch.counts[FOUND])
+        if found:
+            self.found.append((self.watch.found[:found].copy(), self.watch.states[:found].copy()))
+            self.watch.counts[FOUND] = 0
+        return int(status)
 
 
 def start(
@@ -84,6 +121,8 @@ def start(
     *,
     rtol: float,
     work: bool = True,
+    vary: bool | tuple[ContactSystem, ContactSystem, float] = False,
+    events: Sequence[Watched] = (),
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -104,6 +143,12 @@ def start(
     work : bool
         Whether to integrate the powers. Their error of one step is kept below ``rtol`` of the
         largest energy so far, so that the energy balance closes.
+    vary : bool or (above, below, width)
+        Whether to carry the derivatives to the initial state along; with those to a parameter if
+        the system is given with the parameter moved up and down, ``width`` apart. Steps then end
+        where normal forces begin, end or pass the depth of their law, at output times too.
+    events : sequence of ContactEvents, Crossing and Event
+        What to watch for.
     """
     if not np.isfinite(state).all():
         raise InputError("The initial state holds values that are not finite.")
@@ -120,10 +165,18 @@ def start(
     longest = longest_step(system, times)
     with np.errstate(over="ignore", invalid="ignore"):
         energy = energy_scale(system, state)
+    breaks = np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float)
+    above, below, width, columns = system, system, 0.0, 0
+    if vary:
+        breaks = np.union1d(breaks, times[1:-1])
+        columns = len(state)
+        if not isinstance(vary, bool):
+            above, below, width = vary
+            columns += 1
     control = Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
-        breaks=np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        breaks=breaks,
         rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work))
@@ -134,7 +187,10 @@ def start(
     return Run(
         system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), times, control,
         progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
-        np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)))
+        np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)),
+        Vary(above.arrays, below.arrays, width, variation_for(columns, m, n, states),
+             np.zeros((len(times) if vary else 0, columns, len(state)))),
+        watch_for(system, events, bool(vary)))
 
 
 def longest_step(system: ContactSystem, times: Array) -> float:
@@ -184,16 +240,17 @@ def integrate(
     rtol: float,
     progress: Callable[[float], None] | None = None,
     checkpoint: Path | None = None,
-) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
+    events: Sequence[Watched] = (),
+) -> tuple[Array, Array, Array, Status, dict[str, Any], Events]:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`.
 
     Returns
     -------
-    times (k,), states (k, 2 m + n s), work (k, 8 + n), status, statistics
+    times (k,), states (k, 2 m + n s), work (k, 8 + n), status, statistics, events
         If the run ended early, those until then, and the last state that was reached.
     """
     begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol)
+    run = start(system, state, times, rtol=rtol, events=events)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()
@@ -207,10 +264,10 @@ def integrate(
     statistics: dict[str, Any] = {"method": "Rodas5P", "rtol": rtol, **run.statistics,
                                   "seconds": clock.perf_counter() - begin}
     if ended is None:
-        ended = _ENDS[result]
+        ended = ENDS[result]
         if kept is not None:
             kept.remove()
-    if ended is not Status.FINISHED:
+    if ended not in (Status.FINISHED, Status.EVENT):
         statistics["message"] = f"{_place(run, ended)}"
     done = run.outputs
     times, states, work = run.times[:done], run.states[:done], run.work[:done]
@@ -218,11 +275,11 @@ def integrate(
     if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
         times = np.append(times, run.time)
         states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
-    return times, states, work, ended, statistics
+    return times, states, work, ended, statistics, run.events
 
 
-_ENDS = {stepping.FINISHED: Status.FINISHED, stepping.MINIMUM_STEP: Status.MINIMUM_STEP,
-         stepping.NOT_FINITE: Status.NOT_FINITE}
+ENDS = {stepping.FINISHED: Status.FINISHED, stepping.MINIMUM_STEP: Status.MINIMUM_STEP,
+         stepping.NOT_FINITE: Status.NOT_FINITE, stepping.STOPPED: Status.EVENT}
 
 
 def _place(run: Run, ended: Status) -> str:

@@ -1,6 +1,6 @@
 """Running a contact system in time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.contact_energy import POWERS
 from fecontact.errors import InputError, choices, nearest
+from fecontact.integrate.events import Watched
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system import ContactSystem
@@ -28,6 +29,7 @@ def simulate(
     rtol: float = 1e-6,
     restitution: float | None = None,
     checkpoint: str | Path | None = None,
+    events: Watched | Sequence[Watched] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Integrate a contact system in time.
@@ -57,6 +59,9 @@ def simulate(
     checkpoint : path, optional
         For 'Rodas5P': a file that keeps a long run every minute and when it is interrupted. If it
         is there, the run goes on from it, to the same numbers; at the end it is removed.
+    events : ContactEvents, Crossing, Event or sequence of them, optional
+        For 'Rodas5P': what to watch for, located within the steps and kept in
+        :attr:`Trajectory.events`; the run ends at those that say so.
     progress : callable, optional
         Called with the time reached [s] now and then.
 
@@ -77,7 +82,7 @@ def simulate(
         raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")
     if t_start is None:
         t_start = float(initial.time[-1]) if isinstance(initial, Trajectory) else 0.0
-    times = _output_times(t_start, t_end, outputs)
+    times = output_times(t_start, t_end, outputs)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     if method not in METHODS:
@@ -88,6 +93,10 @@ def simulate(
                          f"normal law has its own damping.")
     if checkpoint is not None and method != "Rodas5P":
         raise InputError(f"A checkpoint is for method = 'Rodas5P' alone, not '{method}'.")
+    if events is not None and method != "Rodas5P":
+        raise InputError(f"Events are for method = 'Rodas5P' alone, not '{method}'.")
+    watched = () if events is None else (
+        tuple(events) if isinstance(events, Sequence) else (events,))
     state = initial_state(system, initial, t_start)
     m = system.basis.modes
     rest: dict[str, Any] = {}
@@ -95,8 +104,10 @@ def simulate(
         from fecontact.integrate.control import integrate
 
         run = integrate(system, state, times, rtol=rtol, progress=progress,
-                        checkpoint=None if checkpoint is None else Path(checkpoint))
-        times, states, work, status, statistics = run
+                        checkpoint=None if checkpoint is None else Path(checkpoint),
+                        events=watched)
+        times, states, work, status, statistics, found = run
+        rest["events"] = found if watched else None
         rest["node_friction_work"] = work[:, len(POWERS) :]
         work = work[:, : len(POWERS)]
     elif method == "set-valued":
@@ -118,7 +129,14 @@ def simulate(
                       memory=states[:, 2 * m :] if system.memory else None, **rest)
 
 
-def _output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:
+def output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:
+    """Output times (N,) of a run; see :func:`simulate`.
+
+    Raises
+    ------
+    InputError
+        If they are not ascending from ``t_start`` to ``t_end``.
+    """
     if not (isinstance(t_start, Real) and isinstance(t_end, Real)
             and -np.inf < t_start < t_end < np.inf):
         raise InputError(f"t_end = {t_end!r} must be a finite time after t_start = {t_start!r}.")

@@ -3,13 +3,12 @@
 import numpy as np
 from numba import types
 
-from fecontact.compiled import borrowed, helper, i8, kernel, matrix, vector
+from fecontact.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
 from fecontact.contact_energy import powers
 from fecontact.contact_kernels import SYSTEM
 from fecontact.integrate import linear, motion, rodas, run_arrays
 from fecontact.integrate.run_arrays import (
     CAUTIOUS,
-    ENERGY,
     LAST_ERROR,
     LAST_STEP,
     OUTPUTS,
@@ -21,12 +20,14 @@ from fecontact.integrate.run_arrays import (
     STEP,
     STEPS,
     TIME,
-    WORST_NODE,
 )
+from fecontact.integrate.step_error import energy_scale, slip_error, state_error
+from fecontact.integrate.variation import VARIATION, propagate
+from fecontact.integrate.watching import KINKS, NODES, WATCH, begin, full, next_switch, note_events
 from fecontact.integrate.work import add_up, work_error, work_until
 from fecontact.laws.contract import signal_at
 
-RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE = range(4)
+RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
 _POWER = -1.0 / rodas.ORDER
@@ -85,62 +86,6 @@ def _stages(t, h, latest, G, s, shapes, progress, room):  # type: ignore[no-unty
 
 
 @helper
-def _error(control, progress, room):  # type: ignore[no-untyped-def]
-    """Error of a step as a multiple of what is allowed, of modes and internal variables."""
-    m = len(control.largest)
-    difference = room.stages[rodas.STAGES - 1]
-    speed_scale = max(progress.numbers[SPEED_SCALE], control.speed_scale)
-    error = 0.0
-    for i in range(m):
-        scale = max(max(progress.extremes[i], abs(room.after[i])), control.displacement_scale[i])
-        error = max(error, abs(difference[i]) / scale)
-        error = max(error, abs(difference[m + i]) * control.largest[i] / speed_scale)
-    for k in range(len(control.memory_scale)):
-        error = max(error, abs(difference[2 * m + k]) / control.memory_scale[k])
-    # Comparisons with NaN are false: make sure that it is not lost.
-    for k in range(len(difference)):
-        if not abs(room.after[k]) < np.inf:
-            error = np.inf
-    return error / control.rtol
-
-
-@helper
-def _slip_error(error, s, shapes, control, progress, room):  # type: ignore[no-untyped-def]
-    """The larger of the error and that of the slip velocities at the end of the step.
-
-    Only where friction has no memory: there the force follows the slip velocity alone.
-    """
-    m, rows = shapes.shape
-    n = rows // 2
-    difference = room.stages[rodas.STAGES - 1]
-    for j in range(n):
-        if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
-            slip_error = 0.0
-            for i in range(m):
-                slip_error += shapes[i, j] * difference[m + i]
-            slip = abs(room.nodes[1, j] - room.given[motion.SPEED])
-            part = abs(slip_error) / (control.slip_part * (control.slip_scale[j] + slip))
-            if part > error:
-                error = part
-                progress.counts[WORST_NODE] = j
-    return error
-
-
-@helper
-def _energy(control, progress, room):  # type: ignore[no-untyped-def]
-    """The largest of kinetic energy, work of a power and the energy scale so far [J]."""
-    m = len(control.largest)
-    kinetic = 0.0
-    for i in range(m):
-        kinetic += 0.5 * room.after[m + i] ** 2
-    energy = max(max(progress.numbers[ENERGY], kinetic), control.energy_scale)
-    for k in range(8):
-        energy = max(energy, abs(progress.work[k]))
-    progress.numbers[ENERGY] = energy
-    return energy
-
-
-@helper
 def _go_on(progress, room):  # type: ignore[no-untyped-def]
     """Make the end of the step the state of the run."""
     for k in range(len(progress.state)):
@@ -159,19 +104,27 @@ def _go_on(progress, room):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.i8(SYSTEM, matrix, vector, run_arrays.CONTROL, run_arrays.PROGRESS, run_arrays.ROOM,
-                 i8, matrix, matrix))
+                 i8, matrix, matrix, SYSTEM, SYSTEM, f8, VARIATION, block, WATCH),
+        nogil=True)
 def advance(  # type: ignore[no-untyped-def]
     held_system, held_shapes, held_times, held_control, held_progress, held_room, most, held_out,
-    held_work,
+    held_work, above, below, width, variation, transitions,
+    held_watch,
 ):
     """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
 
     Fills the rows of ``out`` (N, size) and ``work`` (N, 8 + n) that belong to the output times
     passed. A run that is continued gives the same numbers as one that was not interrupted.
+
+    If the columns of ``variation`` are not empty, those that belong to each output time are put
+    into ``transitions`` (N, k, size), and begin anew there; the output times must then be breaks.
+    See :func:`fecontact.integrate.variation.propagate` for ``above``, ``below`` and ``width``.
+    What is watched for is noted in ``watch``; when that is full, the call returns.
     """
     s, shapes, times = borrowed(held_system), borrowed(held_shapes), borrowed(held_times)
     control, progress, room = borrowed(held_control), borrowed(held_progress), borrowed(held_room)
-    out, work = borrowed(held_out), borrowed(held_work)
+    out, work, watch = borrowed(held_out), borrowed(held_work), borrowed(held_watch)
+    watched = watch.counts[NODES] != 0 or len(watch.own) > 0
     numbers, counts = progress.numbers, progress.counts
     size = len(progress.state)
     memory = size > 2 * len(control.largest)
@@ -184,13 +137,15 @@ def advance(  # type: ignore[no-untyped-def]
                                       progress.gradients, progress.rate)
         if control.work:
             powers(t, progress.state, s, progress.power[:8], progress.power[8:])
+        if watched or watch.counts[KINKS]:
+            begin(t, progress.state, s, control.depth, watch, room.scratch)
         for k in range(size):
             out[0, k] = progress.state[k]
         counts[STARTED], counts[OUTPUTS] = 1, 1
     new, speed, attempts = True, 0.0, 0
     while counts[OUTPUTS] < len(times):
         # A step that failed is repeated before the call returns: derivatives are not kept.
-        if new and attempts >= most:
+        if new and (attempts >= most or (watched and full(watch))):
             break
         attempts += 1
         # The end, or the next break; that is approached from below.
@@ -232,18 +187,18 @@ def advance(  # type: ignore[no-untyped-def]
         linear.factorise_step(G, room.reduced)
         _stages(t, h, latest, G, s, shapes, progress, room)
         counts[RATES] += rodas.STAGES
-        error = _error(control, progress, room)
+        error = state_error(control, progress, room)
         if error <= 1.0:
             if is_break and target == stop:
                 motion.set_given(np.nextafter(stop, end), s, room.given, room.pull)
             motion.set_rate_and_gradients(room.after, s, shapes, room.given, room.pull, room.nodes,
                                           room.gradients_after, room.rate_after)
-            error = _slip_error(error, s, shapes, control, progress, room)
+            error = slip_error(error, s, shapes, control, progress, room)
             if control.work and error <= 1.0:
                 rodas.dense_coefficients(room.stages, room.dense)
                 add_up(t, h, latest, s, progress, room)
                 error = max(error, work_error(h, room.power) / (
-                    control.rtol * _energy(control, progress, room)))
+                    control.rtol * energy_scale(control, progress, room)))
 
         factor = _LARGEST_FACTOR
         if error > 1e-6:
@@ -260,17 +215,52 @@ def advance(  # type: ignore[no-untyped-def]
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
 
+        if (watched or watch.counts[KINKS]) and not control.work:
+            rodas.dense_coefficients(room.stages, room.dense)
+        if watch.counts[KINKS]:
+            part = next_switch(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
+                               room.after, room.dense, room.right)
+            if 1e-6 < part < 1.0 - 1e-6:
+                counts[REJECTIONS] += 1
+                h *= part * (1.0 + 1e-9)
+                continue
+        ends = 2.0
+        if watched:
+            ends = note_events(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
+                               room.after, room.dense, room.right)
+        elif watch.counts[KINKS]:
+            begin(min(target, latest), room.after, s, control.depth, watch, room.scratch)
+        reached = target if ends > 1.0 else t + ends * h
+
+        columns = variation.columns
+        if len(columns):
+            propagate(t, h, latest, G, s, above, below, width, shapes, control.slip_scale,
+                      control.depth, control.memory_scale, progress.state, progress.gradients,
+                      room.reduced, room.stages, variation)
         row = counts[OUTPUTS]
-        if times[row] <= target:
-            if not control.work:
+        if times[row] <= reached:
+            if len(columns):
+                transitions[row] = columns
+                columns[:] = 0.0
+                for k in range(size):
+                    columns[k, k] = 1.0
+            if not (control.work or watched):
                 rodas.dense_coefficients(room.stages, room.dense)
-            while row < len(times) and times[row] <= target:
+            while row < len(times) and times[row] <= reached:
                 part = (times[row] - t) / h
                 rodas.interpolated(part, progress.state, room.after, room.dense, out[row])
                 if control.work:
                     work_until(part, h, progress.work, room.power, work[row])
                 row += 1
             counts[OUTPUTS] = row
+        if ends <= 1.0:
+            if control.work:
+                work_until(ends, h, progress.work, room.power, progress.work)
+            rodas.interpolated(ends, progress.state, room.after, room.dense, room.right)
+            progress.state[:] = room.right
+            numbers[TIME], numbers[STEP] = reached, h
+            counts[STEPS] += 1
+            return STOPPED
         if control.work:
             work_until(1.0, h, progress.work, room.power, progress.work)
             if is_break and target == stop:

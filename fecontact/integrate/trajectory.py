@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fecontact import contact_kernels as kernels
 from fecontact.contact_energy import POWERS
 from fecontact.errors import InputError
+from fecontact.integrate.events import Events
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ class Status(Enum):
     """How a run ended; the value is the sentence for people."""
 
     FINISHED = "The run reached its end."
+    EVENT = "The run ended at an event."
     INTERRUPTED = "The run was interrupted; what was computed until then is kept."
     MINIMUM_STEP = ("The steps of the integrator became too small to go on; what was computed "
                     "until then is kept.")
@@ -115,6 +117,8 @@ class Trajectory:
     held_normal_force, held_friction_force : (N, n) arrays or None
         Forces of set-valued contact [N], which hold nodes in place and do not follow from the
         state; None where laws give the forces.
+    events : Events or None
+        What was watched for, in the order of time; None if nothing was.
     """
 
     system: ContactSystem
@@ -128,6 +132,7 @@ class Trajectory:
     node_friction_work: Array | None = None
     held_normal_force: Array | None = None
     held_friction_force: Array | None = None
+    events: Events | None = None
 
     @property
     def states(self) -> Array:

@@ -1,0 +1,245 @@
+"""Many runs at once: one system with many parameter sets or initial states, on all cores.
+
+Each run is one compiled call that leaves Python's lock alone, so that threads share the cores
+without copies of anything; only what is asked for of each run is kept.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.errors import InputError
+from fecontact.integrate import stepping
+from fecontact.integrate.control import ENDS, start
+from fecontact.integrate.initial import Initial, initial_state
+from fecontact.integrate.trajectory import Status
+from fecontact.system import ContactSystem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """States of E runs at K times each.
+
+    Attributes
+    ----------
+    times : (E, K) array
+        [s].
+    states : (E, K, 2 m + n s) array
+        y = [q, q', z]; NaN after the end of a run that could not go on.
+    status : tuple of Status
+        How each run ended.
+    steps : (E,) array
+        Steps of the integrator.
+    """
+
+    times: Array
+    states: Array
+    status: tuple[Status, ...]
+    steps: NDArray[np.int64]
+
+    @property
+    def finished(self) -> NDArray[np.bool_]:
+        """Which runs (E,) reached their end."""
+        return np.array([status is Status.FINISHED for status in self.status])
+
+
+def ensemble(
+    systems: ContactSystem | Sequence[ContactSystem],
+    times: ArrayLike,
+    *,
+    initial: Initial | Sequence[Any] | Array = "rest",
+    rtol: float = 1e-6,
+    chain: int = 1,
+    workers: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Ensemble:
+    """Run many systems, or one from many initial states, and keep their states at few times.
+
+    The same numbers as single runs of :func:`fecontact.simulate` with as loose a grip on their
+    energies: powers are not integrated, which also leaves the steps to the motion alone.
+
+    Parameters
+    ----------
+    systems : ContactSystem or sequence of E ContactSystem
+        What moves. The modal bases may differ in everything but the size of the state.
+    times : (K,) or (E, K) array
+        The start of each run and the times to keep states at, ascending [s]; the first column
+        belongs to the initial states.
+    initial : (E, size) array, sequence of E, or one for all
+        Initial states, or what :func:`fecontact.integrate.initial.initial_state` takes.
+    rtol : float
+        Relative tolerance.
+    chain : int
+        Runs in a row that hand on their last state: only the first of each chain starts from its
+        initial state, as when a parameter is moved slowly. With E the whole ensemble is one chain
+        and runs on one core.
+    workers : int, optional
+        Threads; default one a core.
+    progress : callable, optional
+        Called with the number of runs that have ended, now and then.
+
+    Raises
+    ------
+    InputError
+        For states or times that do not fit the systems, and values out of range.
+
+    Notes
+    -----
+    A chain breaks where a run cannot go on; the next run then starts from its own initial state.
+    Ctrl-C ends all runs.
+    """
+    members, starts, instants = _members(systems, initial, times)
+    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
+        raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    for name, value in (("chain", chain), ("workers", 1 if workers is None else workers)):
+        if not (isinstance(value, Integral) and value >= 1):
+            raise InputError(f"{name} = {value!r} must be a whole number from 1 on.")
+    count, kept = instants.shape
+    states = np.full((count, kept, members[0].size), np.nan)
+    status = [Status.INTERRUPTED] * count
+    steps = np.zeros(count, dtype=np.int64)
+    done, leave = [0], [False]
+
+    def run_chain(first: int) -> None:
+        last: Array | None = None
+        for index in range(first, min(first + chain, count)):
+            state = starts(index) if last is None else last
+            run = start(members[index], state, instants[index], rtol=float(rtol), work=False)
+            result = stepping.RUNNING
+            while result == stepping.RUNNING:
+                if leave[0]:
+                    return
+                result = run.advance(100_000)
+            states[index, : run.outputs] = run.states[: run.outputs]
+            status[index], steps[index] = ENDS[result], run.statistics["steps"]
+            last = run.progress.state if result == stepping.FINISHED else None
+            done[0] += 1
+
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        pending = {pool.submit(run_chain, first) for first in range(0, count, chain)}
+        try:
+            while pending:
+                ended, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    future.result()
+                if progress is not None:
+                    progress(done[0])
+        except BaseException:
+            leave[0] = True
+            raise
+    return Ensemble(instants, states, tuple(status), steps)
+
+
+def strobe(
+    systems: ContactSystem | Sequence[ContactSystem],
+    *,
+    transient: int,
+    keep: int,
+    period: float | ArrayLike | None = None,
+    **settings: Any,
+) -> Ensemble:
+    """States once per period of the excitation, after a transient: a Poincare section in time.
+
+    Parameters
+    ----------
+    systems : ContactSystem or sequence of E ContactSystem
+        What moves.
+    transient : int
+        Periods that are not kept.
+    keep : int
+        States kept, one per period from there on.
+    period : float or (E,) array, optional
+        Period of strobing [s]; default that of each system's excitation.
+    **settings
+        As for :func:`ensemble`.
+
+    Returns
+    -------
+    Ensemble
+        With ``keep`` states a run.
+
+    Raises
+    ------
+    InputError
+        For a system without a period of its own if none is given, and as :func:`ensemble`.
+    """
+    for name, value, least in (("transient", transient, 0), ("keep", keep, 1)):
+        if not (isinstance(value, Integral) and value >= least):
+            raise InputError(f"{name} = {value!r} must be a whole number from {least} on.")
+    given = [systems] if isinstance(systems, ContactSystem) else list(systems)
+    if period is None:
+        periods = np.array([forcing_period(system) for system in given])
+    else:
+        periods = np.array(period, dtype=float)
+        if not (np.isfinite(periods).all() and (periods > 0.0).all()):
+            raise InputError(f"period = {period!r} must be above zero and finite.")
+    counts = np.arange(transient, transient + keep, dtype=float)
+    first = 1 if transient else 0
+    if transient:
+        counts = np.concatenate([[0.0], counts])
+    found = ensemble(systems, periods.reshape(-1, 1) * counts if periods.ndim else periods * counts,
+                     **settings)
+    return Ensemble(found.times[:, first:], found.states[:, first:], found.status, found.steps)
+
+
+def forcing_period(system: ContactSystem) -> float:
+    """Period of what excites a system: of the motion at B and the loads [s].
+
+    Raises
+    ------
+    InputError
+        If nothing excites it periodically, or several things with different periods.
+    """
+    sources = [motion for motion in system.drive.motions if motion.largest > 0.0]
+    sources += [force.signal for force in system.load.forces]
+    frequencies = {source.frequency_hz for source in sources if source.frequency_hz}
+    if len(frequencies) != 1 or (system.ground.shortest_wavelength is not None
+                                 and system.ground.largest_speed(0.0, 1.0) > 0.0):
+        raise InputError("The system has no single period of excitation (one frequency of drive "
+                         "and loads, level or resting ground); give period.")
+    return 1.0 / float(frequencies.pop())
+
+
+def _members(
+    systems: ContactSystem | Sequence[ContactSystem], initial: Any, times: ArrayLike,
+) -> tuple[list[ContactSystem], Callable[[int], Array], Array]:
+    """One system and row of times for each run, and a function that gives its initial state."""
+    instants = np.array(times, dtype=float)
+    single = isinstance(systems, ContactSystem)
+    members = [systems] if isinstance(systems, ContactSystem) else list(systems)
+    if not members or not all(isinstance(system, ContactSystem) for system in members):
+        raise InputError("systems must be a ContactSystem or a list of them, not empty.")
+    many = initial if _is_many(initial) else None
+    count = len(members) if not single else len(many) if many is not None else (
+        len(instants) if instants.ndim == 2 else 1)
+    members = members * count if single else members
+    sizes = {system.size for system in members}
+    if len(sizes) > 1:
+        raise InputError(f"The states of all systems must have the same size, not {sorted(sizes)}.")
+    if many is not None and len(many) != count:
+        raise InputError(f"There are {len(many)} initial states for {count} systems.")
+    if instants.ndim == 1 or len(instants) == 1:
+        instants = np.tile(instants, (count, 1))
+    if instants.ndim != 2 or len(instants) != count or instants.shape[1] < 1 or (
+            not np.isfinite(instants).all() or not (np.diff(instants, axis=1) > 0.0).all()):
+        raise InputError(f"times must be ascending and finite, of shape (K,) or ({count}, K), not "
+                         f"{np.shape(times)}.")
+
+    def state(index: int) -> Array:
+        given = initial if many is None else many[index]
+        return initial_state(members[index], given, float(instants[index, 0]))
+
+    return members, state, np.ascontiguousarray(instants)
+
+
+def _is_many(initial: Any) -> bool:
+    return (isinstance(initial, np.ndarray) and initial.ndim == 2) or isinstance(
+        initial, list | tuple)

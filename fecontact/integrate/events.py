@@ -1,0 +1,214 @@
+"""What can be watched for during a run, and the table of what was found."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.compiled import CompiledLaw, compile_law
+from fecontact.errors import InputError, choices, nearest
+from fecontact.integrate.watching import EVENT, FIRST_OWN
+from fecontact.system import ContactSystem
+
+Array = NDArray[np.float64]
+
+CONTACT_EVENTS = ("touch-down", "lift-off", "stick", "slip")
+_AXES = ("x", "y", "phi")
+_DIRECTIONS = {"both": 0, "rising": 1, "falling": -1}
+
+
+def event(function: Callable[..., Any]) -> CompiledLaw:
+    """Compile ``g(t, y, p) -> value`` whose changes of sign are events.
+
+    ``y`` = [q, q', z] is the state, ``p`` the parameters of the :class:`Event`.
+    """
+    return compile_law(EVENT, "g(t, y, p) -> value", function)
+
+
+@dataclass(frozen=True)
+class ContactEvents:
+    """Changes of state of the contact nodes: touch-down, lift-off, stick and slip.
+
+    A node touches down when its normal force begins and lifts off when that ends; it sticks and
+    slips as :attr:`fecontact.Trajectory.contact_state` says. A node that sticks as it touches
+    down has both events at once.
+
+    Parameters
+    ----------
+    stop : str or sequence of str
+        Those at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
+
+    Raises
+    ------
+    InputError
+        For other names.
+    """
+
+    stop: str | Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        given = (self.stop,) if isinstance(self.stop, str) else tuple(self.stop)
+        for name in given:
+            if name not in CONTACT_EVENTS:
+                raise InputError(f"ContactEvents: stop = {name!r} must be one of "
+                                 f"{choices(CONTACT_EVENTS)}{nearest(str(name), CONTACT_EVENTS)}.")
+        object.__setattr__(self, "stop", given)
+
+
+@dataclass(frozen=True)
+class Event:
+    """A function of time and state that is watched for changes of its sign.
+
+    Parameters
+    ----------
+    kernel : compiled function
+        From :func:`event`.
+    parameters : sequence of float
+        What the function gets as ``p``.
+    direction : 'both', 'rising' or 'falling'
+        The changes that count.
+    stop : bool
+        Whether the run ends at the first.
+
+    Raises
+    ------
+    InputError
+        For another direction.
+    """
+
+    kernel: CompiledLaw
+    parameters: Sequence[float] = ()
+    direction: Literal["both", "rising", "falling"] = "both"
+    stop: bool = False
+
+    def __post_init__(self) -> None:
+        _require_direction("Event", self.direction)
+
+    def row(self, system: ContactSystem) -> Array:
+        """Parameters of the function for a system."""
+        return np.array(self.parameters, dtype=float)
+
+
+@event
+def _plane(t, y, p):  # type: ignore[no-untyped-def]
+    value = -p[0]
+    for i in range(len(y)):
+        value += p[1 + i] * y[i]
+    return value
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A displacement or velocity of a point that passes a value: a Poincare section.
+
+    Parameters
+    ----------
+    point : str or int
+        'B', 'C' or a further named point; a contact node by its number from 0.
+    axis : 'x', 'y' or 'phi'
+        Along the ground, away from it, counter-clockwise.
+    value : float
+        Value passed [m], [rad], [m/s], [rad/s].
+    of : 'displacement' or 'velocity'
+        Which of them.
+    direction : 'both', 'rising' or 'falling'
+        The passages that count.
+    stop : bool
+        Whether the run ends at the first.
+
+    Raises
+    ------
+    InputError
+        For other names.
+    """
+
+    kernel: ClassVar[CompiledLaw] = _plane
+
+    point: str | int
+    axis: Literal["x", "y", "phi"]
+    value: float = 0.0
+    of: Literal["displacement", "velocity"] = "displacement"
+    direction: Literal["both", "rising", "falling"] = "both"
+    stop: bool = False
+
+    def __post_init__(self) -> None:
+        _require_direction("Crossing", self.direction)
+        for name, names in (("axis", _AXES), ("of", ("displacement", "velocity"))):
+            value = getattr(self, name)
+            if value not in names:
+                raise InputError(f"Crossing: {name} = {value!r} must be one of {choices(names)}"
+                                 f"{nearest(str(value), names)}.")
+        if not np.isfinite(self.value):
+            raise InputError(f"Crossing: value = {self.value!r} must be finite.")
+
+    def row(self, system: ContactSystem) -> Array:
+        """Parameters of the function for a system."""
+        basis = system.basis
+        m = basis.modes
+        row = np.zeros(1 + system.size)
+        row[0] = self.value
+        first = 1 if self.of == "displacement" else 1 + m
+        row[first : first + m] = basis.T[basis.point_index(self.point), _AXES.index(self.axis)]
+        return row
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """Events of a run in the order of time.
+
+    Attributes
+    ----------
+    time : (K,) array
+        [s], located to round-off on the dense output of the steps.
+    kind : tuple of str
+        'touch-down', 'lift-off', 'stick', 'slip', or 'event k' for the k-th of one's own from 0.
+    node : (K,) array
+        Number of the contact node from 0; -1 for events of one's own.
+    states : (K, size) array
+        y = [q, q', z].
+    """
+
+    time: Array
+    kind: tuple[str, ...]
+    node: NDArray[np.int64]
+    states: Array
+
+    @classmethod
+    def of_rows(cls, found: Array, states: Array) -> "Events":
+        """From rows of time, number of the kind and node."""
+        order = np.argsort(found[:, 0], kind="stable")
+        kinds = [int(kind) for kind in found[order, 1]]
+        return cls(found[order, 0],
+                   tuple(CONTACT_EVENTS[kind] if kind < FIRST_OWN else f"event {kind - FIRST_OWN}"
+                         for kind in kinds),
+                   found[order, 2].astype(np.int64), states[order])
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def only(self, kind: str | None = None, node: int | None = None) -> "Events":
+        """Those of one kind, of one node, or both."""
+        keep = np.ones(len(self), dtype=bool)
+        if kind is not None:
+            keep &= np.array([one == kind for one in self.kind], dtype=bool)
+        if node is not None:
+            keep &= self.node == node
+        return Events(self.time[keep],
+                      tuple(one for one, stays in zip(self.kind, keep, strict=True) if stays),
+                      self.node[keep], self.states[keep])
+
+
+Watched = ContactEvents | Event | Crossing
+
+
+def _require_direction(owner: str, direction: str) -> None:
+    if direction not in _DIRECTIONS:
+        raise InputError(f"{owner}: direction = {direction!r} must be one of "
+                         f"{choices(tuple(_DIRECTIONS))}.")
+
+
+def direction_sign(watched: Event | Crossing) -> int:
+    """1 for 'rising', -1 for 'falling', 0 for 'both'."""
+    return _DIRECTIONS[watched.direction]

@@ -1,0 +1,265 @@
+"""Derivatives of a step of the integrator to its start and to a parameter.
+
+A step maps y to y + sum_j A_8j u_j + u_8 with stages u_i of :mod:`fecontact.integrate.rodas`. For a
+column x of dy/dy_0, or of dy/dp, its stages U_i solve the same systems, with the factors of the
+step,
+
+    (I / (h gamma) - J) U_i = J(t_i, Y_i) X_i + sum_j C_ij U_j / h + H_i x  [+ p_i]
+    X_i = x + sum_j A_ij U_j,     H_i = d/de J(t + e d_i h, y + e u_i) at e = 0
+
+and p_i = df/dp(t_i, Y_i) + d/de df/dp(t + e d_i h, y + e u_i) for the column of the parameter. So
+the result is the derivative of what is computed, not another approximation of the same thing.
+H_i and p_i are differences over steps that are small against the scales of the laws, central ones
+but beside kinks.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.compiled import borrowed, f8, helper, kernel, matrix, vector
+from fecontact.contact_kernels import SYSTEM
+from fecontact.integrate import linear, motion, rodas
+from fecontact.laws.contract import ground_at, signal_at
+
+Array = NDArray[np.float64]
+
+# Differences are taken over this part of the scales of the laws.
+_PART = 1e-4
+# Differences of larger parts of the usual size of a derivative are jumps.
+_JUMP = 3.0 * _PART
+
+
+class Variation(NamedTuple):
+    """Columns of derivatives, and room for a step of them.
+
+    Attributes
+    ----------
+    columns : (k, size) array
+        dy/dy_0 column by column, then dy/dp if a parameter varies. Empty if none are wanted.
+    stages : (8 k, size) array
+        U_i of column c in row 8 c + i.
+    """
+
+    columns: Array
+    stages: Array
+    vectors: Array
+    nodes: Array
+    sinking: Array
+    given: Array
+    pull: Array
+    none: Array
+    inside: motion.Gradients
+    ahead: motion.Gradients
+    behind: motion.Gradients
+    usual: motion.Gradients
+
+
+VARIATION = types.NamedTuple(
+    [matrix] * 5 + [vector] * 3 + [motion.GRADIENTS] * 4, Variation)
+
+
+def variation_for(columns: int, modes: int, nodes: int, states: int) -> Variation:
+    """Room for so many columns; the first ``size`` of them are the unit matrix."""
+    size = 2 * modes + nodes * states
+    room = [motion.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
+                             np.zeros((nodes, states, 3 + states))) for _ in range(4)]
+    start = np.zeros((columns, size))
+    np.fill_diagonal(start, 1.0)
+    return Variation(start, np.zeros((rodas.STAGES * columns, size)), np.zeros((6, size)),
+                     np.zeros((3, 2 * nodes)), np.zeros((2, nodes)),
+                     np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes), *room)
+
+
+@helper
+def _push(g, s, shapes, x, w, sign, rate):  # type: ignore[no-untyped-def]
+    """Add to w[2] (2 n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
+    m, rows = shapes.shape
+    n = rows // 2
+    states = g.rates.shape[1]
+    motion.project(shapes, x, w[0], w[1])
+    for j in range(n):
+        a, b, c, d = w[0, j], w[0, n + j], w[1, j], w[1, n + j]
+        p = g.partial[j]
+        first = 2 * m + j * states
+        tangential = p[1, 0] * a + p[1, 1] * b + p[1, 2] * c + p[1, 3] * d
+        pressing = p[2, 0] * a + p[2, 1] * b + p[2, 2] * c + p[2, 3] * d
+        for k in range(s.memory[j]):
+            tangential += g.force[j, 3 + k] * x[first + k]
+            total = g.rates[j, k, 1] * c + g.rates[j, k, 2] * pressing
+            for other in range(s.memory[j]):
+                total += g.rates[j, k, 3 + other] * x[first + other]
+            rate[first + k] += sign * total
+        w[2, j] -= sign * tangential
+        w[2, n + j] += sign * (p[0, 0] * a + p[0, 1] * b + p[0, 2] * c + p[0, 3] * d)
+
+
+@helper
+def _reach(u, shapes, slip_scale, depth, memory_scale, w):  # type: ignore[no-untyped-def]
+    """Multiple e of the stage u that is small against the scales of all laws."""
+    m, rows = shapes.shape
+    n = rows // 2
+    motion.project(shapes, u, w[0], w[1])
+    largest = 1.0
+    for j in range(n):
+        largest = max(largest, abs(w[1, j]) / slip_scale[j])
+        largest = max(largest, abs(w[0, n + j]) / depth[j])
+    for k in range(len(memory_scale)):
+        largest = max(largest, abs(u[2 * m + k]) / memory_scale[k])
+    return _PART / largest
+
+
+@helper
+def _difference(ahead, here, behind, factor, forward, usual):  # type: ignore[no-untyped-def]
+    """Difference quotient, that of one side where a kink or a jump lies within reach.
+
+    A difference that is not small against the ``usual`` size has met a jump. Of two sides that
+    differ without one, that of the step itself counts.
+    """
+    a, b = ahead - here, here - behind
+    jump_ahead, jump_behind = abs(a) > _JUMP * usual, abs(b) > _JUMP * usual
+    if jump_ahead or jump_behind:
+        if jump_ahead and jump_behind:
+            return factor * (a if abs(a) < abs(b) else b)
+        return factor * (b if jump_ahead else a)
+    if abs(a - b) <= 0.5 * max(abs(a), abs(b)):
+        return 0.5 * factor * (a + b)
+    return factor * (a if forward else b)
+
+
+@helper
+def _learn(here, usual):  # type: ignore[no-untyped-def]
+    """Let the usual sizes be the largest seen."""
+    n, states, width = here.rates.shape
+    for j in range(n):
+        for row in range(3):
+            for k in range(4):
+                usual.partial[j, row, k] = max(usual.partial[j, row, k],
+                                               abs(here.partial[j, row, k]))
+        for k in range(width):
+            usual.force[j, k] = max(usual.force[j, k], abs(here.force[j, k]))
+            for row in range(states):
+                usual.rates[j, row, k] = max(usual.rates[j, row, k], abs(here.rates[j, row, k]))
+
+
+@helper
+def _set_sinking(t, y, s, shapes, v, out):  # type: ignore[no-untyped-def]
+    """Fill out (2, n): slope of the ground under each node, and rate of its penetration."""
+    n = len(s.abscissa)
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    motion.project(shapes, y, v.nodes[0], v.nodes[1])
+    for j in range(n):
+        xi = s.abscissa[j] + v.nodes[0, j] - travel
+        slope = ground_at(s.profile)(xi, s.profile_parameters)[1]
+        out[0, j] = slope
+        out[1, j] = slope * (v.nodes[1, j] - speed) - v.nodes[1, n + j]
+
+
+@helper
+def _differences(ahead, here, behind, usual, factor, u, travelled, sinking, shapes, w):  # type: ignore[no-untyped-def]
+    """Put the difference quotients of gradients along the stage u into those ahead.
+
+    A stage that moves a node as the step does shows with its forward side what is within the
+    step.
+    """
+    n, states, width = ahead.rates.shape
+    motion.project(shapes, u, w[0], w[1])
+    for j in range(n):
+        sunk = sinking[0, j] * (w[0, j] - travelled) - w[0, n + j]
+        forward = sunk * sinking[1, j] >= 0.0
+        for row in range(3):
+            for k in range(4):
+                ahead.partial[j, row, k] = _difference(
+                    ahead.partial[j, row, k], here.partial[j, row, k], behind.partial[j, row, k],
+                    factor, forward, usual.partial[j, row, k])
+        for k in range(width):
+            ahead.force[j, k] = _difference(ahead.force[j, k], here.force[j, k],
+                                            behind.force[j, k], factor, forward,
+                                            usual.force[j, k])
+            for row in range(states):
+                ahead.rates[j, row, k] = _difference(
+                    ahead.rates[j, row, k], here.rates[j, row, k], behind.rates[j, row, k], factor,
+                    forward, usual.rates[j, row, k])
+
+
+@helper
+def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # type: ignore[no-untyped-def]
+    """Fill out = factor (f of the system above less f of that below)."""
+    motion.set_given(t, above, v.given, v.pull)
+    motion.set_rate(Y, above, shapes, v.given, v.pull, v.nodes, v.behind, rate)
+    motion.set_given(t, below, v.given, v.pull)
+    motion.set_rate(Y, below, shapes, v.given, v.pull, v.nodes, v.behind, other)
+    for k in range(len(Y)):
+        out[k] = factor * (rate[k] - other[k])
+
+
+@kernel(types.void(f8, f8, f8, f8, SYSTEM, SYSTEM, SYSTEM, f8, matrix, vector, vector, vector,
+                   vector, motion.GRADIENTS, linear.REDUCED, matrix, VARIATION))
+def propagate(  # type: ignore[no-untyped-def]
+    t, h, latest, G, held_s, held_above, held_below, width, held_shapes, held_slip, held_depth,
+    held_memory, held_state, held_gradients, held_reduced, held_stages, held_v,
+):
+    """Carry the columns over the step from t to t + h whose stages and factors are given.
+
+    ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
+    with width = 0 no parameter varies.
+    """
+    s, shapes, v = borrowed(held_s), borrowed(held_shapes), borrowed(held_v)
+    above, below = borrowed(held_above), borrowed(held_below)
+    slip_scale, depth, memory_scale = (borrowed(held_slip), borrowed(held_depth),
+                                       borrowed(held_memory))
+    state, gradients = borrowed(held_state), borrowed(held_gradients)
+    reduced, stages = borrowed(held_reduced), borrowed(held_stages)
+    count, size = v.columns.shape
+    m = len(v.none)
+    w = v.nodes
+    Y, right, X, forced, rate, other = (v.vectors[0], v.vectors[1], v.vectors[2], v.vectors[3],
+                                        v.vectors[4], v.vectors[5])
+    ahead, behind = v.ahead, v.behind
+    _set_sinking(t, state, s, shapes, v, v.sinking)
+    for i in range(rodas.STAGES):
+        now = t if i == 0 else min(t + rodas.NODES[i] * h, latest)
+        rodas.combined(rodas.A[i], 1.0, state, stages, Y)
+        motion.set_given(now, s, v.given, v.pull)
+        motion.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.inside, rate)
+        _learn(v.inside, v.usual)
+        advance = rodas.TIME[i] * h
+        reach = _reach(stages[i], shapes, slip_scale, depth, memory_scale, w)
+        if width != 0.0:
+            _rates_between(now, Y, above, below, shapes, v, 1.0 / width, rate, other, forced)
+        for side in range(2):
+            e = reach if side == 0 else -reach
+            for k in range(size):
+                Y[k] = state[k] + e * stages[i, k]
+            later = t + e * advance
+            if width != 0.0:
+                _rates_between(later, Y, above, below, shapes, v, 0.5 / (e * width), rate, other,
+                               right)
+                for k in range(size):
+                    forced[k] += right[k]
+            motion.set_given(later, s, v.given, v.pull)
+            if side == 0:
+                motion.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, ahead, rate)
+            else:
+                motion.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, behind, rate)
+        _differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
+                     signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1] * advance,
+                     v.sinking, shapes, w)
+        for c in range(count):
+            own = v.stages[rodas.STAGES * c : rodas.STAGES * (c + 1)]
+            rodas.combined(rodas.A[i], 1.0, v.columns[c], own, X)
+            w[2, :] = 0.0
+            rate[2 * m :] = 0.0
+            _push(ahead, s, shapes, v.columns[c], w, 1.0, rate)
+            _push(v.inside, s, shapes, X, w, 1.0, rate)
+            motion.gather(X, s, shapes, v.none, w[2], rate)
+            if width != 0.0 and c == count - 1:
+                for k in range(size):
+                    rate[k] += forced[k]
+            rodas.combined(rodas.C[i], 1.0 / h, rate, own, right)
+            linear.solve_stage(G, s, shapes, gradients, reduced, right, w, own[i])
+            if i == rodas.STAGES - 1:
+                for k in range(size):
+                    v.columns[c, k] = X[k] + own[i, k]

@@ -1,0 +1,281 @@
+"""Finding events within a step: contact nodes that change their state, and users' functions.
+
+The dense output of a step is looked at four times, and what has changed since the time before is
+narrowed down by bisection. So two changes within a quarter of a step escape; but steps are as
+short as the forces demand.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact import contact_kernels as kernels
+from fecontact.compiled import borrowed, f8, function_at, helper, integers, kernel, matrix, vector
+from fecontact.contact_kernels import SYSTEM
+from fecontact.integrate import motion, rodas
+from fecontact.laws.contract import signal_at
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+EVENT = f8(f8, vector, vector)
+event_at = function_at(EVENT)
+
+# Kinds of events; a user's event k is FIRST_OWN + k.
+TOUCH_DOWN, LIFT_OFF, STICK, SLIP, FIRST_OWN = range(5)
+# States of a node, as in `ContactState`; past the depth of the normal law 3 more.
+OPEN, STICKING, SLIPPING, DEEP = range(4)
+# Entries of Watch.counts.
+FOUND, NODES, KINKS = range(3)
+
+_LOOKS = 4
+_HALVINGS = 44
+_MOST_A_NODE = 3
+
+
+class Watch(NamedTuple):
+    """What is watched during a run, and what was found.
+
+    Attributes
+    ----------
+    stick_speed : (n,) array
+        Slip velocity below which a node sticks, for laws without memory [m/s].
+    curve_speed, curve : (k,), (n, k) arrays
+        Slip velocities and R/F of steady sliding there, for laws with memory; zeros for others.
+    zones : (n,) array
+        State of the nodes at the start of the step.
+    own, own_parameters, own_values, own_direction : (l,), (l, p), (l,), (l,)
+        Users' functions, their values at the start of the step, and the direction of the change
+        of sign that counts.
+    stops : (4 + l,) array
+        Whether the run ends at an event of this kind.
+    found, states : (K, 3), (K, size)
+        Time, kind and node (-1 for a user's event), and the state.
+    counts : (3,) array
+        Events found; whether contact nodes are watched; whether steps must end at the kinks of
+        the normal forces.
+    """
+
+    stick_speed: Array
+    curve_speed: Array
+    curve: Array
+    zones: Integers
+    own: Integers
+    own_parameters: Array
+    own_values: Array
+    own_direction: Integers
+    stops: Integers
+    found: Array
+    states: Array
+    counts: Integers
+
+
+WATCH = types.NamedTuple(
+    [vector, vector, matrix, integers, integers, matrix, vector, integers, integers, matrix, matrix,
+     integers], Watch)
+
+
+@helper
+def _between(x, places, values):  # type: ignore[no-untyped-def]
+    """Linear interpolation, constant outside."""
+    right = np.searchsorted(places, x)
+    if right == 0 or right == len(places):
+        return values[min(right, len(places) - 1)]
+    part = (x - places[right - 1]) / (places[right] - places[right - 1])
+    return (1.0 - part) * values[right - 1] + part * values[right]
+
+
+@helper
+def _zone(j, t, y, s, watch, depth, force, rates):  # type: ignore[no-untyped-def]
+    """State of node j, and whether it is past the depth of its normal law."""
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    x, height, x_rate, height_rate = kernels.node_motion(j, y, s)
+    F, R, u, _, slip, _ = kernels.node_forces(j, x, height, x_rate, height_rate,
+                                              kernels.memory_of(j, y, s), travel, speed, s, force,
+                                              rates)
+    zone = OPEN
+    if F != 0.0:
+        if s.memory[j] > 0 and len(watch.curve_speed) > 0 and watch.curve[j, 0] != 0.0:
+            sticks = abs(R) < 0.95 * abs(_between(slip, watch.curve_speed, watch.curve[j]) * F)
+        else:
+            sticks = abs(slip) < watch.stick_speed[j]
+        zone = STICKING if sticks else SLIPPING
+    return zone + DEEP if u > depth[j] else zone
+
+
+@helper
+def _note(watch, t, kind, node, y):  # type: ignore[no-untyped-def]
+    row = watch.counts[FOUND]
+    watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
+    watch.states[row, :] = y
+    watch.counts[FOUND] = row + 1
+
+
+@helper
+def full(watch):  # type: ignore[no-untyped-def]
+    """Whether the events of one more step may find no place."""
+    most = _LOOKS * (_MOST_A_NODE * len(watch.zones) + len(watch.own))
+    return watch.counts[FOUND] + most > len(watch.found)
+
+
+@helper
+def _normal_zone(zone):  # type: ignore[no-untyped-def]
+    """What of a zone belongs to the normal force alone."""
+    return (0 if zone % DEEP == OPEN else 1) + (2 if zone >= DEEP else 0)
+
+
+@helper
+def _state_at(part, before, after, dense, y):  # type: ignore[no-untyped-def]
+    if part == 1.0:
+        y[:] = after
+    else:
+        rodas.interpolated(part, before, after, dense, y)
+
+
+@helper
+def _changed(j, t, h, latest, low, high, s, watch, depth, force, rates, before, after, dense, y):  # type: ignore[no-untyped-def]
+    """Where node j leaves its state between two parts of a step, and for which; y is set there."""
+    old = watch.zones[j] % DEEP
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        rodas.interpolated(middle, before, after, dense, y)
+        zone = _zone(j, min(t + middle * h, latest), y, s, watch, depth, force, rates)
+        if zone % DEEP == old:
+            low = middle
+        else:
+            high = middle
+    _state_at(high, before, after, dense, y)
+    return high, _zone(j, min(t + high * h, latest), y, s, watch, depth, force, rates)
+
+
+@helper
+def _own(k, t, h, latest, left, right, before, after, dense, watch, y):  # type: ignore[no-untyped-def]
+    """Value of a user's function at the right end, after its change of sign has been noted."""
+    g, p = event_at(watch.own[k]), watch.own_parameters[k]
+    old = watch.own_values[k]
+    new = g(min(t + right * h, latest), y, p)
+    rising = old < 0.0 <= new
+    falling = old > 0.0 >= new
+    if not ((rising and watch.own_direction[k] >= 0) or (
+            falling and watch.own_direction[k] <= 0)):
+        return new
+    low, high = left, right
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        rodas.interpolated(middle, before, after, dense, y)
+        value = g(min(t + middle * h, latest), y, p)
+        if (value >= 0.0) if rising else (value <= 0.0):
+            high = middle
+        else:
+            low = middle
+    _state_at(high, before, after, dense, y)
+    _note(watch, min(t + high * h, latest), FIRST_OWN + k, -1, y)
+    return new
+
+
+@helper
+def _end(t, h, begun, watch):  # type: ignore[no-untyped-def]
+    """Drop the events after the first at which the run stops; its part of the step, or 2."""
+    stop = np.inf
+    for row in range(begun, watch.counts[FOUND]):
+        if watch.stops[int(watch.found[row, 1])] != 0:
+            stop = min(stop, watch.found[row, 0])
+    if stop == np.inf:
+        return 2.0
+    kept = begun
+    for row in range(begun, watch.counts[FOUND]):
+        if watch.found[row, 0] <= stop:
+            watch.found[kept, :] = watch.found[row, :]
+            watch.states[kept, :] = watch.states[row, :]
+            kept += 1
+    watch.counts[FOUND] = kept
+    return (stop - t) / h
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, WATCH, motion.GRADIENTS))
+def begin(t, y, held_s, depth, held_watch, scratch):  # type: ignore[no-untyped-def]
+    """Take the state at the start of a run for that from which things change."""
+    s, watch = borrowed(held_s), borrowed(held_watch)
+    for j in range(len(watch.zones)):
+        watch.zones[j] = _zone(j, t, y, s, watch, depth, scratch.force[0], scratch.rates[0])
+    for k in range(len(watch.own)):
+        watch.own_values[k] = event_at(watch.own[k])(t, y, watch.own_parameters[k])
+
+
+@kernel(types.f8(f8, f8, f8, SYSTEM, vector, WATCH, motion.GRADIENTS, vector, vector, matrix,
+                 vector))
+def next_switch(  # type: ignore[no-untyped-def]
+    t, h, latest, held_s, held_depth, held_watch, held_scratch, held_before, held_after,
+    held_dense, held_y,
+):
+    """Part of the step until a normal force begins, ends or passes its depth; 1 if none does."""
+    s, watch, scratch = borrowed(held_s), borrowed(held_watch), borrowed(held_scratch)
+    depth, before, after = borrowed(held_depth), borrowed(held_before), borrowed(held_after)
+    dense, y = borrowed(held_dense), borrowed(held_y)
+    force, rates = scratch.force[0], scratch.rates[0]
+    first = 1.0
+    for j in range(len(watch.zones)):
+        old = _normal_zone(watch.zones[j])
+        if _normal_zone(_zone(j, min(t + h, latest), after, s, watch, depth, force,
+                              rates)) == old:
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            rodas.interpolated(middle, before, after, dense, y)
+            zone = _zone(j, min(t + middle * h, latest), y, s, watch, depth, force, rates)
+            if _normal_zone(zone) == old:
+                low = middle
+            else:
+                high = middle
+        first = min(first, high)
+    return first
+
+
+@kernel(types.f8(f8, f8, f8, SYSTEM, vector, WATCH, motion.GRADIENTS, vector, vector, matrix,
+                 vector))
+def note_events(  # type: ignore[no-untyped-def]
+    t, h, latest, held_s, held_depth, held_watch, held_scratch, held_before, held_after,
+    held_dense, held_y,
+):
+    """Note the events of an accepted step; the part of it after which the run ends, or 2."""
+    s, watch, scratch = borrowed(held_s), borrowed(held_watch), borrowed(held_scratch)
+    depth, before, after = borrowed(held_depth), borrowed(held_before), borrowed(held_after)
+    dense, y = borrowed(held_dense), borrowed(held_y)
+    force, rates = scratch.force[0], scratch.rates[0]
+    begun = watch.counts[FOUND]
+    n = len(watch.zones)
+    for look in range(_LOOKS):
+        left, right = look / _LOOKS, (look + 1) / _LOOKS
+        _state_at(right, before, after, dense, y)
+        now = min(t + right * h, latest)
+        for k in range(len(watch.own)):
+            watch.own_values[k] = _own(k, t, h, latest, left, right, before, after, dense, watch,
+                                       y)
+            _state_at(right, before, after, dense, y)
+        for j in range(n):
+            zone = _zone(j, now, y, s, watch, depth, force, rates)
+            if watch.counts[NODES] == 0 or zone % DEEP == watch.zones[j] % DEEP:
+                watch.zones[j] = zone
+                continue
+            low = left
+            for _ in range(_MOST_A_NODE):
+                old = watch.zones[j] % DEEP
+                if old == zone % DEEP:
+                    break
+                low, watch.zones[j] = _changed(j, t, h, latest, low, right, s, watch, depth, force,
+                                               rates, before, after, dense, y)
+                at, new = min(t + low * h, latest), watch.zones[j] % DEEP
+                if old == OPEN:
+                    _note(watch, at, TOUCH_DOWN, j, y)
+                if new == OPEN:
+                    _note(watch, at, LIFT_OFF, j, y)
+                elif new == STICKING:
+                    _note(watch, at, STICK, j, y)
+                elif old == STICKING:
+                    _note(watch, at, SLIP, j, y)
+            watch.zones[j] = zone
+            _state_at(right, before, after, dense, y)
+    return _end(t, h, begun, watch)
