@@ -172,10 +172,8 @@ class Collocation(Problem):
         self, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, float]:
         """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
-        stability = linearisation.floquet
-        # At a fold a multiplier passes one as well, but there the parameter turns.
-        return {"period doubling": stability.doubling_test(), "torus": stability.torus_test(),
-                "branch point": float(np.sign(tangent[-1])) * stability.unit_test()}
+        found: dict[str, float] = linearisation.floquet.tests(tangent)
+        return found
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, mesh and the extremes of the states."""

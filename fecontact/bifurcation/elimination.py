@@ -53,12 +53,8 @@ def factors_for(intervals: int, points: int, states: int, common: int) -> Factor
 
 @helper
 def eliminate(a, count, pivots):  # type: ignore[no-untyped-def]
-    """Eliminate the first columns of a (rows, columns) in place, with row interchanges.
-
-    Returns the sign of the product of the pivots, of the interchanges too.
-    """
+    """Eliminate the first columns of a (rows, columns) in place, with row interchanges."""
     rows, columns = a.shape
-    sign = 1.0
     for k in range(count):
         row, largest = k, abs(a[k, k])
         for i in range(k + 1, rows):
@@ -66,11 +62,8 @@ def eliminate(a, count, pivots):  # type: ignore[no-untyped-def]
                 row, largest = i, abs(a[i, k])
         pivots[k] = row
         if row != k:
-            sign = -sign
             for c in range(columns):
                 a[k, c], a[row, c] = a[row, c], a[k, c]
-        if a[k, k] < 0.0:
-            sign = -sign
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse
         i = k + 1
@@ -91,7 +84,6 @@ def eliminate(a, count, pivots):  # type: ignore[no-untyped-def]
             for c in range(k + 1, columns):
                 a[i, c] -= factor * a[k, c]
             i += 1
-    return sign
 
 
 @helper
@@ -118,23 +110,52 @@ def _reduce_row(a, count, row, weights):  # type: ignore[no-untyped-def]
             row[c] -= factor * a[k, c]
 
 
-@kernel(types.f8(block, matrix, block, vector, f8, matrix, matrix, i8, FACTORS))
+@kernel(types.void(FACTORS))
+def chain_intervals(factors):  # type: ignore[no-untyped-def]
+    """Eliminate x_1, x_2, ... from the last d rows of each interval."""
+    factors = borrowed(factors)
+    local, chain, end = factors.local, factors.chain, factors.end
+    N, size, width = local.shape
+    inner = factors.local_pivots.shape[1]
+    d = size - inner
+    e = width - inner - 2 * d
+    for i in range(d):
+        for c in range(2 * d + e):
+            end[i, c] = local[0, inner + i, inner + c]
+    for j in range(1, N):
+        a = chain[j - 1]
+        for i in range(d):
+            for c in range(d):
+                a[i, c] = end[i, d + c]
+                a[i, d + c] = end[i, c]
+                a[i, 2 * d + c] = 0.0
+                a[d + i, c] = local[j, inner + i, inner + c]
+                a[d + i, d + c] = 0.0
+                a[d + i, 2 * d + c] = local[j, inner + i, inner + d + c]
+            for c in range(e):
+                a[i, 3 * d + c] = end[i, 2 * d + c]
+                a[d + i, 3 * d + c] = local[j, inner + i, inner + 2 * d + c]
+        eliminate(a, d, factors.chain_pivots[j - 1])
+        for i in range(d):
+            for c in range(2 * d + e):
+                end[i, c] = a[d + i, d + c]
+
+
+@kernel(types.void(block, matrix, block, vector, f8, matrix, matrix, i8, FACTORS))
 def condense(J, f, P, widths, T, values, slopes, with_period, factors):  # type: ignore[no-untyped-def]
-    """Factorise the system of x' = T f on intervals; returns the sign of its pivots' product.
+    """Factorise the system of x' = T f on intervals.
 
     J (N m, d, d), f (N m, d) and P (N m, d, q) at the collocation points; values and slopes
     (m, m + 1) of the basis there. Rows: sum_k slopes x_k - h T f. The common unknowns are T (if
     ``with_period``) and q parameters.
     """
     J, f, P, factors = borrowed(J), borrowed(f), borrowed(P), borrowed(factors)
-    local, chain, end = factors.local, factors.chain, factors.end
+    local = factors.local
     N = len(widths)
     m = len(values)
     d = f.shape[1]
     q = P.shape[2]
     inner = (m - 1) * d
-    e = local.shape[2] - inner - 2 * d
-    sign = 1.0
     for j in range(N):
         a = local[j]
         step = widths[j] * T
@@ -157,28 +178,8 @@ def condense(J, f, P, widths, T, values, slopes, with_period, factors):  # type:
                     first += 1
                 for l in range(q):
                     a[row, first + l] = -step * P[here, i, l]
-        sign *= eliminate(a, inner, factors.local_pivots[j])
-    for i in range(d):
-        for c in range(2 * d + e):
-            end[i, c] = local[0, inner + i, inner + c]
-    for j in range(1, N):
-        a = chain[j - 1]
-        for i in range(d):
-            for c in range(d):
-                a[i, c] = end[i, d + c]
-                a[i, d + c] = end[i, c]
-                a[i, 2 * d + c] = 0.0
-                a[d + i, c] = local[j, inner + i, inner + c]
-                a[d + i, d + c] = 0.0
-                a[d + i, 2 * d + c] = local[j, inner + i, inner + d + c]
-            for c in range(e):
-                a[i, 3 * d + c] = end[i, 2 * d + c]
-                a[d + i, 3 * d + c] = local[j, inner + i, inner + 2 * d + c]
-        sign *= eliminate(a, d, factors.chain_pivots[j - 1])
-        for i in range(d):
-            for c in range(2 * d + e):
-                end[i, c] = a[d + i, d + c]
-    return sign
+        eliminate(a, inner, factors.local_pivots[j])
+    chain_intervals(factors)
 
 
 @kernel(types.void(FACTORS, vector, matrix, matrix, vector))

@@ -1,6 +1,7 @@
 """Floquet multipliers of a periodic orbit, and what they say of its stability."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from fecontact.bifurcation.periodic_schur import eigenvalues_of_product, transit
 from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]
+
+_NEAR = 1e-2  # distance of a critical multiplier from the circle, at a point located coarsely
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,28 @@ class Floquet:
     def stable(self) -> bool:
         """Whether all disturbances die away."""
         return self.unstable == 0
+
+    def tests(self, tangent: Array) -> dict[str, float]:
+        """Test functions of special points of a branch with this tangent, parameter last."""
+        # At a fold a multiplier passes one as well, but there the parameter turns.
+        return {"period doubling": self.doubling_test(), "torus": self.torus_test(),
+                "branch point": float(np.sign(tangent[-1])) * self.unit_test()}
+
+    def confirmed(self, kind: str) -> dict[str, Any] | None:
+        """What the multipliers say of a zero of a test function; None if it is no special point.
+
+        A torus bifurcation gets its name, Neimark-Sacker, and the angle of the pair.
+        """
+        mu = self.others
+        if kind == "period doubling":
+            return {} if np.abs(mu + 1.0).min() <= _NEAR else None
+        if kind != "torus":
+            return {}
+        pairs = mu[mu.imag > 1e-6]
+        if not len(pairs) or np.abs(np.abs(pairs) - 1.0).min() > _NEAR:
+            return None
+        critical = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))]
+        return {"kind": "Neimark-Sacker", "angle": float(np.angle(critical))}
 
     def doubling_test(self) -> float:
         """Product of mu + 1, scaled: changes sign where a multiplier passes -1."""

@@ -83,19 +83,15 @@ class Linearised:
         P[:, :, 0] = (up - down) / (2.0 * h * T)
 
     @cached_property
-    def _factorised(self) -> tuple[elimination.Factors, float]:
+    def factors(self) -> elimination.Factors:
+        """The condensed equations."""
         problem = self.problem
         f, J, P = self.derivatives
         factors = elimination.factors_for(problem.intervals, problem.degree, f.shape[1],
                                           problem.common)
-        sign = elimination.condense(J, f, P, problem.widths, self.period, problem.rule.values,
-                                    problem.rule.slopes, int(problem.autonomous), factors)
-        return factors, sign
-
-    @property
-    def factors(self) -> elimination.Factors:
-        """The condensed equations."""
-        return self._factorised[0]
+        elimination.condense(J, f, P, problem.widths, self.period, problem.rule.values,
+                             problem.rule.slopes, int(problem.autonomous), factors)
+        return factors
 
     @cached_property
     def _phase(self) -> "Border":

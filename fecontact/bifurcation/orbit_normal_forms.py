@@ -42,26 +42,15 @@ def examined(
     'criticality' its meaning: 'supercritical', 'subcritical', or 'uncertain' where differences
     over smaller and smaller steps do not agree. Without ``details`` these are left out.
     """
-    stability = linearised.floquet
-    mu = stability.others
-    if kind == "period doubling":
-        nearest = mu[np.argmin(np.abs(mu + 1.0))]
-        if abs(nearest + 1.0) > 1e-2:
-            return None
-        return _judged(Expansion(problem, u, linearised).doubling) if details else {}
-    if kind == "torus":
-        complex_pairs = mu[mu.imag > 1e-6]
-        if not len(complex_pairs):
-            return None
-        nearest = complex_pairs[np.argmin(np.abs(np.abs(complex_pairs) - 1.0))]
-        if abs(abs(nearest) - 1.0) > 1e-2:
-            return None
-        angle = float(np.angle(nearest))
-        found: dict[str, Any] = {"kind": "Neimark-Sacker", "angle": angle}
-        if details:
-            found |= _judged(partial(Expansion(problem, u, linearised).torus, angle))
+    found = linearised.floquet.confirmed(kind)
+    if found is None or not details:
         return found
-    return {}
+    if kind == "period doubling":
+        found |= _judged(Expansion(problem, u, linearised).doubling)
+    elif kind == "torus":
+        expansion = Expansion(problem, u, linearised)
+        found |= _judged(partial(expansion.torus, found["angle"]))
+    return found
 
 
 def _judged(coefficient: Any) -> dict[str, Any]:
