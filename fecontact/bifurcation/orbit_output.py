@@ -7,16 +7,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.bifurcation.interpolation import extremes, interpolate
+from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
 
 
 def orbit_nodes(point: BranchPoint, states: int) -> tuple[Array, Array, int]:
-    """Mesh (N + 1,), nodes (N m, d) and degree m of an orbit; ``states`` is d."""
+    """Mesh (N + 1,), nodes (N m, d) and degree m of an orbit; ``states`` is d.
+
+    Raises
+    ------
+    InputError
+        If the orbit was not found by collocation.
+    """
+    if "mesh" not in point.values:
+        raise InputError("The point is no periodic orbit.")
     mesh = np.asarray(point.values["mesh"], dtype=float)
     # Behind the nodes stand the parameter and, without forcing, the period.
     intervals = len(mesh) - 1
     degree = (len(point.u) - 1) // (intervals * states)
+    if degree < 2:
+        raise InputError("The orbit was found by shooting, which keeps the states at the ends of "
+                         "its segments only; run it from there with simulate.")
     count = intervals * degree * states
     return mesh, np.ascontiguousarray(point.u[:count].reshape(-1, states)), degree
 

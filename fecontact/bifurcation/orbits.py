@@ -14,14 +14,15 @@ from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.interpolation import equidistributed
+from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.vector_field import VectorField
-from fecontact.errors import FecontactError, InputError, require_positive
+from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
 
 # Special points of a branch, and the distance to both sides over which they are located again.
 _KINDS = ("fold", "period doubling", "Neimark-Sacker", "branch point")
-_NEAR = 1e-3
+_NEAR = (1e-3, 1e-2)
 
 
 def orbits_from_hopf(
@@ -74,12 +75,12 @@ def orbits_from_hopf(
     values = np.array(branch.attributes["parameter_values"], dtype=float)
     values[free] = point.parameter
     state = np.ascontiguousarray(point.u[:-1])
-    chosen = _settings(settings, bounds)
-    sizes, limits = _sizes(scales, default_scales(Equilibrium(field, values, state)))
+    chosen = settings_of(settings, bounds)
+    sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
     start = orbit_starts.from_hopf(
         field, values, free, state, float(point.details["angular_frequency"]),
         point.details["eigenvector"], intervals, degree,
-        np.append(sizes, _width(width, chosen, point.parameter)))
+        np.append(sizes, width_of(width, chosen, point.parameter)))
     return _followed(start, chosen, limits)
 
 
@@ -120,12 +121,12 @@ def orbits_from_motion(
     """
     free = field.index(parameter)
     given = field.values if values is None else np.array(values, dtype=float)
-    chosen = _settings(settings, bounds)
+    chosen = settings_of(settings, bounds)
     amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
-    sizes, limits = _sizes(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
+    sizes, limits = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
     problem, u = orbit_starts.corrected(*orbit_starts.from_samples(
         field, given, free, times, states, period, intervals, degree, periods,
-        np.append(sizes, _width(width, chosen, given[free]))))
+        np.append(sizes, width_of(width, chosen, given[free]))))
     return _followed((problem, u, None), chosen, limits, direction=direction, both=both)
 
 
@@ -146,7 +147,7 @@ def orbits_beyond(
         If no other orbits begin at a point of this kind.
     """
     problem, u, tangent = restored(field, branch, point)
-    chosen = _settings(settings, bounds)
+    chosen = settings_of(settings, bounds)
     if point.kind == "period doubling":
         problem, u, tangent = orbit_starts.doubled(problem, u, intervals)
     elif point.kind == "branch point":
@@ -177,30 +178,6 @@ def restored(
     return problem, point.u, point.tangent
 
 
-def _settings(settings: Settings | None, bounds: tuple[float, float] | None) -> Settings:
-    chosen = settings or Settings()
-    return chosen if bounds is None else replace(chosen, bounds=bounds)
-
-
-def _sizes(given: ArrayLike | None, found: Array) -> tuple[Array, Array | None]:
-    """Scales (d,) of the states, and up to where they grow with the orbit."""
-    if given is None:
-        return found, 100.0 * found
-    sizes = np.asarray(given, dtype=float)
-    if sizes.shape != found.shape or not (sizes > 0.0).all():
-        raise InputError(f"scales = {given!r} must hold {len(found)} numbers above zero, one for "
-                         f"each state.")
-    return sizes, None
-
-
-def _width(given: float | None, settings: Settings, value: float) -> float:
-    if given is not None:
-        require_positive("orbits", width=given)
-        return given
-    span = settings.bounds[1] - settings.bounds[0]
-    return float(span) if np.isfinite(span) else abs(float(value)) or 1.0
-
-
 def _followed(
     start: tuple[Collocation, Array, Array | None], settings: Settings, limits: Array | None,
     **options: Any,
@@ -225,18 +202,21 @@ def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
     point = branch.points[index]
     problem, u, _ = restored(field, branch, point)
     # At branch points the tangent is not defined; that of a neighbour serves for all kinds.
-    near = next((other for other in branch.points[index::-1] if other.kind is None),
-                branch.points[-1])
-    before, start, direction = restored(field, branch, near)
+    neighbour = next((other for other in branch.points[index::-1] if other.kind is None),
+                     branch.points[-1])
+    before, start, direction = restored(field, branch, neighbour)
     tangent = before.on_mesh(problem.mesh, start, direction)[2]
     mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, problem.intervals)
     problem, u, tangent = problem.on_mesh(mesh, u, tangent)
-    settings = Settings(step=2.0 * _NEAR, largest_step=2.0 * _NEAR, points=2)
-    try:
-        for found in continuation(replace(problem, renewal=0), u - _NEAR * tangent, settings,
-                                  tangent=tangent):
-            if found.kind == point.kind:
-                return replace(found, tangent=tangent)
-    except FecontactError:
-        pass
+    problem = replace(problem, renewal=0)
+    # The scales may have grown along the branch.
+    tangent = tangent / np.sqrt(problem.weights() @ tangent**2)
+    for near in _NEAR:
+        settings = Settings(step=2.0 * near, largest_step=2.0 * near, points=2)
+        try:
+            for found in continuation(problem, u - near * tangent, settings, tangent=tangent):
+                if found.kind == point.kind:
+                    return replace(found, tangent=tangent)
+        except FecontactError:
+            continue
     return point
