@@ -104,7 +104,8 @@ def _zero(
         if not best:
             return None
     size, at = min(best, key=lambda pair: pair[0])
-    return at if size <= 1e-3 * max(abs(before), abs(after)) else None
+    # At a pole or a jump the values do not get small; how small they get else, the precision says.
+    return at if size <= max(1e-3, 50.0 * precision) * max(abs(before), abs(after)) else None
 
 
 class _LostError(Exception):
