@@ -213,13 +213,13 @@ class Collocation(Problem):
     def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """Problem, u and tangent on another mesh."""
         times = node_times(mesh, self.degree)
-        moved = [np.concatenate([
-            interpolate(self.mesh, self.nodes(given), times).reshape(-1),
-            given[self.size:]]) for given in (u, tangent)]
-        problem = replace(self, mesh=mesh, age=0,
-                          reference=moved[0][: len(times) * self.field.dimension].reshape(
-                              len(times), -1).copy())
-        return problem, moved[0], moved[1]
+        d = self.field.dimension
+        both = interpolate(self.mesh, np.concatenate([self.nodes(u), self.nodes(tangent)], axis=1),
+                           times)
+        reference = np.ascontiguousarray(both[:, :d])
+        problem = replace(self, mesh=mesh, age=0, reference=reference)
+        return (problem, np.concatenate([reference.reshape(-1), u[self.size :]]),
+                np.concatenate([both[:, d:].reshape(-1), tangent[self.size :]]))
 
 
 def require_mesh(intervals: int, degree: int) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.inner_product import weighted_norm
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
 from fecontact.errors import AnalysisError
 
@@ -92,5 +93,4 @@ def _tests(
 
 def norm(problem: Problem, vector: Array) -> float:
     """Length of a vector in the problem's inner product."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.sqrt(problem.weights() * vector @ vector))
+    return float(weighted_norm(problem.weights(), vector))

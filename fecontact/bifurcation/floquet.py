@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.elimination import Factors
+from fecontact.bifurcation.multiplier_tests import multiplier_tests
 from fecontact.bifurcation.periodic_schur import eigenvalues_of_product, transitions
 from fecontact.errors import AnalysisError
 
@@ -50,7 +51,10 @@ class Floquet:
     @property
     def unstable(self) -> int:
         """Number of multipliers outside the unit circle."""
-        return int(np.sum(np.abs(self.others) > 1.0))
+        outside = np.abs(self.multipliers) > 1.0
+        if self.trivial is not None:
+            outside[self.trivial] = False
+        return int(outside.sum())
 
     @property
     def stable(self) -> bool:
@@ -59,9 +63,19 @@ class Floquet:
 
     def tests(self, tangent: Array) -> dict[str, float]:
         """Test functions of special points of a branch with this tangent, parameter last."""
+        doubling, unit, torus = self.products
         # At a fold a multiplier passes one as well, but there the parameter turns.
-        return {"period doubling": self.doubling_test(), "torus": self.torus_test(),
-                "branch point": float(np.sign(tangent[-1])) * self.unit_test()}
+        return {"period doubling": doubling, "torus": torus,
+                "branch point": float(np.sign(tangent[-1])) * unit}
+
+    @property
+    def products(self) -> tuple[float, float, float]:
+        """Functions that change sign where a multiplier passes -1, where one passes 1, and where
+        a pair passes the unit circle, or the product of two real ones passes one (neutral saddle).
+        """
+        out = np.empty(3)
+        multiplier_tests(self.multipliers, -1 if self.trivial is None else self.trivial, out)
+        return float(out[0]), float(out[1]), float(out[2])
 
     def confirmed(self, kind: str) -> dict[str, Any] | None:
         """What the multipliers say of a zero of a test function; None if it is no special point.
@@ -78,26 +92,6 @@ class Floquet:
             return None
         critical = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))]
         return {"kind": "Neimark-Sacker", "angle": float(np.angle(critical))}
-
-    def doubling_test(self) -> float:
-        """Product of mu + 1, scaled: changes sign where a multiplier passes -1."""
-        mu = self.others
-        return float(np.prod((mu + 1.0) / (np.abs(mu) + 1.0)).real)
-
-    def unit_test(self) -> float:
-        """Product of mu - 1, scaled: changes sign where a multiplier passes 1."""
-        mu = self.others
-        return float(np.prod((mu - 1.0) / (np.abs(mu) + 1.0)).real)
-
-    def torus_test(self) -> float:
-        """Product of mu_i mu_k - 1 over pairs, scaled: changes sign where a pair passes the circle.
-
-        So it does where the product of two real multipliers passes one (neutral saddle).
-        """
-        mu = self.others
-        first, second = np.triu_indices(len(mu), 1)
-        product = mu[first] * mu[second]
-        return float(np.prod((product - 1.0) / (np.abs(product) + 1.0)).real)
 
 
 def floquet_of(factors: Factors, autonomous: bool) -> Floquet:

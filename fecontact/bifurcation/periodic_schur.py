@@ -14,7 +14,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.elimination import FACTORS
-from fecontact.compiled import block, borrowed, helper, kernel, vector
+from fecontact.compiled import block, borrowed, helper, kernel
 
 _complex = types.complex128
 _complex_block = types.Array(_complex, 3, "C")
@@ -266,13 +266,13 @@ def _plain_step(H, first, last, cosines, sines):  # type: ignore[no-untyped-def]
         _upward(H, k, cosines[k], sines[k])
 
 
-@kernel(types.i8(_complex_block, _complex_vector, vector))
-def product_eigenvalues(H, mantissas, exponents):  # type: ignore[no-untyped-def]
-    """Fill the d eigenvalues mantissa * 2^exponent of H[K - 1] ... H[0] (K, d, d), used up.
+@kernel(types.boolean(block, _complex_vector))
+def product_eigenvalues(M, values):  # type: ignore[no-untyped-def]
+    """Fill the d eigenvalues of M[N - 1] ... M[0] (N, d, d), used up; the largest first.
 
-    Returns how many were found, counted from the smallest block up: d if all.
+    Returns whether they were found.
     """
-    H = borrowed(H)
+    H = M[: merge(M)].astype(np.complex128)
     K, d, _ = H.shape
     _to_hessenberg(H)
     h = H[0]
@@ -292,7 +292,7 @@ def product_eigenvalues(H, mantissas, exponents):  # type: ignore[no-untyped-def
             continue
         tries += 1
         if tries > _STEPS:
-            return d - 1 - last
+            return False
         if tries == 1:
             _plain_step(H, first, last, cosines, sines)
         else:
@@ -302,14 +302,21 @@ def product_eigenvalues(H, mantissas, exponents):  # type: ignore[no-untyped-def
         for j in range(K):
             value *= H[j, i, i]
             size = abs(value)
+            if not size < np.inf:
+                return False
             if size == 0.0:
                 break
             shift = math.frexp(size)[1]
             value *= math.ldexp(1.0, -shift)
             exponent += shift
-        mantissas[i] = value
-        exponents[i] = exponent
-    return d
+        exponent = min(max(exponent, -1100), 1023)
+        value = complex(math.ldexp(value.real, exponent), math.ldexp(value.imag, exponent))
+        k = i
+        while k > 0 and abs(values[k - 1]) < abs(value):
+            values[k] = values[k - 1]
+            k -= 1
+        values[k] = value
+    return True
 
 
 def eigenvalues_of_product(factors: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -323,12 +330,7 @@ def eigenvalues_of_product(factors: NDArray[np.float64]) -> NDArray[np.complex12
     ArithmeticError
         If the iteration does not converge (seen only for matrices that are not finite).
     """
-    M = np.array(factors, dtype=float, order="C")
-    H = M[: merge(M)].astype(complex)
-    d = M.shape[1]
-    mantissas, exponents = np.zeros(d, dtype=complex), np.zeros(d)
-    if not np.isfinite(M).all() or product_eigenvalues(H, mantissas, exponents) < d:
+    values = np.empty(factors.shape[1], dtype=complex)
+    if not product_eigenvalues(np.array(factors, dtype=float, order="C"), values):
         raise ArithmeticError("the periodic QR algorithm did not converge")
-    power = np.clip(exponents, -1100, 1023).astype(int)
-    values = np.ldexp(mantissas.real, power) + 1j * np.ldexp(mantissas.imag, power)
-    return values[np.argsort(-np.abs(values), kind="stable")]
+    return values
