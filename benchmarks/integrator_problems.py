@@ -78,6 +78,18 @@ def impact_oscillator(periods: int = 50, outputs: int = 200) -> Problem:
     return Problem("a", system, np.zeros(2), times, _observed(basis, [(0, 1, 0), (0, 1, 1)]))
 
 
+def diagram(values: Array) -> list[ContactSystem]:
+    """(f): section 3 with two modes at many frequencies of the drive."""
+    r = 1.0 / np.sqrt(_STOP_MASS)
+    shape = [[0.0, 0.0], [r, 0.6 * r]]
+    basis = _basis([0.0, 2.0 * np.pi * 230.0], [0.0, 0.03], shape, shape)
+    system = ContactSystem(
+        basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
+        drive=Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
+                    angular_frequency=float(values[0])))
+    return [system.with_(**{"drive.angular_frequency": float(w)}) for w in values]
+
+
 def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Problem:
     """(b), (b2), (c): section 4 with one, two and three modes."""
     w, r = 13.8, 1.0 / np.sqrt(_BELT_MASS)

@@ -1,10 +1,19 @@
+from .analysis.impacts import Impacts, find_impacts, find_rests
+from .analysis.periods import Periodicity, count_periods, periodicity, strobed_states
+from .analysis.quantities import history
+from .analysis.receptance import frequency_response
+from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
+from .bifurcation.basins import Attractor, Axis, Basins, basins
 from .bifurcation.branch import Branch
+from .bifurcation.brute_force import BruteForce, brute_force
 from .bifurcation.contact_field import contact_field
 from .bifurcation.curves import fold_curve, hopf_curve
 from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
+from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .bifurcation.orbit_output import amplitude, orbit_history
 from .bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
 from .bifurcation.shooting_branch import orbits_by_shooting
@@ -21,8 +30,10 @@ from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
 from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
 from .integrate.sensitivity import Sensitivity, sensitivity
+from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.check import check_law
 from .laws.contract import (
     FrictionLaw,
     NormalLaw,
@@ -32,40 +43,46 @@ from .laws.contract import (
     normal_law,
 )
 from .laws.drive import Drive, Load, PointLoad
+from .laws.fourier_series import FourierSeries
 from .laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from .laws.friction_minimum import CubicFriction, GalvanettoFriction
 from .laws.ground import Ground
 from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.memory import (
-    BoucWenFriction,
-    DahlFriction,
-    IwanFriction,
-    JenkinsFriction,
-    LuGreFriction,
-)
+from .laws.maxwell_slip import IwanFriction, JenkinsFriction
+from .laws.memory import BoucWenFriction, DahlFriction, LuGreFriction
 from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .laws.normal_measured import MeasuredSurface
 from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
 from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
 from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
-from .laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from .laws.profiles import Flat, Sine
+from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
 from .laws.trace import Trace
 from .laws.transients import Pulse, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
-from .output.diagrams import plot_branches, plot_eigenvalues, plot_stability_map
+from .output.analysis_plots import (
+    plot_friction_work,
+    plot_poincare,
+    plot_response,
+    plot_spectrogram,
+    plot_spectrum,
+)
+from .output.dataset import to_xarray
+from .output.diagrams import plot_branches
+from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
+from .output.stability_plots import plot_eigenvalues, plot_stability_map
 from .output.store import read_case, write_case
 from .points import Patch
 from .rows import rows_from_dofs
@@ -76,11 +93,15 @@ from .system import ContactSystem
 __version__: str
 
 __all__ = [
+    "Attractor",
+    "Axis",
+    "Basins",
     "BasisReport",
     "Beam",
     "Block",
     "BoucWenFriction",
     "Branch",
+    "BruteForce",
     "Constant",
     "ConstantFriction",
     "ContactEvents",
@@ -112,6 +133,7 @@ __all__ = [
     "HarmonicSpeed",
     "Harmonics",
     "HyperbolicFriction",
+    "Impacts",
     "InputError",
     "IwanFriction",
     "JenkinsFriction",
@@ -119,6 +141,7 @@ __all__ = [
     "Load",
     "LossFactor",
     "LuGreFriction",
+    "LyapunovExponents",
     "Material",
     "MeasuredSurface",
     "Mesh",
@@ -128,6 +151,7 @@ __all__ = [
     "Patch",
     "Pendulum",
     "PerNode",
+    "Periodicity",
     "PointLoad",
     "PowerContact",
     "PowerLawContact",
@@ -141,6 +165,7 @@ __all__ = [
     "RoughSurface",
     "Sensitivity",
     "Sine",
+    "SmoothingCost",
     "SpeedRamp",
     "Status",
     "Study",
@@ -151,17 +176,30 @@ __all__ = [
     "TwoSidedStop",
     "VectorField",
     "amplitude",
+    "amplitude_spectrum",
+    "basins",
+    "brute_force",
+    "check_law",
     "contact_field",
+    "count_periods",
     "ensemble",
     "equilibrium_branch",
     "event",
+    "export_csv",
+    "export_mat",
+    "export_netcdf",
     "export_pvd",
     "find_equilibrium",
+    "find_impacts",
+    "find_rests",
     "fold_curve",
     "forcing_period",
+    "frequency_response",
     "friction_law",
     "generate",
+    "history",
     "hopf_curve",
+    "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
@@ -170,15 +208,22 @@ __all__ = [
     "orbits_by_shooting",
     "orbits_from_hopf",
     "orbits_from_motion",
+    "periodicity",
     "picture",
     "plot_branches",
     "plot_contact_map",
     "plot_eigenvalues",
     "plot_energies",
+    "plot_friction_work",
     "plot_history",
     "plot_modes",
     "plot_phase",
+    "plot_poincare",
+    "plot_response",
+    "plot_spectrogram",
+    "plot_spectrum",
     "plot_stability_map",
+    "power_spectral_density",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -187,10 +232,15 @@ __all__ = [
     "rows_from_dofs",
     "sensitivity",
     "simulate",
+    "smoothing_cost",
+    "spectrogram",
     "stability_map",
     "static_equilibrium",
     "strobe",
+    "strobed_states",
     "switched_branch",
+    "to_xarray",
+    "window",
     "write_case",
     "write_mesh",
 ]

@@ -47,6 +47,12 @@ class ModalBasis:
     groups : tuple of (str, int)
         Names of the contact groups and their numbers of nodes, in the order of the nodes; one
         group 'contact' of all when left out.
+
+    Raises
+    ------
+    InputError
+        For arrays of another shape, values that are not finite, tributary lengths that are not
+        positive, and groups that do not make up the contact nodes.
     """
 
     angular_frequencies: Array
@@ -127,7 +133,10 @@ class ModalBasis:
         return self.positions[2 : 2 + self.contact_nodes, 0]
 
     def point_index(self, point: str | int) -> int:
-        """Index into ``T`` of B, C, a further named point, or a contact node by its number."""
+        """Index into ``T`` of B, C, a further named point, or a contact node by its number.
+
+        InputError if there is none, with those that there are.
+        """
         if isinstance(point, int):
             if not 0 <= point < self.contact_nodes:
                 raise InputError(f"Contact node {point} does not exist; there are "

@@ -33,6 +33,11 @@ class Material:
         nu, above -1 and below 0.5.
     density : float
         rho, positive [kg/m^3].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
     """
 
     youngs_modulus: float = 2.1e11

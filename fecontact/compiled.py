@@ -5,6 +5,7 @@ laws, now and in later processes, a call from a kernel costs a few nanoseconds, 
 spent in converting function objects when the kernel is called from Python.
 """
 
+import dis
 import hashlib
 import inspect
 import re
@@ -150,14 +151,20 @@ class CompiledLaw:
         Raises
         ------
         InputError
-            If the function takes or returns something else than its form says, or uses what
-            cannot be compiled.
+            If the function takes or returns something else than its form says, uses what cannot
+            be compiled, or raises exceptions.
         """
         return int(self._compiled.address)
 
     @cached_property
     def _compiled(self) -> Any:
         function = self.python
+        raising = _raising(function)
+        if raising is not None:
+            raise InputError(f"The law {function.__name__}({_arguments(function)}) has a raise or "
+                             f"assert statement{raising}, which a compiled law cannot have; check "
+                             f"parameters in __post_init__ of the law's class, and return a "
+                             f"finite value everywhere.")
         law = CFunc(function, sigutils.normalize_signature(self._signature), {},
                     {"error_model": "numpy"})
         # Functions typed into a console have no file beside which they could be stored.
@@ -181,6 +188,20 @@ def compile_law(signature: Any, form: str, function: Callable[..., Any]) -> Comp
 
 def _arguments(function: Callable[..., Any]) -> str:
     return ", ".join(inspect.signature(function).parameters)
+
+
+def _raising(function: Callable[..., Any]) -> str | None:
+    """Where a function raises: "" for itself, " in NAME" for one that it calls, None for nowhere.
+
+    Behind an address exceptions are printed and lost, and the function returns zeros.
+    """
+    if any(step.opname == "RAISE_VARARGS" for step in dis.get_instructions(function)):
+        return ""
+    for name, value in inspect.getclosurevars(function).globals.items():
+        called = getattr(value, "py_func", None)
+        if called is not None and _raising(called) is not None:
+            return f" in {name}"
+    return None
 
 
 def function_at(signature: Any) -> Any:

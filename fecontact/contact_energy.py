@@ -3,6 +3,7 @@
 import numpy as np
 from numba import types
 
+from fecontact.body_powers import body_powers
 from fecontact.compiled import f8, kernel, vector
 from fecontact.contact_kernels import SYSTEM, contact_state
 from fecontact.laws.contract import normal_at, signal_at
@@ -16,27 +17,11 @@ POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "conta
 @kernel(types.void(f8, vector, SYSTEM, vector, vector))
 def powers(t, y, s, out, friction):  # type: ignore[no-untyped-def]
     """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
-    n, m = s.Tx.shape
+    n = len(s.Tx)
     speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
     state = np.empty((n, 6))
     contact_state(t, y, s, state)
-    out[:] = 0.0
-    for axis in range(2):
-        value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
-        pull = s.drive_stiffness[axis] * value
-        for i in range(m):
-            pull -= s.drive_shapes[axis, i] * y[i]
-        out[0] += pull * rate
-    for k in range(len(s.load)):
-        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
-        for i in range(m):
-            out[3] += value * s.load_shapes[k, i] * y[m + i]
-    for i in range(m):
-        out[3] += s.constant_load[i] * y[m + i]
-        for k in range(m):
-            product = y[m + i] * y[m + k]
-            out[4] += s.modal_damping[i, k] * product
-            out[5] += (s.damping[i, k] - s.modal_damping[i, k]) * product
+    body_powers(t, y, s, out)
     for j in range(n):
         force, tangential, v, slip = state[j, 0], state[j, 1], state[j, 3], state[j, 4]
         elastic = normal_at(s.normal[j])(state[j, 2], 0.0, s.normal_parameters[j])[0]

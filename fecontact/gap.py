@@ -24,6 +24,11 @@ class Crown:
         R, positive [m].
     centre : float
         Abscissa of the lowest point [m].
+
+    Raises
+    ------
+    InputError
+        For a radius that is not positive, and when it is used, one that a contact node exceeds.
     """
 
     radius: float
@@ -36,8 +41,9 @@ class Crown:
         """Gap [m] at abscissae x [m]; InputError beyond the circle."""
         away = np.asarray(x, dtype=float) - self.centre
         if (np.abs(away) > self.radius).any():
-            raise InputError(f"Crown: a contact node lies {np.abs(away).max():g} m from the "
-                             f"centre {self.centre:g}, beyond the radius {self.radius:g}.")
+            raise InputError(f"Crown: radius = {self.radius!r} must be at least "
+                             f"{np.abs(away).max():g}, the distance of the farthest contact node "
+                             f"from centre = {self.centre!r}.")
         return np.asarray(away**2 / (self.radius + np.sqrt(self.radius**2 - away**2)))
 
 

@@ -6,7 +6,9 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from fecontact.errors import InputError, choices, nearest
-from fecontact.laws.names import law_names
+from fecontact.laws.check import check_law
+from fecontact.laws.contract import FrictionLaw, NormalLaw
+from fecontact.laws.names import law_names, own_law
 from fecontact.report import table
 
 
@@ -22,13 +24,16 @@ def laws_table() -> Any:
 def law_help(name: str) -> str:
     """The documentation of the laws of a name, and how they stand in a study file.
 
-    The name is that in study files or that of the class; capitals do not matter.
+    The name is that in study files or that of the class; capitals do not matter. A law of one's
+    own, ``FILE.py:CLASS``, is checked too, see :func:`fecontact.laws.check.check_law`.
 
     Raises
     ------
     InputError
-        If there is no such law, with those that there are.
+        If there is no such law, with those that there are; if a law of one's own is wrong.
     """
+    if ".py:" in name:
+        return _own(name)
     laws = [(kind, law, cls) for kind, names in law_names().items() for law, cls in names.items()]
     found = [(kind, law, cls) for kind, law, cls in laws
              if name.lower() in (law, cls.__name__.lower())]
@@ -38,6 +43,18 @@ def law_help(name: str) -> str:
                          f"{choices(known)}.")
     return "\n\n".join(f"{inspect.getdoc(cls)}\n\nIn a study file:\n\n{_example(kind, law, cls)}"
                        for kind, law, cls in found)
+
+
+def _own(name: str) -> str:
+    cls = own_law(tuple(law_names()), name, name)
+    kind = next(kind for kind in law_names() if issubclass(cls, kind))
+    text = f"{inspect.getdoc(cls)}\n\nIn a study file:\n\n{_example(kind, name, cls)}"
+    if not issubclass(cls, NormalLaw | FrictionLaw):
+        return text
+    if any(entry.default is MISSING and entry.default_factory is MISSING for entry in fields(cls)):
+        return f"{text}\n\nIt is not checked, because it has parameters without a default."
+    check_law(cls())
+    return f"{text}\n\nWith these values it keeps the contract of laws: derivatives, signs, energy."
 
 
 def _example(kind: type, name: str, cls: type) -> str:

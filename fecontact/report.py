@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from fecontact.integrate.events import Events
     from fecontact.integrate.trajectory import Trajectory
     from fecontact.mesh import Mesh
 
@@ -51,10 +52,17 @@ def run_table(trajectory: "Trajectory") -> Any:
         ("time", f"{quantity(float(time[0]), 's')} ... {quantity(float(time[-1]), 's')}"),
         ("steps", f"{statistics.get('steps', 0)} in {statistics.get('seconds', 0.0):.1f} s"),
         ("energy imbalance", f"{trajectory.energies.imbalance:.1e}"),
+        *(() if trajectory.events is None else (("events", _events(trajectory.events)),)),
         ("largest displacement", f"{quantity(size, 'm')} at {place}"),
         *((f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()),
     ]
     return table("", "", rows=rows)
+
+
+def _events(events: "Events") -> str:
+    """Numbers of events by kind."""
+    kinds = dict.fromkeys(events.kind)
+    return ", ".join(f"{events.kind.count(kind)} {kind}" for kind in kinds) or "none"
 
 
 def largest_displacement(trajectory: "Trajectory") -> tuple[float, str]:

@@ -40,26 +40,24 @@ def write_run(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Pa
     from fecontact.output.store import write_case
 
     case = write_case(folder / f"{study.name}.vtkhdf", trajectory, frames=study.output.frames,
-                      study=study.to_toml())
+                      study=study.to_toml(), root=study.folder)
     return [case, *write_plots(study, trajectory, folder)]
 
 
 def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
     """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
+    from fecontact.analysis.quantities import usual_axis
     from fecontact.output import plots
 
     def file(what: str) -> Path:
         return folder / f"{study.name}-{what}.png"
 
     system, points = trajectory.system, study.output.points
-    # Where only the y direction is driven, the motion in x has nothing to show.
-    drive = system.drive
-    vertical = drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0
     middle = system.basis.contact_nodes // 2
     point = points[0] if points else "B" if system.basis.T[0].any() else middle
     return [
         plots.plot_history(trajectory, file("history"), points),
-        plots.plot_phase(trajectory, file("phase"), point, "y" if vertical else "x"),
+        plots.plot_phase(trajectory, file("phase"), point, usual_axis(system)),
         plots.plot_contact_map(trajectory, file("contact")),
         plots.plot_energies(trajectory, file("energies")),
     ]

@@ -11,6 +11,7 @@ from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Crown
+from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.contract import FrictionLaw, NormalLaw
@@ -20,16 +21,16 @@ from fecontact.laws.ground import Ground
 from fecontact.laws.names import with_folder
 from fecontact.laws.normal import RoughSurface
 from fecontact.mesh import Mesh
-from fecontact.shapes import Beam, Block, Pendulum
+from fecontact.study_geometry import Geometry, MeshFile, geometry_from_table, geometry_table
 from fecontact.study_sections import (
     BasisSettings,
     BodySettings,
     ContactLaws,
-    MeshFile,
     OutputSettings,
     RenderSettings,
     SimulationSettings,
 )
+from fecontact.study_system import contact_system
 from fecontact.system import ContactSystem
 from fecontact.tables import (
     PART_CLASSES,
@@ -42,8 +43,6 @@ from fecontact.tables import (
 )
 
 Gap = float | tuple[float, ...] | Crown
-
-SHAPES: Mapping[str, type] = {"beam": Beam, "pendulum": Pendulum, "block": Block}
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
@@ -87,7 +86,7 @@ class Study:
         The file; other files are named relative to it.
     """
 
-    geometry: Beam | Pendulum | Block | MeshFile
+    geometry: Geometry
     body_settings: BodySettings = field(default_factory=BodySettings)
     basis_settings: BasisSettings = field(default_factory=BasisSettings)
     normal: NormalLaw = field(default_factory=RoughSurface)
@@ -150,7 +149,7 @@ class Study:
             raise InputError(f"{title} lacks the section [geometry]; give a shape and its "
                              f"dimensions, or the file of a mesh.")
         return cls(
-            _geometry(tables["geometry"], f"{title}: [geometry]"),
+            geometry_from_table(tables["geometry"], f"{title}: [geometry]"),
             gap=_gap(tables.get("gap", 0.0), title),
             contact=convert(tables.get("contact", {}), Mapping[str, ContactLaws], title,
                             "contact"),
@@ -184,13 +183,11 @@ class Study:
 
     def tables(self, *, defaults: bool = True) -> dict[str, Any]:
         """All sections as tables for TOML, with or without values equal to the defaults."""
-        geometry = to_table(self.geometry, defaults=defaults)
-        shape = {kind: name for name, kind in SHAPES.items()}.get(type(self.geometry))
         sections = {name: to_table(getattr(self, attribute), defaults=defaults)
                     for name, attribute in _ATTRIBUTES.items()}
         contact = {"contact": plain(self.contact)} if self.contact else {}
         return {"gap": plain(self.gap),
-                "geometry": geometry if shape is None else {"shape": shape, **geometry},
+                "geometry": geometry_table(self.geometry, defaults=defaults),
                 **contact,
                 **{name: table for name, table in sections.items() if table or defaults}}
 
@@ -247,21 +244,7 @@ class Study:
         FecontactError
             With the file and the section before the message, like all of these methods.
         """
-        title, basis = _title(self.path), self.basis()
-        parts = {part: getattr(self, part) for part in PART_CLASSES}
-        for part in ("normal", "friction"):
-            own = {group: law for group, laws in self.contact.items()
-                   if (law := getattr(laws, part)) is not None}
-            if own:
-                parts[part] = {name: parts[part] for name, _ in basis.groups} | own
-        try:
-            return ContactSystem(basis, gap=self.gap, **parts)
-        except InputError as error:
-            owner, _, message = str(error).partition(": ")
-            for part in PART_CLASSES:
-                if owner == type(getattr(self, part)).__name__:
-                    raise InputError(f"{title}: [{part}]: {message}") from None
-            raise InputError(f"{title}: {error}") from None
+        return contact_system(self, self.basis(), _title(self.path))
 
     def run(
         self, progress: Callable[[float], None] | None = None, checkpoint: Path | None = None
@@ -279,7 +262,11 @@ class Study:
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=settings.initial, outputs=settings.outputs,
                             method=settings.method, rtol=settings.rtol,
-                            restitution=settings.restitution, progress=progress,
+                            restitution=settings.restitution,
+                            static_coefficient=settings.static_coefficient,
+                            scheme=settings.scheme, progress=progress,
+                            events=(ContactEvents(settings.stop)
+                                    if settings.events or settings.stop else None),
                             checkpoint=checkpoint if settings.method == "Rodas5P" else None)
 
     @cached_property
@@ -306,20 +293,6 @@ class Study:
 
 def _title(path: Path | None) -> str:
     return "The study" if path is None else str(path)
-
-
-def _geometry(table: Any, where: str) -> Any:
-    if not isinstance(table, Mapping) or ("shape" in table) == ("file" in table):
-        raise InputError(f"{where} must have either a shape ({choices(SHAPES)}) or the file of a "
-                         f"mesh.")
-    if "file" in table:
-        return from_table(MeshFile, table, where)
-    shape = table["shape"]
-    if not isinstance(shape, str) or shape not in SHAPES:
-        raise InputError(f"{where}: shape = {shown(shape)} must be one of {choices(SHAPES)}"
-                         f"{nearest(str(shape), SHAPES)}.")
-    dimensions = {key: value for key, value in table.items() if key != "shape"}
-    return from_table(SHAPES[shape], dimensions, where)
 
 
 def _gap(value: Any, title: str) -> Gap:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 from fecontact.basis import ModalBasis
@@ -21,39 +20,6 @@ Support = Literal["x", "y", "xy", "hinge"]
 
 
 @dataclass(frozen=True)
-class MeshFile:
-    """``[geometry]`` with the file of a mesh; see :func:`fecontact.mesh_io.read_mesh`.
-
-    Parameters
-    ----------
-    file : str
-        The mesh, relative to the study file.
-    scale : float
-        Factor from the file's unit of length to m.
-    boundaries : mapping of name to name or box
-        Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1] [m].
-    points : mapping of name to name or place
-        Points to name: a group of the file, or the node nearest to [x, y] [m].
-    """
-
-    file: str
-    scale: float = 1.0
-    boundaries: Mapping[str, str | tuple[float, float, float, float]] = field(
-        default_factory=dict)
-    points: Mapping[str, str | tuple[float, float]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        require_positive("MeshFile", scale=self.scale)
-
-    def mesh(self, folder: Path) -> Mesh:
-        """Read the mesh; ``folder`` is that of the study file."""
-        from fecontact.mesh_io import read_mesh
-
-        return read_mesh(folder / self.file, scale=self.scale,
-                         boundaries=self.boundaries or None, points=self.points or None)
-
-
-@dataclass(frozen=True)
 class BodySettings:
     """``[body]``: material, thickness and supports; see :class:`fecontact.body.ElasticBody`.
 
@@ -67,10 +33,12 @@ class BodySettings:
     thickness : float
         Out-of-plane thickness [m].
     plane : 'stress' or 'strain'
+        Plane stress for thin bodies, plane strain for long ones.
     degree : 1 or 2
         Of the finite elements.
-    fixed : mapping of name to 'x', 'y' or 'xy'
-        Supports on boundaries and points of the mesh.
+    fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
+        Supports on boundaries and points of the mesh: the directions that are held, or a hole
+        that turns about its centre.
     """
 
     material: str | None = None
@@ -145,7 +113,9 @@ class BasisSettings:
         Number of modes, the rigid ones included.
     contact : str or list of str
         Boundary that touches the ground, or several, each a contact group of that name.
-    contact_nodes : int or 'all', or a list with one of them for each boundary
+    contact_nodes : int or 'all', or list
+        Number of contact nodes, or every node of the mesh there; a list has one of them for each
+        boundary.
     B, C : place, optional
         Excitation and load point: name of a point or boundary, [x, y], or a patch
         ``{at = name or [x, y], radius = r}``.
@@ -212,11 +182,21 @@ class SimulationSettings:
     outputs : int
         Number of equally spaced output times, both ends included.
     method : str
-        Integrator: 'Rodas5P', compiled; 'Radau', 'BDF', 'LSODA' of scipy; 'set-valued' friction.
+        Integrator: 'Rodas5P', compiled; 'Radau', 'BDF', 'LSODA' of scipy; 'CVODE' of
+        scikit-sundae; 'set-valued' friction.
     rtol : float
         Relative tolerance.
     restitution : float, optional
         For 'set-valued': rigid stops with this coefficient in place of the normal law.
+    static_coefficient : float, optional
+        For 'set-valued': limit of R/F in stick [-]; default that of the law.
+    scheme : str, optional
+        For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
+    events : bool
+        For 'Rodas5P': whether to locate touch-down, lift-off, stick and slip of every contact
+        node, and keep them with the result.
+    stop : list of str
+        Events at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
     initial : 'rest', 'sliding' or RigidStart
         Where it starts; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid
         motion.
@@ -228,6 +208,10 @@ class SimulationSettings:
     method: str = "Rodas5P"
     rtol: float = 1e-6
     restitution: float | None = None
+    static_coefficient: float | None = None
+    scheme: str | None = None
+    events: bool = False
+    stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding"] | RigidStart = "rest"
 
     def __post_init__(self) -> None:
@@ -306,3 +290,6 @@ class RenderSettings:
                              f"height in pixels, at least [320, 180].")
         if self.scale is not None:
             require_positive("RenderSettings", scale=self.scale)
+        if self.start is not None and self.end is not None and not self.start <= self.end:
+            raise InputError(f"RenderSettings: end = {self.end!r} must not be before start = "
+                             f"{self.start!r}.")

@@ -1,6 +1,6 @@
 """The contact system: a modal basis, laws at its contact nodes, drive and load."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from fecontact import contact_jacobian, contact_kernels
 from fecontact.basis import ModalBasis
-from fecontact.compiled import CompiledLaw
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Gap, gap_values
 from fecontact.laws.contract import FrictionLaw, NormalLaw
@@ -21,12 +20,12 @@ from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.soundness import require_sound
 from fecontact.parameters import parameters_of, with_parameters
+from fecontact.system_arrays import system_arrays
 
 Array = NDArray[np.float64]
 
 PARTS = ("normal", "friction", "ground", "drive", "load")
 
-_DIRECTIONS = ("x", "y", "moment")
 _KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
 
 
@@ -54,6 +53,12 @@ class ContactSystem:
     gap : float, (n,) sequence, Crown or function of x
         Initial distance g_j of the contact nodes from flat ground, zero or above [m]; kept as
         numbers.
+
+    Raises
+    ------
+    InputError
+        For a part of another kind, laws for groups that the basis lacks, parameters or gaps of
+        another number than there are contact nodes, and laws that :func:`require_sound` refuses.
     """
 
     basis: ModalBasis
@@ -153,6 +158,19 @@ class ContactSystem:
         return tuple(sorted({time for source in given
                              for time in source.breakpoints(start, end)}))
 
+    def shortest_period(self, start: float, end: float) -> float:
+        """Shortest period of drive, loads and waves under the body [s]; infinite without any.
+
+        Waves pass at the largest speed of the ground between two times [s].
+        """
+        given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
+        given += [force.signal for force in self.load.forces]
+        periods = [source.shortest_period for source in given]
+        wavelength, speed = self.ground.shortest_wavelength, self.ground.largest_speed(start, end)
+        if wavelength is not None and speed > 0.0:
+            periods.append(wavelength / speed)
+        return float(min((period for period in periods if period is not None), default=np.inf))
+
     def stored_energy(self, penetration: Array) -> Array:
         """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""
         energy = np.zeros(penetration.shape[:-1])
@@ -169,63 +187,10 @@ class ContactSystem:
                         friction_force[..., nodes])
              for nodes, _, law in self.law_groups("friction")], axis=-1)
 
-    def _law_table(self, kind: Literal["normal", "friction"]) -> tuple[NDArray[np.int64], Array]:
-        """Addresses (n,) and parameters (n, k) of the laws of all nodes."""
-        groups = [(law, law.table(share)) for _, share, law in self.law_groups(kind)]
-        width = max(table.shape[1] for _, table in groups)
-        return (np.concatenate([np.full(len(table), law.kernel.address, dtype=np.int64)
-                                for law, table in groups]),
-                np.vstack([np.pad(table, ((0, 0), (0, width - table.shape[1])))
-                           for _, table in groups]))
-
     @cached_property
     def arrays(self) -> contact_kernels.SystemArrays:
         """The system as the compiled kernels take it."""
-        basis, drive, ground = self.basis, self.drive, self.ground
-        B, C = basis.T[0], basis.T[1]
-        stiffness = np.diag(basis.angular_frequencies**2)
-        damping = basis.damping.copy()
-        for axis, c, b in ((0, drive.stiffness_x, drive.damping_x),
-                           (1, drive.stiffness_y, drive.damping_y)):
-            stiffness += c * np.outer(B[axis], B[axis])
-            damping += b * np.outer(B[axis], B[axis])
-        n, m = basis.contact_nodes, basis.modes
-        normal, normal_parameters = self._law_table("normal")
-        friction, friction_parameters = self._law_table("friction")
-        memory = [np.full(nodes.stop - nodes.start, law.memory, dtype=np.int64)
-                  for nodes, _, law in self.law_groups("friction")]
-        loads = self.load.forces
-        load_shapes = [basis.T[basis.point_index(force.point), _DIRECTIONS.index(force.direction)]
-                       for force in loads]
-        scale = ground.friction_scale_kernel
-        return contact_kernels.SystemArrays(
-            stiffness=stiffness,
-            damping=damping,
-            modal_damping=basis.damping.copy(),
-            constant_load=-self.load.normal * C[1],
-            drive_shapes=np.array([drive.stiffness_x * B[0], drive.stiffness_y * B[1]]),
-            drive_stiffness=np.array([drive.stiffness_x, drive.stiffness_y], dtype=float),
-            load_shapes=np.array(load_shapes, dtype=float).reshape(-1, m),
-            Tx=basis.contact_T[:, 0].copy(),
-            Ty=basis.contact_T[:, 1].copy(),
-            abscissa=basis.contact_x.copy(),
-            gap=np.array(np.broadcast_to(np.asarray(self.gap, dtype=float), n)),
-            normal_parameters=normal_parameters,
-            friction_parameters=friction_parameters,
-            profile_parameters=ground.profile_parameters(),
-            friction_scale_parameters=ground.friction_scale_parameters(),
-            ground_motion_parameters=ground.motion_parameters(),
-            drive_parameters=_rows([motion.parameters() for motion in drive.motions]),
-            load_parameters=_rows([force.signal.parameters() for force in loads]),
-            normal=normal,
-            friction=friction,
-            memory=np.concatenate(memory),
-            drive=_addresses(motion.kernel for motion in drive.motions),
-            load=_addresses(force.signal.kernel for force in loads),
-            profile=ground.profile_kernel.address,
-            friction_scale=0 if scale is None else scale.address,
-            ground_motion=ground.motion_kernel.address,
-        )
+        return system_arrays(self)
 
     def rhs(self, t: float, y: Array) -> Array:
         """Rate y' (2 m + n s,) of the state y = [q, q', z]."""
@@ -243,7 +208,8 @@ class ContactSystem:
         """Contact quantities (N, n, 6) at N times and states (N, 2 m + n s).
 
         The columns are normal force [N], friction force [N], penetration [m], its rate [m/s],
-        slip velocity [m/s] and the rate of the ground's height under the node [m/s].
+        slip velocity [m/s] and the rate of the ground's height under the node [m/s]. InputError
+        for states of another shape.
         """
         times = np.ascontiguousarray(times, dtype=float)
         states = np.ascontiguousarray(states, dtype=float)
@@ -316,15 +282,3 @@ def _outer_name(system: ContactSystem, name: str) -> str:
     if group not in getattr(system, kind):
         return name
     return f"contact.{group}.{kind}.{last}" if last else f"contact.{group}.{kind}"
-
-
-def _rows(parameters: list[Array]) -> Array:
-    """Parameters of several functions as one array, filled up with zeros."""
-    table = np.zeros((len(parameters), max((len(row) for row in parameters), default=1)))
-    for index, row in enumerate(parameters):
-        table[index, : len(row)] = row
-    return table
-
-
-def _addresses(kernels: Iterable[CompiledLaw]) -> NDArray[np.int64]:
-    return np.array([kernel.address for kernel in kernels], dtype=np.int64)

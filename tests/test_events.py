@@ -15,7 +15,9 @@ from fecontact import (
     Load,
     Status,
     event,
+    read_case,
     simulate,
+    write_case,
 )
 
 
@@ -121,6 +123,16 @@ def test_many_impacts_fill_the_table_more_than_once():
     assert (up[: count - 1] < down[1:count]).all()
     plain = simulate(system, 12.0, initial=np.zeros(4))
     assert (plain.states == run.states).all()
+
+
+def test_events_are_stored(tmp_path):
+    run = simulate(impact_oscillator(2), 0.5, initial=np.zeros(4), events=ContactEvents())
+    stored = read_case(write_case(tmp_path / "run.h5", run)).trajectory.events
+    assert len(stored) > 5
+    assert (stored.time == run.events.time).all()
+    assert stored.kind == run.events.kind
+    assert (stored.node == run.events.node).all()
+    assert (stored.states == run.events.states).all()
 
 
 def test_bad_input():

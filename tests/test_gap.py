@@ -68,7 +68,7 @@ def test_bad_gaps_are_refused():
         gap_values([0.0, 1.0], x)
     with pytest.raises(InputError, match=r"gap = -1.* must be finite and zero or above"):
         gap_values(-1e-6, x)
-    with pytest.raises(InputError, match=r"beyond the radius 0\.5"):
+    with pytest.raises(InputError, match=r"radius = 0\.5 must be at least 1, the distance"):
         gap_values(Crown(0.5), x)
     with pytest.raises(InputError, match="radius = 0"):
         Crown(0.0)

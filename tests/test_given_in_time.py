@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import fecontact as fc
+from fecontact.integrate import control, scipy_solvers
 
 MASS, STIFFNESS, DASHPOT = 2.0, 800.0, 3.0
 
@@ -120,3 +121,28 @@ def test_moment_and_constant_loads_at_points():
     assert start.displacement("C")[0, 2] == pytest.approx(turn, rel=1e-8)
     assert start.normal_force[0, 0] == pytest.approx(23.0, rel=1e-9)
     assert start.displacement("C")[1, 2] == pytest.approx(turn, rel=1e-8)
+
+
+def test_longest_steps_resolve_what_is_given_in_time():
+    """Parts of the run, of the shortest period, and of the time in which a wave passes."""
+    def loaded(signal):
+        return fc.Load(forces=(fc.PointLoad(point="C", direction="x", signal=signal),))
+
+    times = np.array([0.0, 10.0])
+    cases = {
+        0.5: point(drive=fc.Drive(stiffness_x=1.0, amplitude_x=1e-3,
+                                  angular_frequency=4.0 * np.pi)),
+        0.25: point(drive=fc.Drive(stiffness_x=1.0, motion_x=fc.Harmonic(1e-3, 8.0 * np.pi)),
+                    load=loaded(fc.Harmonic(1.0, np.pi))),
+        0.2: point(load=loaded(fc.Harmonic(1.0, 10.0 * np.pi))),
+        0.1: point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02)),
+        # The drive does not move: its frequency does not count.
+        np.inf: point(drive=fc.Drive(stiffness_x=1.0, angular_frequency=4.0 * np.pi)),
+    }
+    for period, system in cases.items():
+        assert control.longest_step(system, times) == pytest.approx(min(1.0, period / 4.0))
+        assert scipy_solvers.longest_step(system, times) == pytest.approx(min(0.2, period / 20.0))
+    ramp = point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02,
+                                  motion=fc.SpeedRamp(0.8, start=1.0, duration=1.0)))
+    assert ramp.shortest_period(0.0, 10.0) == pytest.approx(0.02 / 0.8)
+    assert ramp.shortest_period(0.0, 1.0) == pytest.approx(0.1)

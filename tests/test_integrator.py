@@ -14,7 +14,8 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.drive import Drive, Load, PointLoad
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground, HarmonicSpeed
-from fecontact.laws.memory import JenkinsFriction, LuGreFriction
+from fecontact.laws.maxwell_slip import JenkinsFriction
+from fecontact.laws.memory import LuGreFriction
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.normal_power import PowerContact
 from fecontact.laws.normal_stop import LinearContact

@@ -110,6 +110,31 @@ def test_a_law_of_ones_own(tmp_path):
     assert type(case.trajectory.system.friction).__name__ == "LogarithmicFriction"
 
 
+def test_a_study_with_a_law_of_its_own_can_be_moved(tmp_path, capsys):
+    (tmp_path / "here" / "laws").mkdir(parents=True)
+    (tmp_path / "here" / "laws" / "own.py").write_text(MEMORY_LAW)
+    (tmp_path / "here" / "study.toml").write_text(
+        f'{HEAD}\n[friction]\nlaw = "laws/own.py:Mine"\n[load]\nnormal = 10.0\n[drive]\n'
+        f'stiffness_x = 1e4\n[simulation]\nt_end = 1e-4\noutputs = 3\n')
+    assert execute(["run", str(tmp_path / "here" / "study.toml")]) == 0
+    moved = (tmp_path / "here").rename(tmp_path / "there")
+    case = fc.read_case(moved / "results" / "study.vtkhdf")
+    assert type(case.trajectory.system.friction).__name__ == "Mine"
+    assert Study.from_toml(case.study).friction == Study.read(moved / "study.toml").friction
+    capsys.readouterr()
+    assert execute(["export", str(moved / "study.toml"), "--frames", "2"]) == 0
+    assert "other values" not in capsys.readouterr().err
+    # Outside of the study's folder there is nothing to move along: the path stays absolute.
+    fc.write_case(tmp_path / "elsewhere.vtkhdf", case.trajectory, root=tmp_path / "nowhere")
+    import h5py
+
+    with h5py.File(tmp_path / "elsewhere.vtkhdf") as file:
+        assert f'"{moved / "laws" / "own.py"}:Mine"' in file["system"].attrs["json"]
+    with h5py.File(moved / "results" / "study.vtkhdf") as file:
+        assert '"../laws/own.py:Mine"' in file["system"].attrs["json"]
+        assert str(tmp_path) not in file["study"].attrs["toml"]
+
+
 @pytest.mark.parametrize(("law", "message"), [
     ('"lugr"', "did you mean 'lugre'"), ('"none.py:Law"', "there is no file"),
     ('"bad.py:Law"', r"cannot be loaded \(SyntaxError"), ("3", "law = 3 must be one of"),
@@ -334,6 +359,13 @@ def test_own_law_with_memory_runs_is_kept_and_read(tmp_path):
 
 
 @pytest.mark.parametrize(("old", "new", "message"), [
+    ("    force[1] = 0.0\n", "    if v > 1e9:\n        raise ValueError(v)\n",
+     r"f\(v, F, z, p, force, rates\) has a raise or assert statement, which"),
+    ("    force[1] = 0.0\n", "    assert F >= 0.0\n", "has a raise or assert statement, which"),
+    ("@fc.memory_friction_law\ndef f(v, F, z, p, force, rates):\n",
+     "import numba\n\n@numba.njit\ndef checked(F):\n    if F < 0.0:\n        raise ValueError(F)\n"
+     "\n@fc.memory_friction_law\ndef f(v, F, z, p, force, rates):\n    checked(F)\n",
+     "statement in checked, which"),
     ("    memory: ClassVar = 1\n", "", "memory = 0 must be the number of internal variables"),
     ("memory: ClassVar = 1", "memory: ClassVar = -1", "memory = -1 must be"),
     ("velocity_scale: ClassVar = 1e-5", "velocity_scale: ClassVar = 0.0", "velocity_scale = 0.0"),

@@ -9,12 +9,15 @@ from matplotlib.image import imread
 from synthetic import basis, run
 
 from fecontact.errors import InputError, MissingLibraryError
+from fecontact.laws.friction import ConstantFriction
 from fecontact.output import movie, probe
+from fecontact.output.contact_states import STATE_COLOURS
+from fecontact.output.force_chart import ForceChart
 from fecontact.output.frames import frame_indices
 from fecontact.output.furniture import Furniture
 from fecontact.output.motion import Motion
 from fecontact.output.movie import picture, render
-from fecontact.output.scene import STATE_COLOURS, Scene
+from fecontact.output.scene import NODE_COLOURS, Scene, needed_height
 
 SMALL = (480, 270)
 
@@ -89,6 +92,44 @@ def test_ground_travels_at_its_true_speed_and_its_waves_are_scaled():
     assert motion_of(gap, given_scale=100.0).ground_level == pytest.approx(-2e-4)
 
 
+def test_flat_bodies_leave_room_for_a_chart_of_the_forces_with_a_cursor():
+    motion = motion_of(run(times=21))
+    furniture = Furniture(motion, 960, 540)
+    assert furniture.chart_height >= 110
+    assert furniture.scene_height >= needed_height(motion) * 960
+    chart = ForceChart(motion, 960, furniture.chart_height, 10.5)
+    cursors = []
+    for frame in range(21):
+        image = chart.image(frame)
+        assert image.shape == (furniture.chart_height, 960, 3)
+        red = (image == [178, 24, 43]).all(axis=2)
+        assert red.any(axis=1).mean() > 0.5  # from top to bottom of the axes
+        cursors.append(np.flatnonzero(red.any(axis=0)).mean())
+    assert np.diff(cursors) == pytest.approx((cursors[-1] - cursors[0]) / 20, abs=1.0)
+    assert cursors[-1] - cursors[0] > 0.85 * 960
+    # A tall picture of the same body has more room, one of a tall body none.
+    assert Furniture(motion, 480, 640).chart_height > 0
+    tall = motion_of(still(np.zeros((3, 5))))
+    object.__setattr__(tall, "box", (0.0, 0.1, 0.0, 0.1))
+    assert Furniture(tall, 960, 540).chart_height == 0
+
+
+def test_without_friction_nodes_are_open_or_in_contact():
+    q = np.zeros((3, 5))
+    q[:, 1] = [5e-6, -4e-6, -4e-6]
+    trajectory = still(q, speed=0.02)
+    smooth = type(trajectory)(
+        trajectory.system.with_(friction=ConstantFriction(0.0)), trajectory.time,
+        trajectory.modal_coordinates, trajectory.modal_velocities, trajectory.work)
+    motion = motion_of(smooth)
+    assert motion.state_names == ("open", "contact")
+    assert motion.states.tolist() == [[0] * 5, [1] * 5, [1] * 5]
+    footer = Furniture(motion, 960, 540)._footer
+    assert close_to(footer, rgb(STATE_COLOURS["contact"])).any()
+    assert not close_to(footer, rgb(STATE_COLOURS["stick"])).any()
+    assert motion_of(trajectory).state_names == ("open", "stick", "slip")
+
+
 def test_strips_and_scene_fill_the_picture_and_say_scale_and_time():
     for size in ((960, 540), (1280, 720), (480, 640)):
         motion = motion_of(run(times=5))
@@ -140,8 +181,8 @@ def test_contact_nodes_show_their_states_and_forces():
     forces = [(image[:, :, 0] > 150) & (image[:, :, 1] < 60) & (image[:, :, 2] < 80)
               for image in images]
     for frame, image in enumerate(images):
-        for state in (1, 2):
-            seen = np.count_nonzero(close_to(image, rgb(STATE_COLOURS[state])))
+        for state, name in ((1, "stick"), (2, "slip")):
+            seen = np.count_nonzero(close_to(image, rgb(NODE_COLOURS[name])))
             assert seen > 5 * 30 if state == frame else seen == 0
     assert not forces[0].any()
     upright, slanted = (np.argwhere(force) for force in forces[1:])

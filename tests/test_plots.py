@@ -1,5 +1,5 @@
 import struct
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from synthetic import basis, run
 from fecontact import contact_kernels as kernels
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
-from fecontact.integrate.trajectory import Trajectory
+from fecontact.integrate.trajectory import Energies, Trajectory
 from fecontact.output import figures, plots
 from fecontact.output.figures import (
     contact_map_figure,
@@ -202,18 +202,28 @@ def test_modes_are_titled_by_their_frequencies():
         modes_figure(plain)
 
 
+def test_colours_of_energies_tell_where_they_are():
+    named = {entry.name for entry in fields(Energies)}
+    assert set(figures.ENERGY_COLOURS) == named
+    panels = (("kinetic", "elastic", "drive_spring", "contact"),
+              ("drive_work", "ground_work", "belt_work", "load_work"),
+              ("modal_damping", "dashpots", "contact_damping", "friction"))
+    for names in panels:
+        assert len({figures.ENERGY_COLOURS[name] for name in names}) == 4
+
+
 def test_long_lines_are_thinned_without_losing_peaks():
     t = np.linspace(0.0, 1.0, 100_003)
     y = np.sin(2.0 * np.pi * 3.0 * t)
     y[77_777], y[50_001], y[-1] = 5.0, -4.0, 3.0
-    x, thinned = figures._thinned(t, y)
+    x, thinned = figures.thinned(t, y)
     assert len(x) < 5000
     assert (thinned.max(), thinned.min()) == (5.0, -4.0)
     assert x[np.argmax(thinned)] == t[77_777]
     assert (x[0], x[-1], thinned[-1]) == (0.0, 1.0, 3.0)
     assert (np.diff(x) > 0.0).all()
-    assert figures._thinned(t[:100], y[:100])[0] is not None
-    assert len(figures._thinned(t[:7999], y[:7999])[0]) == 7999
+    assert figures.thinned(t[:100], y[:100])[0] is not None
+    assert len(figures.thinned(t[:7999], y[:7999])[0]) == 7999
 
 
 @pytest.mark.parametrize("triangles", [False, True])

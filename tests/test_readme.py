@@ -1,10 +1,15 @@
-"""The examples of the README run as they stand."""
+"""The README and the pages of docs: their examples run, their commands and links exist."""
 
 import re
+import tomllib
 from pathlib import Path
 
+import pytest
+
 from fecontact.cli import execute
+from fecontact.cli.app import COMMANDS
 from fecontact.output.probe import rendering_works
+from fecontact.study import Study
 
 README = (Path(__file__).parents[1] / "README.md").read_text()
 
@@ -37,3 +42,36 @@ def test_study_example(tmp_path, monkeypatch, capsys):
     assert "study.vtkhdf" in capsys.readouterr().out
 
 
+
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = {"README.md": README, **{path.name: path.read_text() for path in DOCS.glob("*.md")}}
+TABLES = [(page, text) for page, content in PAGES.items()
+          for text in re.findall(r"```toml\n(.*?)```", content, re.DOTALL)]
+
+
+@pytest.mark.parametrize(("page", "text"), TABLES,
+                         ids=[f"{page}-{number}" for number, (page, _) in enumerate(TABLES)])
+def test_tables_of_the_pages_are_understood(page, text):
+    shape = '[geometry]\nshape = "beam"\n'
+    study = Study.from_toml(text if "[geometry]" in text else text + shape, "study.toml")
+    given = tomllib.loads(text)
+    written = study.tables()
+    for section, keys in given.items():
+        for key, value in keys.items():
+            if not isinstance(value, dict | list):
+                assert written[section][key] == value
+
+
+def test_commands_of_the_pages_exist():
+    names = {command.__name__ for command in COMMANDS}
+    for content in PAGES.values():
+        for name in re.findall(r"(?:^    |`)fecontact (\w+)", content, re.MULTILINE):
+            assert name in names, name
+
+
+def test_links_of_the_pages_lead_somewhere():
+    for page, content in PAGES.items():
+        folder = DOCS.parent if page == "README.md" else DOCS
+        for target in re.findall(r"\]\(([^)#:]+)\)", content):
+            assert (folder / target).exists(), (page, target)

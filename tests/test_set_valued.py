@@ -11,6 +11,7 @@ from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ConstantFriction, ExponentialFriction, HyperbolicFriction
 from fecontact.laws.ground import Ground
+from fecontact.laws.ground_motion import SpeedRamp
 from fecontact.laws.memory import LuGreFriction
 from fecontact.laws.normal import RoughSurface
 from fecontact.statics import static_equilibrium
@@ -275,3 +276,20 @@ def test_friction_with_memory_has_no_set_valued_limit():
     system = block(friction=LuGreFriction())
     with pytest.raises(InputError, match="LuGreFriction has no smoothing_slope"):
         integrate_set_valued(system, np.zeros(4), np.linspace(0.0, 1.0, 3))
+
+
+@pytest.mark.parametrize("scheme", ["events", "stepping"])
+def test_steps_end_where_the_speed_of_the_ground_has_a_kink(scheme):
+    """Sticking to a belt that speeds up from 0.1 to 0.4 m/s, the block travels with it."""
+    ramp = SpeedRamp(0.4, start=0.513, duration=0.2)
+    system = block(friction=ConstantFriction(0.5), load=Load(10.0),
+                   ground=Ground(speed=0.1, motion=ramp))
+    times = np.linspace(0.0, 1.2, 13)
+    run = integrate_set_valued(system, start(system, 0.0, 0.1), times, scheme=scheme, rtol=1e-6)
+    x, rate = along(system, run)
+    since = np.clip(times - 0.513, 0.0, 0.2)
+    after = np.maximum(times - 0.713, 0.0)
+    # The steps' tolerance leaves 1e-10; a step across the kink 3e-5.
+    assert x == pytest.approx(0.1 * times + 0.75 * since**2 + 0.3 * after, abs=1e-9)
+    assert rate == pytest.approx(0.1 + 1.5 * since, abs=1e-9)
+    assert imbalance(system, run) < 1e-5

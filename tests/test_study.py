@@ -254,6 +254,18 @@ MISTAKES = [
     ({"output.frames": -1}, r"\[output\]: frames = -1 must be zero or above"),
     ({"output.points": ["D"]}, r"\[output\]: There is no point 'D'"),
     ({"output.points": [4]}, r"\[output\]: Contact node 4 does not exist"),
+    ({"contact.contact.normal.stiffness": [1.0, 2.0]},
+     r"\[contact\.contact\.normal\]: stiffness has 2 values for 4 contact nodes"),
+    ({"contact.contct.friction.decay": 1.0},
+     r"\[contact\.contct\]: the basis has no contact group 'contct' \(did you mean 'contact'\?\)"),
+    ({"load.forces": [{"point": "D", "signal": {"law": "constant"}}]},
+     r"\[load\.forces\]: There is no point 'D'"),
+    ({"gap": {"radius": 1e-3}}, r"s.toml: \[gap\]: radius = 0\.001 must be at least 0\.0"),
+    ({"gap": [0, 0]}, r"s.toml: gap has 2 values for 4 contact nodes"),
+    ({"drive.motion_x": {"law": "sweep", "amplitude": 1, "start_frequency_hz": 0,
+                         "end_frequency_hz": 1, "duration": 1, "kind": "logarithmic"}},
+     r"\[drive\.motion_x\]: start_frequency_hz = 0\.0 must be a finite number above zero"),
+    ({"render.start": 0.2, "render.end": 0.1}, r"\[render\]: end = 0\.1 must not be before start"),
     ({"output.points": [1.5]}, r"points = \[1\.5\] must be a list of texts in quotes or whole num"),
 ]
 

@@ -166,6 +166,10 @@ class Collocation(Problem):
         """Residual and linearisation at u; what is not asked for is not computed."""
         return Linearised(self, u)
 
+    def evaluate(self, u: Array) -> Linearised:
+        """As :meth:`linearise`, for the residual alone."""
+        return Linearised(self, u, whole=False)
+
     def weights(self) -> Array:
         """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""
         return self._weights

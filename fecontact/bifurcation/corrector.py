@@ -38,7 +38,7 @@ def corrected(
     steps: list[Array] = []
     scale = 1.0 + norm(problem, guess)
     for count in range(1, iterations + 1):
-        linearisation = problem.linearise(u)
+        linearisation = problem.linearise(u) if kept is None else problem.evaluate(u)
         rhs = np.append(-linearisation.residual, -(row @ (u - guess)))
         change = (kept or linearisation).solve(row, rhs)
         if kept is not None:
@@ -52,7 +52,7 @@ def corrected(
         if kept is None and size <= tolerance * scale:
             return u, linearisation, count
         # With a matrix that is kept the error falls by about the same factor each time.
-        if kept is not None and size * size / before <= max(1e-2 * tolerance, 1e-13) * scale:
+        if kept is not None and size * size / before <= max(0.1 * tolerance, 1e-13) * scale:
             return u, problem.linearise(u), max(1, count - 2)
         if problem.keeps_matrix:
             keeps = kept is None or size < 0.2 * before

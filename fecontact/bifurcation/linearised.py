@@ -26,8 +26,8 @@ class Linearised:
     the phase condition where the period is unknown.
     """
 
-    def __init__(self, problem: "Collocation", u: Array) -> None:
-        self.problem, self.u = problem, u
+    def __init__(self, problem: "Collocation", u: Array, whole: bool = True) -> None:
+        self.problem, self.u, self._whole = problem, u, whole
         self._last: tuple[Array, float, Bordered] | None = None
 
     @cached_property
@@ -44,7 +44,7 @@ class Linearised:
         """Residual (N m d + 1,), without the last entry for forced systems."""
         problem = self.problem
         x, slopes = self._points
-        if "derivatives" in self.__dict__:
+        if self._whole:
             f = self.derivatives[0]
         else:
             f = problem.field.rates(problem.times * self.period, x, problem.parameters(self.u))

@@ -12,16 +12,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.errors import InputError, MissingLibraryError
+from fecontact.errors import InputError
+from fecontact.formats.uff_sets import (
+    coordinates,
+    data_sets,
+    elements,
+    modes_of,
+    one_mode,
+    require_displacements,
+    units,
+)
 
 if TYPE_CHECKING:
     from fecontact.basis import ModalBasis
 
 Array = NDArray[np.float64]
 
-_NORMAL_MODES, _COMPLEX_MODES = 2, (3, 7)
-_DISPLACEMENTS = (0, 1, 8)  # unknown, general, displacement
-_REAL_ENOUGH = 0.1
 _AXES = ("x", "y", "z")
 
 
@@ -168,153 +174,37 @@ def read_uff(path: str | Path) -> UffModes:
         displacements, or far from real.
     """
     path = Path(path)
-    sets = _data_sets(path)
+    sets = data_sets(path)
     try:
         return _modes(sets, str(path))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _data_sets(path: Path) -> list[dict[str, Any]]:
-    try:
-        import pyuff
-    except ImportError:
-        raise MissingLibraryError("Universal files are read by pyuff, which is not installed: "
-                                  "pip install pyuff") from None
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file.")
-    try:
-        file = pyuff.UFF(str(path))
-        kinds = file.get_set_types()
-        wanted = [k for k, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2412, 2420)]
-        # One at a time: what pyuff returns for one set is no list, and its message for several
-        # does not say which one is damaged.
-        sets = []
-        for k in wanted:
-            try:
-                sets.append(file.read_sets(k))
-            except Exception:
-                raise InputError(f"{path}: data set {k + 1} of the file, of type {kinds[k]}, "
-                                 f"cannot be read; it is damaged or in a form that pyuff does not "
-                                 f"know.") from None
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f"{path}: the file cannot be read as a universal file "
-                         f"({error}).") from None
-    return sets
-
-
 def _modes(sets: list[dict[str, Any]], source: str) -> UffModes:
-    modes = [one for one in sets
-             if one["type"] == 55 and one["analysis_type"] in (_NORMAL_MODES, *_COMPLEX_MODES)]
+    modes = modes_of(sets)
     if not modes:
         raise InputError("The file holds no modes; they are read from data sets 55 of normal or "
                          "complex modes (not from 2414).")
     for number, mode in enumerate(modes, 1):
-        _require_displacements(mode, number)
+        require_displacements(mode, number)
     labels = np.unique(np.concatenate([mode["node_nums"] for mode in modes])).astype(np.int64)
     width = max(int(mode["n_data_per_node"]) for mode in modes)
     shapes = np.zeros((len(labels), width, len(modes)))
     scalars = np.zeros((3, len(modes)))
     for k, mode in enumerate(modes):
-        values, scalars[:, k] = _one_mode(mode, k + 1)
+        values, scalars[:, k] = one_mode(mode, k + 1)
         shapes[np.searchsorted(labels, mode["node_nums"]), : values.shape[1], k] = values
     frequencies, ratios, masses = scalars
-    length, force = _units(sets)
+    length, force = units(sets)
     shapes[:, :3] /= length
     return UffModes(
         frequencies_hz=frequencies,
         shapes=shapes,
         node_labels=labels,
-        coordinates=_coordinates(sets, labels) / length,
+        coordinates=coordinates(sets, labels) / length,
         damping_ratios=ratios,
         modal_masses=masses / (force * length) if (masses > 0.0).all() else None,
         source=source,
-        elements=_elements(sets),
+        elements=elements(sets),
     )
-
-
-def _elements(sets: list[dict[str, Any]]) -> dict[int, NDArray[np.int64]]:
-    found: dict[int, list[list[int]]] = {}
-    for one in sets:
-        if one["type"] != 2412:
-            continue
-        for kind, elements in one.items():
-            if not isinstance(kind, int):
-                continue  # pyuff repeats triangles and quadrilaterals under their names
-            for element in elements:
-                nodes = element["nodes_nums"]
-                if len(nodes) != element["num_nodes"]:
-                    raise InputError(f"Element {element['element_nums']} of data set 2412 has "
-                                     f"{len(nodes)} nodes where {element['num_nodes']} are "
-                                     f"announced.")
-                found.setdefault(len(nodes), []).append(nodes)
-    return {count: np.array(nodes, dtype=np.int64) for count, nodes in sorted(found.items())}
-
-
-def _require_displacements(mode: Mapping[str, Any], number: int) -> None:
-    if mode["spec_data_type"] not in _DISPLACEMENTS:
-        raise InputError(f"Mode {number} holds data of type {mode['spec_data_type']}, not "
-                         f"displacements (8); export the mode shapes as displacements.")
-    if mode["n_data_per_node"] not in (3, 6) or mode["data_ch"] not in (0, 2, 3):
-        raise InputError(f"Mode {number} has {mode['n_data_per_node']} values at a node (data "
-                         f"characteristic {mode['data_ch']}); there must be 3 displacements, or 3 "
-                         f"displacements and 3 rotations.")
-
-
-def _one_mode(mode: Mapping[str, Any], number: int) -> tuple[Array, tuple[float, float, float]]:
-    """Real shape (k, 3 or 6), and frequency [Hz], damping ratio and modal mass (0: unknown)."""
-    columns = [mode[f"r{k + 1}"] for k in range(mode["n_data_per_node"])]
-    if any(len(column) != len(mode["node_nums"]) for column in columns):
-        raise InputError(f"Mode {number} has another number of values than "
-                         f"{len(columns)} at each of its nodes.")
-    values = np.stack(columns, axis=1)
-    turn = 1.0 + 0.0j
-    if np.iscomplexobj(values):
-        # The phase that makes the sum of squares of the real parts largest.
-        turn = np.exp(-0.5j * np.angle((values**2).sum()))
-        values = values * turn
-        rest = float(np.linalg.norm(values.imag)) / (float(np.linalg.norm(values)) or 1.0)
-        if rest > _REAL_ENOUGH:
-            raise InputError(f"Mode {number} is complex: its imaginary part is {rest:.2g} of it in "
-                             f"the best phase, more than {_REAL_ENOUGH:g}; identify real (normal) "
-                             f"modes.")
-        values = values.real
-    if mode["analysis_type"] == _NORMAL_MODES:
-        ratio = mode["modal_damp_vis"] or 0.5 * mode["modal_damp_his"]
-        return values, (mode["freq"], ratio, mode["modal_m"])
-    root = complex(mode["eig"])
-    w = abs(root)
-    # Modal A of a proportionally damped system is 2 i w_d times the modal mass.
-    mass = float((complex(mode["modal_a"]) * turn**2).imag) / (2.0 * abs(root.imag) or np.inf)
-    return values, (w / (2.0 * np.pi), -root.real / w if w else 0.0, abs(mass))
-
-
-def _units(sets: list[dict[str, Any]]) -> tuple[float, float]:
-    """Units of the file per metre and per newton; one without a data set 164."""
-    for one in sets:
-        if one["type"] == 164:
-            length, force = float(one["length"]), float(one["force"])
-            if not (length > 0.0 and force > 0.0):
-                raise InputError(f"The units of the file (data set 164) are {length:g} per metre "
-                                 f"and {force:g} per newton; both must be above zero.")
-            return length, force
-    return 1.0, 1.0
-
-
-def _coordinates(sets: list[dict[str, Any]], labels: NDArray[np.int64]) -> Array:
-    """Places (N, 3) of the nodes in the file's unit, not a number where it does not give them."""
-    for one in sets:
-        if one["type"] == 2420 and not all(
-                np.array_equal(matrix, np.eye(4, 3)) for matrix in one["CS_matrices"]):
-            raise InputError("The file has local coordinate systems (data set 2420); export it in "
-                             "the global one.")
-    places = np.full((len(labels), 3), np.nan)
-    for one in sets:
-        if one["type"] in (15, 2411):
-            numbers = np.asarray(one["node_nums"], dtype=np.int64)
-            xyz = np.column_stack([one["x"], one["y"], one["z"]])
-            known = np.isin(numbers, labels)
-            places[np.searchsorted(labels, numbers[known])] = xyz[known]
-    return places

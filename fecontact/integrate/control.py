@@ -198,16 +198,8 @@ def longest_step(system: ContactSystem, times: Array) -> float:
 
     The stages of a step meet these at five times; longer steps could miss them.
     """
-    limits = [(times[-1] - times[0]) / 10.0]
-    given = [motion for motion in system.drive.motions if motion.largest > 0.0]
-    given += [force.signal for force in system.load.forces]
-    limits += [source.shortest_period / 4.0 for source in given
-               if source.shortest_period is not None]
-    wavelength = system.ground.shortest_wavelength
-    speed = system.ground.largest_speed(float(times[0]), float(times[-1]))
-    if wavelength is not None and speed > 0.0:
-        limits.append(wavelength / speed / 4.0)
-    return float(min(limits))
+    start, end = float(times[0]), float(times[-1])
+    return min((end - start) / 10.0, system.shortest_period(start, end) / 4.0)
 
 
 def finish(

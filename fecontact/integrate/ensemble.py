@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.errors import InputError
 from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, start
+from fecontact.integrate.events import Events, Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.trajectory import Status
 from fecontact.system import ContactSystem
@@ -38,12 +39,15 @@ class Ensemble:
         How each run ended.
     steps : (E,) array
         Steps of the integrator.
+    events : tuple of Events, or None
+        What was watched for in each run; None if nothing was.
     """
 
     times: Array
     states: Array
     status: tuple[Status, ...]
     steps: NDArray[np.int64]
+    events: tuple[Events, ...] | None = None
 
     @property
     def finished(self) -> NDArray[np.bool_]:
@@ -58,6 +62,7 @@ def ensemble(
     initial: Initial | Sequence[Any] | Array = "rest",
     rtol: float = 1e-6,
     chain: int = 1,
+    events: Watched | Sequence[Watched] | None = None,
     workers: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Ensemble:
@@ -81,6 +86,9 @@ def ensemble(
         Runs in a row that hand on their last state: only the first of each chain starts from its
         initial state, as when a parameter is moved slowly. With E the whole ensemble is one chain
         and runs on one core.
+    events : ContactEvents, Crossing, Event or sequence of them, optional
+        What to watch for, such as the passage through a Poincare section; a run that stops at one
+        has no states after it.
     workers : int, optional
         Threads; default one a core.
     progress : callable, optional
@@ -106,19 +114,23 @@ def ensemble(
     states = np.full((count, kept, members[0].size), np.nan)
     status = [Status.INTERRUPTED] * count
     steps = np.zeros(count, dtype=np.int64)
+    watched = as_watched(events)
+    seen = [Events.none(members[0].size)] * count
     done, leave = [0], [False]
 
     def run_chain(first: int) -> None:
         last: Array | None = None
         for index in range(first, min(first + chain, count)):
             state = starts(index) if last is None else last
-            run = start(members[index], state, instants[index], rtol=float(rtol), work=False)
+            run = start(members[index], state, instants[index], rtol=float(rtol), work=False,
+                        events=watched)
             result = stepping.RUNNING
             while result == stepping.RUNNING:
                 if leave[0]:
                     return
                 result = run.advance(100_000)
             states[index, : run.outputs] = run.states[: run.outputs]
+            seen[index] = run.events
             status[index], steps[index] = ENDS[result], run.statistics["steps"]
             last = run.progress.state if result == stepping.FINISHED else None
             done[0] += 1
@@ -135,7 +147,7 @@ def ensemble(
         except BaseException:
             leave[0] = True
             raise
-    return Ensemble(instants, states, tuple(status), steps)
+    return Ensemble(instants, states, tuple(status), steps, tuple(seen) if watched else None)
 
 
 def strobe(
@@ -187,7 +199,8 @@ def strobe(
         counts = np.concatenate([[0.0], counts])
     found = ensemble(systems, periods.reshape(-1, 1) * counts if periods.ndim else periods * counts,
                      **settings)
-    return Ensemble(found.times[:, first:], found.states[:, first:], found.status, found.steps)
+    return Ensemble(found.times[:, first:], found.states[:, first:], found.status, found.steps,
+                    found.events)
 
 
 def forcing_period(system: ContactSystem) -> float:

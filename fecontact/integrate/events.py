@@ -185,6 +185,11 @@ class Events:
                          for kind in kinds),
                    found[order, 2].astype(np.int64), states[order])
 
+    @classmethod
+    def none(cls, size: int) -> "Events":
+        """No events, of a state of so many values."""
+        return cls.of_rows(np.zeros((0, 3)), np.zeros((0, size)))
+
     def __len__(self) -> int:
         return len(self.time)
 
@@ -201,6 +206,13 @@ class Events:
 
 
 Watched = ContactEvents | Event | Crossing
+
+
+def as_watched(events: Watched | Sequence[Watched] | None) -> tuple[Watched, ...]:
+    """One, several or no events as a tuple."""
+    if events is None:
+        return ()
+    return tuple(events) if isinstance(events, Sequence) else (events,)
 
 
 def _require_direction(owner: str, direction: str) -> None:

@@ -144,7 +144,7 @@ def integrate_set_valued(
     reached = np.array([times[0], 0.01 * longest])
     carried = np.zeros(3 + n)
     floor = _floor(system, state, times, longest)
-    stops = _breakpoints(system, float(times[0]), float(times[-1]))
+    stops = np.array(system.breakpoints(float(times[0]), float(times[-1])))
     outcome, ended = 0, Status.FINISHED
     try:
         while outcome == 0:
@@ -288,8 +288,3 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
                   (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True)))
     return np.concatenate([depth / largest, speed / largest,
                            np.full(len(POWERS) + n, energy or 0.5 * speed**2)])
-
-
-def _breakpoints(system: ContactSystem, start: float, end: float) -> Array:
-    signals = [*system.drive.motions, *(force.signal for force in system.load.forces)]
-    return np.array(sorted({time for signal in signals for time in signal.breakpoints(start, end)}))

@@ -12,6 +12,7 @@ proportion to its limit. The state of these kernels is Y = [q, q', work, frictio
 
 from numba import types
 
+from fecontact.body_powers import body_powers
 from fecontact.compiled import (
     compile_law,
     f8,
@@ -103,29 +104,6 @@ def free_acceleration(t, Y, s, out):  # type: ignore[no-untyped-def]
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         for i in range(m):
             out[i] += value * s.load_shapes[k, i]
-
-
-@helper
-def body_powers(t, Y, s, out):  # type: ignore[no-untyped-def]
-    """Fill out (8,) with the powers that do not come from the contact, the others with zero."""
-    m = s.Tx.shape[1]
-    out[:EFFORTS] = 0.0
-    for axis in range(2):
-        value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
-        pull = s.drive_stiffness[axis] * value
-        for i in range(m):
-            pull -= s.drive_shapes[axis, i] * Y[i]
-        out[0] += pull * rate
-    for k in range(len(s.load)):
-        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
-        for i in range(m):
-            out[3] += value * s.load_shapes[k, i] * Y[m + i]
-    for i in range(m):
-        out[3] += s.constant_load[i] * Y[m + i]
-        for k in range(m):
-            product = Y[m + i] * Y[m + k]
-            out[4] += s.modal_damping[i, k] * product
-            out[5] += (s.damping[i, k] - s.modal_damping[i, k]) * product
 
 
 @helper

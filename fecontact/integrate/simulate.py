@@ -1,5 +1,6 @@
 """Running a contact system in time."""
 
+import warnings
 from collections.abc import Callable, Sequence
 from numbers import Real
 from pathlib import Path
@@ -9,13 +10,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.contact_energy import POWERS
+from fecontact.contact_kernels import PENETRATION
 from fecontact.errors import InputError, choices, nearest
-from fecontact.integrate.events import Watched
+from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
-from fecontact.integrate.trajectory import Trajectory
+from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system import ContactSystem
 
-METHODS = ("Rodas5P", "Radau", "BDF", "LSODA", "set-valued")
+Array = NDArray[np.float64]
+
+# Starts deeper than so many penetration scales are warned of.
+_DEEP = 100.0
+# Growth of energy without a source, relative to the largest energy, that is an error, and the
+# output times that are looked at for it.
+_GROWTH, _LOOKS = 1e-2, 200
+
+METHODS = ("Rodas5P", "Radau", "BDF", "LSODA", "CVODE", "set-valued")
 
 
 def simulate(
@@ -28,11 +38,13 @@ def simulate(
     method: str = "Rodas5P",
     rtol: float = 1e-6,
     restitution: float | None = None,
+    static_coefficient: float | Sequence[float] | None = None,
+    scheme: str | None = None,
     checkpoint: str | Path | None = None,
     events: Watched | Sequence[Watched] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """Integrate a contact system in time.
+    r"""Integrate a contact system in time.
 
     Parameters
     ----------
@@ -47,15 +59,19 @@ def simulate(
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or the times themselves,
         ascending, the first ``t_start``, the last ``t_end``.
-    method : 'Rodas5P', 'Radau', 'BDF', 'LSODA' or 'set-valued'
-        The compiled integrator; a stiff solver of scipy, as a reference; or friction without
-        smoothing, sticking by constraint.
+    method : 'Rodas5P', 'Radau', 'BDF', 'LSODA', 'CVODE' or 'set-valued'
+        The compiled integrator; a stiff solver of scipy, or of scikit-sundae if that is
+        installed, as a reference; or friction without smoothing, sticking by constraint.
     rtol : float
         Relative tolerance; absolute ones follow from it, the penetration scale of the normal law
         and the width of the friction smoothing.
     restitution : float, optional
         For 'set-valued' alone: rigid stops with Newton's coefficient of restitution, from 0 to
         below 1, in place of the normal law.
+    static_coefficient : float or (n,) sequence, optional
+        For 'set-valued' alone: limit of \|R\|/F in stick [-]; default that of the law.
+    scheme : 'auto', 'events' or 'stepping', optional
+        For 'set-valued' alone: from event to event, for few nodes, or by implicit steps.
     checkpoint : path, optional
         For 'Rodas5P': a file that keeps a long run every minute and when it is interrupted. If it
         is there, the run goes on from it, to the same numbers; at the end it is removed.
@@ -88,16 +104,19 @@ def simulate(
     if method not in METHODS:
         raise InputError(f"method = {method!r} must be one of {choices(METHODS)}"
                          f"{nearest(str(method), METHODS)}.")
-    if restitution is not None and method != "set-valued":
-        raise InputError(f"restitution = {restitution!r} is for method = 'set-valued' alone; a "
-                         f"normal law has its own damping.")
+    for name, value in (("restitution", restitution), ("scheme", scheme),
+                        ("static_coefficient", static_coefficient)):
+        if value is not None and method != "set-valued":
+            raise InputError(f"{name} = {value!r} is for method = 'set-valued' alone, not "
+                             f"'{method}'; laws have damping and coefficients of their own.")
     if checkpoint is not None and method != "Rodas5P":
         raise InputError(f"A checkpoint is for method = 'Rodas5P' alone, not '{method}'.")
     if events is not None and method != "Rodas5P":
         raise InputError(f"Events are for method = 'Rodas5P' alone, not '{method}'.")
-    watched = () if events is None else (
-        tuple(events) if isinstance(events, Sequence) else (events,))
+    watched = as_watched(events)
     state = initial_state(system, initial, t_start)
+    if not isinstance(initial, str | Trajectory):
+        _warn_of_depth(system, state, t_start)
     m = system.basis.modes
     rest: dict[str, Any] = {}
     if method == "Rodas5P":
@@ -114,19 +133,47 @@ def simulate(
         from fecontact.integrate.set_valued import integrate_set_valued
 
         found = integrate_set_valued(system, state, times, rtol=rtol, restitution=restitution,
-                                     progress=progress)
+                                     static_coefficient=static_coefficient,
+                                     scheme=scheme or "auto", progress=progress)
         times, states, work = found.time, found.states, found.work
         status, statistics = found.status, found.statistics
         rest = {"node_friction_work": found.node_friction_work,
                 "held_normal_force": found.normal_force,
                 "held_friction_force": found.friction_force}
+    elif method == "CVODE":
+        from fecontact.integrate import cvode
+
+        times, states, work, status, statistics = cvode.integrate(
+            system, state, times, rtol=rtol, progress=progress)
     else:
         from fecontact.integrate import scipy_solvers
 
         times, states, work, status, statistics = scipy_solvers.integrate(
             system, state, times, method=method, rtol=rtol, progress=progress)
+    if status is Status.FINISHED and method != "set-valued" and _grows(
+            system, times, states, work, rtol):
+        status = Status.ENERGY_GREW
     return Trajectory(system, times, states[:, :m], states[:, m : 2 * m], work, status, statistics,
                       memory=states[:, 2 * m :] if system.memory else None, **rest)
+
+
+def _grows(system: ContactSystem, times: Array, states: Array, work: Array, rtol: float) -> bool:
+    """Whether energy came from nowhere, by some of the output times."""
+    some = np.unique(np.linspace(0, len(times) - 1, min(len(times), _LOOKS)).astype(int))
+    m = system.basis.modes
+    run = Trajectory(system, times[some], states[some, :m], states[some, m : 2 * m], work[some],
+                     memory=states[some, 2 * m :] if system.memory else None)
+    return run.energies.growth > max(_GROWTH, 1e3 * rtol)
+
+
+def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
+    """Warn of a start so deep in the ground that a wrong unit is more likely than a wish."""
+    depth = float(system.contact_history(np.array([time]), state[None])[0, :, PENETRATION].max())
+    scale = system.penetration_scale
+    if depth > _DEEP * scale:
+        warnings.warn(f"The initial state is {depth:.3g} m deep in the ground, {depth / scale:.2g} "
+                      f"times the {scale:.3g} m over which the normal law rises: the body will be "
+                      f"thrown off.", stacklevel=3)
 
 
 def output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:

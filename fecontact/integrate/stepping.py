@@ -142,7 +142,7 @@ def advance(  # type: ignore[no-untyped-def]
         for k in range(size):
             out[0, k] = progress.state[k]
         counts[STARTED], counts[OUTPUTS] = 1, 1
-    new, speed, attempts = True, 0.0, 0
+    new, speed, attempts, to_switch = True, 0.0, 0, False
     while counts[OUTPUTS] < len(times):
         # A step that failed is repeated before the call returns: derivatives are not kept.
         if new and (attempts >= most or (watched and full(watch))):
@@ -155,7 +155,9 @@ def advance(  # type: ignore[no-untyped-def]
                 stop, is_break = control.breaks[k], True
         latest = np.nextafter(stop, t) if is_break else stop
         target = t + h
-        if target + 0.01 * h >= stop:
+        if to_switch:
+            target = min(target, stop)
+        elif target + 0.01 * h >= stop:
             target = stop
         elif target + h > stop:
             target = t + 0.5 * (stop - t)
@@ -220,10 +222,14 @@ def advance(  # type: ignore[no-untyped-def]
         if watch.counts[KINKS]:
             part = next_switch(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
                                room.after, room.dense, room.right)
-            if 1e-6 < part < 1.0 - 1e-6:
+            # Nearer to an end it is at that end, as far as the time can tell.
+            near = max(1e-6 * h, 100.0 * smallest)
+            if part * h > near and (1.0 - part) * h > near:
                 counts[REJECTIONS] += 1
                 h *= part * (1.0 + 1e-9)
+                to_switch = True
                 continue
+        to_switch = False
         ends = 2.0
         if watched:
             ends = note_events(t, h, latest, s, control.depth, watch, room.scratch, progress.state,

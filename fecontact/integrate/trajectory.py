@@ -25,6 +25,8 @@ class Status(Enum):
     INTERRUPTED = "The run was interrupted; what was computed until then is kept."
     MINIMUM_STEP = ("The steps of the integrator became too small to go on; what was computed "
                     "until then is kept.")
+    ENERGY_GREW = ("The stored energy grew by more than all work put in: a law or the tolerance is "
+                   "at fault; see the energy balance.")
     NOT_FINITE = "The motion grew beyond all numbers; what was computed until then is kept."
     FAILED = "The integrator could not go on; what was computed until then is kept."
 
@@ -86,10 +88,23 @@ class Energies:
     @property
     def imbalance(self) -> float:
         """Largest ``|stored - stored[0] - work + lost|`` relative to the largest energy in it."""
-        error = np.abs(self.stored - self.stored[0] - self.work + self.lost).max()
+        error = float(np.abs(self._unexplained).max())
+        return error / self._scale if self._scale > 0.0 else 0.0
+
+    @property
+    def growth(self) -> float:
+        """Largest ``stored - stored[0] - work + lost`` relative to the largest energy in it."""
+        error = max(float(self._unexplained.max()), 0.0)
+        return error / self._scale if self._scale > 0.0 else 0.0
+
+    @property
+    def _unexplained(self) -> Array:
+        return self.stored - self.stored[0] - self.work + self.lost
+
+    @property
+    def _scale(self) -> float:
         terms = [getattr(self, name) for name in self.__dataclass_fields__]
-        scale = max(float(np.abs(term).max()) for term in terms)
-        return float(error) / scale if scale > 0.0 else 0.0
+        return max(float(np.abs(term).max()) for term in terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +210,11 @@ class Trajectory:
         return self._contact[:, :, kernels.PENETRATION]
 
     @property
+    def penetration_rate(self) -> Array:
+        """Rates u' (N, n) of the penetrations, positive towards the ground [m/s]."""
+        return self._contact[:, :, kernels.PENETRATION_RATE]
+
+    @property
     def slip_velocity(self) -> Array:
         """Slip velocities (N, n) of the body relative to the ground [m/s]."""
         return self._contact[:, :, kernels.SLIP_VELOCITY]
@@ -211,6 +231,31 @@ class Trajectory:
         power = self.friction_force * self.slip_velocity
         steps = 0.5 * np.diff(self.time)[:, None] * (power[1:] + power[:-1])
         return np.vstack([np.zeros(power.shape[1]), np.cumsum(steps, axis=0)])
+
+    def wear_depth(self, coefficient: float, width: float) -> Array:
+        """Depth (N, n) worn off the body at each node since the first time [m].
+
+        Archard's law in terms of friction work: volume = coefficient times work, spread over the
+        area that belongs to the node.
+
+        Parameters
+        ----------
+        coefficient : float
+            Volume worn off per friction work [m3/J]: Archard's k [m2/N] over the coefficient of
+            friction.
+        width : float
+            Width of the contact face across the plane [m].
+
+        Raises
+        ------
+        InputError
+            For a width that is not above zero, or a coefficient below zero.
+        """
+        if not (width > 0.0 and np.isfinite(width)):
+            raise InputError(f"width = {width!r} must be above zero [m].")
+        if not (coefficient >= 0.0 and np.isfinite(coefficient)):
+            raise InputError(f"coefficient = {coefficient!r} must be zero or above [m3/J].")
+        return coefficient * self.friction_work / (self.system.basis.tributary * width)
 
     @property
     def pressure(self) -> Array:
@@ -236,7 +281,7 @@ class Trajectory:
         spring = np.zeros(len(t))
         for axis, c in ((0, drive.stiffness_x), (1, drive.stiffness_y)):
             motion = drive.motions[axis]
-            ends = np.array([motion.kernel.python(time, motion.parameters())[0] for time in t])
+            ends = motion.history(t)[:, 0]
             spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
         contact = system.stored_energy(self.penetration)
         put = dict(zip(POWERS, self.work.T, strict=True))

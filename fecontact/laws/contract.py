@@ -36,7 +36,8 @@ zero.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from functools import cache
+from typing import Annotated, Any, ClassVar, get_type_hints
 
 import numpy as np
 from numba import types
@@ -64,13 +65,56 @@ MEMORY_FORM = "f(v, F, z, p, force, rates)"
 PerNode = float | tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class Range:
+    """Values that a parameter may have, as part of its annotation: ``Annotated[PerNode, Range]``.
+
+    Attributes
+    ----------
+    allowed : str
+        The values in words: ``parameter = -1.0 must be {allowed}``.
+    holds : callable
+        Whether each number of an array is one of them.
+    """
+
+    allowed: str
+    holds: Callable[[NDArray[np.float64]], Any]
+
+
+Positive = Annotated[PerNode, Range("above zero", lambda x: x > 0.0)]
+NotNegative = Annotated[PerNode, Range("zero or above", lambda x: x >= 0.0)]
+OneOrAbove = Annotated[PerNode, Range("one or above", lambda x: x >= 1.0)]
+UpToOne = Annotated[PerNode, Range("above zero and at most 1", lambda x: (x > 0.0) & (x <= 1.0))]
+
+
+@cache
+def _ranges(law: Any) -> Mapping[str, tuple[Range, ...]]:
+    """Ranges that the annotations of a law's parameters name."""
+    try:
+        hints = get_type_hints(law, include_extras=True)
+    except NameError as error:
+        raise InputError(f"{law.__name__}: an annotation cannot be understood ({error}); use names "
+                         f"that the module of the law knows.") from None
+    return {name: tuple(item for item in getattr(hint, "__metadata__", ())
+                        if isinstance(item, Range))
+            for name, hint in hints.items()}
+
+
 def normal_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(u, v, p) -> F, dF/du, dF/dv``."""
+    """Decorator of a function ``f(u, v, p) -> F, dF/du, dF/dv``, compiled at its first use.
+
+    Arguments, results, units and signs stand at the top of the module. InputError at that use for
+    another form, or a statement that cannot be compiled.
+    """
     return compile_law(NORMAL, NORMAL_FORM, function)
 
 
 def friction_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(v, F, p) -> R, dR/dv, dR/dF``."""
+    """Decorator of a function ``f(v, F, p) -> R, dR/dv, dR/dF``, compiled at its first use.
+
+    Arguments, results, units and signs stand at the top of the module. InputError at that use for
+    another form, or a statement that cannot be compiled.
+    """
     return compile_law(FRICTION, FRICTION_FORM, function)
 
 
@@ -80,7 +124,10 @@ def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
 
 
 def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(v, F, z, p, force, rates)`` that fills force and rates."""
+    """Decorator of a function ``f(v, F, z, p, force, rates)`` that fills force and rates.
+
+    As :func:`friction_law`.
+    """
     return compile_law(MEMORY, MEMORY_FORM, function)
 
 
@@ -100,6 +147,7 @@ class NodeLaw:
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
+        law: Any = type(self)
         for entry in fields(self):
             given = getattr(self, entry.name)
             if entry.name in self.choices:
@@ -122,6 +170,8 @@ class NodeLaw:
             if not np.isfinite(value).all():
                 raise InputError(f"{self._title(entry.name)} = {value!r} must be finite.")
             object.__setattr__(self, entry.name, value)
+            for one in _ranges(law)[entry.name]:
+                self.require(one.allowed, one.holds, entry.name)
 
     def node_count(self) -> int | None:
         """Number of contact nodes for which parameters are given one by one; None if for none.

@@ -1,15 +1,13 @@
-"""Friction laws without memory."""
+"""Friction laws without memory whose coefficient is constant or falls with slip velocity."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
 from fecontact.laws import friction_kernels
-from fecontact.laws.contract import PerNode
-from fecontact.laws.friction_base import MemorylessFriction, SmoothedFriction, require_at_least
-
-Smoothing = Literal["arctan", "tanh", "square-root"]
+from fecontact.laws.contract import NotNegative, Positive
+from fecontact.laws.friction_base import MemorylessFriction, SmoothedFriction, Smoothing
 
 
 @dataclass(frozen=True)
@@ -26,10 +24,8 @@ class ExponentialFriction(SmoothedFriction):
 
     Parameters
     ----------
-    static_coefficient : float or (n,) sequence
-        mu_0, zero or above.
-    kinetic_coefficient : float or (n,) sequence
-        mu_inf, zero or above.
+    static_coefficient, kinetic_coefficient : float or (n,) sequence
+        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
     decay : float or (n,) sequence
         lambda, zero or above [s/m].
     smoothing_slope : float or (n,) sequence
@@ -52,17 +48,12 @@ class ExponentialFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.exponential
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    decay: PerNode = 1000.0
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    decay: NotNegative = 1000.0
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "decay", "viscous_coefficient")
 
 
 @dataclass(frozen=True)
@@ -80,7 +71,7 @@ class GaussianFriction(SmoothedFriction):
     Parameters
     ----------
     static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_0 and mu_inf, zero or above.
+        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
     stribeck_velocity : float or (n,) sequence
         v_s, positive [m/s].
     smoothing_slope : float or (n,) sequence
@@ -103,18 +94,12 @@ class GaussianFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.gaussian
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    stribeck_velocity: PerNode = 1e-3
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    stribeck_velocity: Positive = 1e-3
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "viscous_coefficient")
-        self.require("above zero", lambda x: x > 0, "stribeck_velocity")
 
 
 @dataclass(frozen=True)
@@ -132,7 +117,7 @@ class HyperbolicFriction(SmoothedFriction):
     Parameters
     ----------
     static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_0 and mu_inf, zero or above.
+        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
     stribeck_velocity : float or (n,) sequence
         v_s, positive: half of the fall is behind it [m/s].
     smoothing_slope : float or (n,) sequence
@@ -155,18 +140,12 @@ class HyperbolicFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.hyperbolic
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    stribeck_velocity: PerNode = 1e-3
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    stribeck_velocity: Positive = 1e-3
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "viscous_coefficient")
-        self.require("above zero", lambda x: x > 0, "stribeck_velocity")
 
 
 @dataclass(frozen=True)
@@ -194,118 +173,10 @@ class ConstantFriction(SmoothedFriction):
 
     kernel: ClassVar = friction_kernels.constant
 
-    friction_coefficient: PerNode = 0.55
-    smoothing_slope: PerNode = 1e6
-    viscous_coefficient: PerNode = 0.0
+    friction_coefficient: NotNegative = 0.55
+    smoothing_slope: Positive = 1e6
+    viscous_coefficient: NotNegative = 0.0
     smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0,
-                     "friction_coefficient", "viscous_coefficient")
-
-
-@dataclass(frozen=True)
-class GalvanettoFriction(SmoothedFriction):
-    r"""Dry friction that falls like a hyperbola and rises again with the square of velocity.
-
-    .. math::
-
-        R = F\, \mu(v)\, s(v), \qquad
-        \mu(v) = \mu_k + \frac{\mu_s - \mu_k}{1 + \gamma |v|} + \eta v^2
-
-    R [N] has the sign of the slip velocity v [m/s]. Friction is least where
-    ``gamma (mu_s - mu_k) = 2 eta |v| (1 + gamma |v|)^2``.
-
-    Parameters
-    ----------
-    static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_s and mu_k, zero or above.
-    decay : float or (n,) sequence
-        gamma, zero or above [s/m].
-    growth : float or (n,) sequence
-        eta, zero or above [s^2/m^2].
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
-    References
-    ----------
-    U. Galvanetto, S. R. Bishop, Dynamics of a simple damped oscillator undergoing stick-slip
-    vibrations, Meccanica 34 (1999), for two blocks on a belt.
-    """
-
-    kernel: ClassVar = friction_kernels.galvanetto
-
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    decay: PerNode = 1000.0
-    growth: PerNode = 0.0
-    smoothing_slope: PerNode = 1e6
-    smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "static_coefficient",
-                     "kinetic_coefficient", "decay", "growth")
-
-
-@dataclass(frozen=True)
-class CubicFriction(SmoothedFriction):
-    r"""Dry friction that is a cubic parabola of slip velocity with one minimum.
-
-    .. math::
-
-        R = F\, \mu(v)\, s(v), \qquad
-        \mu(v) = \mu_s - \tfrac{3}{2} (\mu_s - \mu_m)
-        \left[\frac{|v|}{v_m} - \frac{1}{3} \left(\frac{|v|}{v_m}\right)^3\right]
-
-    R [N] has the sign of the slip velocity v [m/s]. mu falls from mu_s at rest to mu_m at v_m, is
-    back at mu_s at ``sqrt(3) v_m`` and grows without bound.
-
-    Parameters
-    ----------
-    static_coefficient : float or (n,) sequence
-        mu_s, at least mu_m.
-    minimum_coefficient : float or (n,) sequence
-        mu_m, zero or above.
-    minimum_velocity : float or (n,) sequence
-        v_m, positive [m/s].
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction_base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
-    References
-    ----------
-    J. J. Thomsen, A. Fidlin, Analytical approximations for stick-slip vibration amplitudes,
-    International Journal of Non-Linear Mechanics 38 (2003), unsmoothed.
-    """
-
-    kernel: ClassVar = friction_kernels.cubic
-
-    static_coefficient: PerNode = 0.8
-    minimum_coefficient: PerNode = 0.55
-    minimum_velocity: PerNode = 1e-2
-    smoothing_slope: PerNode = 1e6
-    smoothing: Smoothing = "arctan"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "minimum_coefficient")
-        self.require("above zero", lambda x: x > 0, "minimum_velocity")
-        require_at_least(self, "static_coefficient", "minimum_coefficient")
 
 
 @dataclass(frozen=True)
@@ -340,15 +211,10 @@ class ProductFriction(MemorylessFriction):
 
     kernel: ClassVar = friction_kernels.product
 
-    factor: PerNode = 0.14
-    excess: PerNode = 1.14
-    decay: PerNode = 2.0
-    smoothing_slope: PerNode = 100.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "factor", "excess", "decay")
-        self.require("above zero", lambda x: x > 0, "smoothing_slope")
+    factor: NotNegative = 0.14
+    excess: NotNegative = 1.14
+    decay: NotNegative = 2.0
+    smoothing_slope: Positive = 100.0
 
     @property
     def velocity_scale(self) -> float:

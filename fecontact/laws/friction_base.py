@@ -1,15 +1,17 @@
 """Base classes of friction laws: without memory, smoothed, with memory."""
 
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
 from fecontact.laws import contract
-from fecontact.laws.contract import NodeLaw, PerNode
+from fecontact.laws.contract import NodeLaw, Positive
 
 Array = NDArray[np.float64]
+
+Smoothing = Literal["arctan", "tanh", "square-root"]
 
 
 class MemorylessFriction(contract.FrictionLaw):
@@ -66,13 +68,9 @@ class SmoothedFriction(MemorylessFriction):
     a creep that the others have less of.
     """
 
-    choices: ClassVar = {"smoothing": ("arctan", "tanh", "square-root")}
+    choices: ClassVar = {"smoothing": get_args(Smoothing)}
 
-    smoothing_slope: PerNode
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "smoothing_slope")
+    smoothing_slope: Positive
 
     @property
     def velocity_scale(self) -> float:
@@ -83,9 +81,14 @@ class SmoothedFriction(MemorylessFriction):
 class MemoryFriction(contract.FrictionLaw):
     """A friction law ``f(v, F, z, p, force, rates)`` with internal variables z.
 
-    Subclasses give :attr:`memory`, :attr:`state_scale`, :meth:`steady_coefficient` and, where it
-    has a closed form, :meth:`initial_memory`.
+    Subclasses give :attr:`state_scale`, :meth:`steady_coefficient` and, where there is more than
+    one internal variable, :attr:`memory`.
     """
+
+    @property
+    def memory(self) -> int:
+        """Number s of internal variables per node: one, if a law does not say otherwise."""
+        return 1
 
     @property
     def velocity_scale(self) -> float:
@@ -100,18 +103,6 @@ class MemoryFriction(contract.FrictionLaw):
         """R/F of sliding at constant slip velocity [m/s], with its sign; for v = 0 that of v > 0.
 
         With parameters per node, (n,) of them, velocities broadcast against (n,).
-        """
-        raise NotImplementedError
-
-    def initial_memory(self, normal_force: Array, slip_velocity: Array, share: Array) -> Array:
-        """Internal variables (n, s) of sliding at constant slip velocities; zero at v = 0.
-
-        Parameters
-        ----------
-        normal_force, slip_velocity : (n,) array
-            F [N] and v [m/s] of each node.
-        share : (n,) array
-            Each node's part of the contact face.
         """
         raise NotImplementedError
 

@@ -15,7 +15,8 @@ from fecontact.laws.ground_motion import (
     SpeedRamp,
     constant_speed,
 )
-from fecontact.laws.profiles import Flat, Profile, Sine
+from fecontact.laws.profile_base import Profile
+from fecontact.laws.profiles import Flat, Sine
 
 Array = NDArray[np.float64]
 

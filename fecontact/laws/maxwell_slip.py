@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
-from fecontact.laws.contract import PerNode, memory_friction_law
+from fecontact.laws.contract import NotNegative, Positive, memory_friction_law
 from fecontact.laws.friction_base import MemoryFriction
 
 Array = NDArray[np.float64]
@@ -48,20 +48,9 @@ class _MaxwellSlip(MemoryFriction):
     kernel: ClassVar = _maxwell_slip
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: PerNode = 1e7
-    friction_coefficient: PerNode = 0.55
-    relaxation_time: PerNode = 1e-7
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness", "relaxation_time")
-        self.require("zero or above", lambda x: x >= 0, "friction_coefficient")
-
-    def _yield_deflections(self, share: Array, normal_force: Array) -> Array:
-        """Deflections (n, s) at which the elements slide [m]."""
-        stiffness, mu = self.table(share)[:, :2].T
-        part = (2.0 * np.arange(self.memory) + 1.0) / self.memory
-        return (mu * normal_force / stiffness)[:, None] * part
+    stiffness: Positive = 1e7
+    friction_coefficient: NotNegative = 0.55
+    relaxation_time: Positive = 1e-7
 
     @property
     def state_scale(self) -> Array:
@@ -77,13 +66,6 @@ class _MaxwellSlip(MemoryFriction):
     def steady_coefficient(self, velocity: Array | float) -> Array:
         """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
         return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
-
-    def initial_memory(self, normal_force: Array, slip_velocity: Array, share: Array) -> Array:
-        """Deflections (n, s) of steady sliding [m]; see :class:`MemoryFriction`."""
-        v = np.asarray(slip_velocity)[:, None]
-        relaxation = self.table(share)[:, 2][:, None]
-        limits = self._yield_deflections(share, np.asarray(normal_force))
-        return np.asarray(np.sign(v) * limits + relaxation * v)
 
 
 @dataclass(frozen=True)
@@ -121,11 +103,6 @@ class JenkinsFriction(_MaxwellSlip):
     G. M. Jenkins, Analysis of the stress-strain relationships in reactor grade graphite, British
     Journal of Applied Physics 13 (1962).
     """
-
-    @property
-    def memory(self) -> int:
-        """One internal variable."""
-        return 1
 
 
 @dataclass(frozen=True)

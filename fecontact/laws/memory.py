@@ -1,101 +1,16 @@
 """Friction laws with memory: bristles and hysteresis."""
 
-import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.compiled import helper
-from fecontact.laws.contract import PerNode, memory_friction_law
+from fecontact.laws import memory_kernels
+from fecontact.laws.contract import NotNegative, OneOrAbove, PerNode, Positive, Range
 from fecontact.laws.friction_base import MemoryFriction, require_at_least
-from fecontact.laws.maxwell_slip import IwanFriction, JenkinsFriction
-
-__all__ = ["BoucWenFriction", "DahlFriction", "IwanFriction", "JenkinsFriction", "LuGreFriction"]
 
 Array = NDArray[np.float64]
-
-# Time constant [s] with which internal variables vanish without normal force.
-_FADING = 1e-7
-
-
-@helper
-def _fade(z, rates):  # type: ignore[no-untyped-def]
-    rates[0, 0] = -z[0] / _FADING
-    rates[0, 1] = 0.0
-    rates[0, 2] = 0.0
-    rates[0, 3] = -1.0 / _FADING
-
-
-@memory_friction_law
-def _dahl(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
-    mu, stiffness, exponent = p[0], p[1], p[2]
-    force[0] = F * stiffness * z[0]
-    force[1] = 0.0
-    force[2] = stiffness * z[0]
-    force[3] = F * stiffness
-    if F <= 0.0:
-        _fade(z, rates)
-        return
-    sign = 1.0 if v >= 0.0 else -1.0
-    left = 1.0 - sign * stiffness * z[0] / mu
-    power = abs(left) ** (exponent - 1.0)
-    rates[0, 0] = v * power * left
-    rates[0, 1] = power * left
-    rates[0, 2] = 0.0
-    rates[0, 3] = -abs(v) * exponent * power * stiffness / mu
-
-
-@memory_friction_law
-def _lugre(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
-    static, kinetic, stribeck, exponent = p[0], p[1], p[2], p[3]
-    stiffness, damping, viscous, decay = p[4], p[5], p[6], p[7]
-    speed = abs(v)
-    sign = 1.0 if v >= 0.0 else -1.0
-    x = (speed / stribeck) ** exponent
-    excess = (static - kinetic) * math.exp(-x)
-    g = kinetic + excess
-    u = stiffness * z[0] / g
-    # |v| g' / g: finite at rest for every exponent.
-    fall = -exponent * x * excess / g
-    rate = v - speed * u
-    rate_v = 1.0 - sign * u * (1.0 - fall)
-    rate_z = -speed * stiffness / g
-    fade = damping * math.exp(-((decay * v) ** 2))
-    ratio = stiffness * z[0] + fade * rate + viscous * v
-    force[0] = F * ratio
-    force[1] = F * (fade * (rate_v - 2.0 * decay * decay * v * rate) + viscous)
-    force[2] = ratio
-    force[3] = F * (stiffness + fade * rate_z)
-    if F <= 0.0:
-        _fade(z, rates)
-        return
-    rates[0, 0] = rate
-    rates[0, 1] = rate_v
-    rates[0, 2] = 0.0
-    rates[0, 3] = rate_z
-
-
-@memory_friction_law
-def _bouc_wen(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
-    mu, yielding, beta, exponent = p[0], p[1], p[2], p[3]
-    force[0] = mu * F * z[0]
-    force[1] = 0.0
-    force[2] = mu * z[0]
-    force[3] = mu * F
-    if F <= 0.0:
-        _fade(z, rates)
-        return
-    size = abs(z[0])
-    pull = 1.0 if v * z[0] >= 0.0 else -1.0
-    share = beta * pull + 1.0 - beta
-    power = size ** (exponent - 1.0)
-    rates[0, 0] = v * (1.0 - share * power * size) / yielding
-    rates[0, 1] = (1.0 - share * power * size) / yielding
-    rates[0, 2] = 0.0
-    side = 1.0 if z[0] >= 0.0 else -1.0
-    rates[0, 3] = -v * share * exponent * power * side / yielding
 
 
 @dataclass(frozen=True)
@@ -131,21 +46,11 @@ class DahlFriction(MemoryFriction):
     P. R. Dahl, A solid friction model, The Aerospace Corporation, TOR-0158(3107-18)-1 (1968).
     """
 
-    kernel: ClassVar = _dahl
+    kernel: ClassVar = memory_kernels.dahl
 
-    friction_coefficient: PerNode = 0.55
-    presliding_stiffness: PerNode = 1e5
-    exponent: PerNode = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "friction_coefficient", "presliding_stiffness")
-        self.require("one or above", lambda x: x >= 1, "exponent")
-
-    @property
-    def memory(self) -> int:
-        """One internal variable."""
-        return 1
+    friction_coefficient: Positive = 0.55
+    presliding_stiffness: Positive = 1e5
+    exponent: OneOrAbove = 1.0
 
     @property
     def state_scale(self) -> Array:
@@ -155,11 +60,6 @@ class DahlFriction(MemoryFriction):
     def steady_coefficient(self, velocity: Array | float) -> Array:
         """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
         return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
-
-    def initial_memory(self, normal_force: Array, slip_velocity: Array, share: Array) -> Array:
-        """Deflections (n, 1) of steady sliding [m]; see :class:`MemoryFriction`."""
-        mu, stiffness, _ = self.table(share).T
-        return np.where(normal_force > 0.0, np.sign(slip_velocity) * mu / stiffness, 0.0)[:, None]
 
 
 @dataclass(frozen=True)
@@ -215,29 +115,20 @@ class LuGreFriction(MemoryFriction):
     Necessary and sufficient conditions for passivity of the LuGre friction model, ibid. 45 (2000).
     """
 
-    kernel: ClassVar = _lugre
+    kernel: ClassVar = memory_kernels.lugre
 
     static_coefficient: PerNode = 0.8
-    kinetic_coefficient: PerNode = 0.55
-    stribeck_velocity: PerNode = 1e-3
-    stribeck_exponent: PerNode = 2.0
-    bristle_stiffness: PerNode = 1e5
-    bristle_damping: PerNode = 0.0
-    viscous_coefficient: PerNode = 0.0
-    damping_decay: PerNode = 0.0
+    kinetic_coefficient: Positive = 0.55
+    stribeck_velocity: Positive = 1e-3
+    stribeck_exponent: Positive = 2.0
+    bristle_stiffness: Positive = 1e5
+    bristle_damping: NotNegative = 0.0
+    viscous_coefficient: NotNegative = 0.0
+    damping_decay: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "kinetic_coefficient", "stribeck_velocity",
-                     "stribeck_exponent", "bristle_stiffness")
-        self.require("zero or above", lambda x: x >= 0, "bristle_damping", "viscous_coefficient",
-                     "damping_decay")
         require_at_least(self, "static_coefficient", "kinetic_coefficient")
-
-    @property
-    def memory(self) -> int:
-        """One internal variable."""
-        return 1
 
     @property
     def state_scale(self) -> Array:
@@ -256,13 +147,6 @@ class LuGreFriction(MemoryFriction):
         x = (np.abs(v) / self.stribeck_velocity) ** self.stribeck_exponent
         g = kinetic + (np.asarray(self.static_coefficient) - kinetic) * np.exp(-x)
         return np.asarray(np.where(v < 0.0, -g, g) + v * self.viscous_coefficient)
-
-    def initial_memory(self, normal_force: Array, slip_velocity: Array, share: Array) -> Array:
-        """Deflections (n, 1) of steady sliding [m]; see :class:`MemoryFriction`."""
-        static, kinetic, stribeck, exponent, stiffness = self.table(share).T[:5]
-        x = (np.abs(slip_velocity) / stribeck) ** exponent
-        g = kinetic + (static - kinetic) * np.exp(-x)
-        return np.where(normal_force > 0.0, np.sign(slip_velocity) * g / stiffness, 0.0)[:, None]
 
 
 @dataclass(frozen=True)
@@ -302,24 +186,12 @@ class BoucWenFriction(MemoryFriction):
     Hysteresis (2007), with beta + gamma = 1.
     """
 
-    kernel: ClassVar = _bouc_wen
+    kernel: ClassVar = memory_kernels.bouc_wen
 
-    friction_coefficient: PerNode = 0.55
-    yield_displacement: PerNode = 5e-6
-    beta: PerNode = 0.5
-    exponent: PerNode = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "friction_coefficient")
-        self.require("above zero", lambda x: x > 0, "yield_displacement")
-        self.require("0.5 or above", lambda x: x >= 0.5, "beta")
-        self.require("one or above", lambda x: x >= 1, "exponent")
-
-    @property
-    def memory(self) -> int:
-        """One internal variable."""
-        return 1
+    friction_coefficient: NotNegative = 0.55
+    yield_displacement: Positive = 5e-6
+    beta: Annotated[PerNode, Range("0.5 or above", lambda x: x >= 0.5)] = 0.5
+    exponent: OneOrAbove = 1.0
 
     @property
     def state_scale(self) -> Array:
@@ -334,7 +206,3 @@ class BoucWenFriction(MemoryFriction):
     def steady_coefficient(self, velocity: Array | float) -> Array:
         """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
         return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
-
-    def initial_memory(self, normal_force: Array, slip_velocity: Array, share: Array) -> Array:
-        """Values (n, 1) of steady sliding, the sign of v; see :class:`MemoryFriction`."""
-        return np.where(normal_force > 0.0, np.sign(slip_velocity), 0.0)[:, None]

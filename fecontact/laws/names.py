@@ -1,10 +1,12 @@
 """Names of the laws in study files: ``law = "lugre"``, or a law of the user's own file."""
 
 import importlib.util
+import os
 import re
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,9 @@ from fecontact.laws.signal_base import Signal
 def law_names() -> Mapping[type, Mapping[str, type]]:
     """Classes by name, for each kind of law (the base class)."""
     from fecontact.laws import (
+        fourier_series,
         friction,
+        friction_minimum,
         ground_motion,
         maxwell_slip,
         memory,
@@ -29,6 +33,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         normal_statistical,
         normal_stop,
         profiles,
+        random_roughness,
         signals,
         trace,
         transients,
@@ -55,8 +60,8 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "gaussian": friction.GaussianFriction,
             "hyperbolic": friction.HyperbolicFriction,
             "constant": friction.ConstantFriction,
-            "galvanetto": friction.GalvanettoFriction,
-            "cubic": friction.CubicFriction,
+            "galvanetto": friction_minimum.GalvanettoFriction,
+            "cubic": friction_minimum.CubicFriction,
             "product": friction.ProductFriction,
             "jenkins": maxwell_slip.JenkinsFriction,
             "iwan": maxwell_slip.IwanFriction,
@@ -67,9 +72,9 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         Profile: {
             "flat": profiles.Flat,
             "sine": profiles.Sine,
-            "fourier-series": profiles.FourierSeries,
+            "fourier-series": fourier_series.FourierSeries,
             "trace": trace.Trace,
-            "random-roughness": profiles.RandomRoughness,
+            "random-roughness": random_roughness.RandomRoughness,
         },
         GroundMotion: {
             "harmonic-speed": ground_motion.HarmonicSpeed,
@@ -113,20 +118,33 @@ def law_class(kind: type, name: Any, where: str) -> type:
                          f"\"FILE.py:CLASS\".")
     if name in names:
         return names[name]
+    return own_law(kind, name, f"{where}: law = {name!r}")
+
+
+def own_law(kind: Any, name: str, where: str) -> type:
+    """The class ``FILE.py:CLASS`` of a law of a kind, or of one of several.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it cannot be loaded, or has no such class.
+    """
     path, _, title = name.rpartition(":")
     try:
         found = getattr(_module(str(Path(path).resolve())), title, None)
     except FileNotFoundError:
-        raise InputError(f"{where}: law = {name!r}: there is no file {path}.") from None
+        raise InputError(f"{where}: there is no file {path}.") from None
     except InputError:
         raise
     except Exception as error:
-        raise InputError(f"{where}: law = {name!r}: {path} cannot be loaded "
+        raise InputError(f"{where}: {path} cannot be loaded "
                          f"({type(error).__name__}: {error}).") from None
     if not (isinstance(found, type) and issubclass(found, kind)):
-        laws = [one.__name__ for one in _subclasses(kind)
-                if one.__module__ == _module_name(str(Path(path).resolve()))]
-        raise InputError(f"{where}: law = {name!r}: {path} has no {kind.__name__} of that name"
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        laws = {one.__name__ for one in chain(*map(_subclasses, kinds))
+                if one.__module__ == _module_name(str(Path(path).resolve()))}
+        what = "law" if len(kinds) > 1 else kind.__name__
+        raise InputError(f"{where}: {path} has no {what} of that name"
                          f"{nearest(title, laws)}; it has {choices(laws)}.")
     return found
 
@@ -154,6 +172,28 @@ def with_folder(table: Any, folder: Path) -> Any:
     if not isinstance(table, Mapping):
         return table
     return {key: _located(key, with_folder(value, folder), folder) for key, value in table.items()}
+
+
+def movable(table: Any, folder: Path, root: Path) -> Any:
+    """A table in which files of laws below ``root`` are named from a folder, not absolutely.
+
+    The reverse of :func:`with_folder`; ``root`` can then be moved with all that is in it.
+    """
+    if isinstance(table, list):
+        return [movable(item, folder, root) for item in table]
+    if not isinstance(table, Mapping):
+        return table
+    return {key: _relative(key, movable(value, folder, root), folder.resolve(), root.resolve())
+            for key, value in table.items()}
+
+
+def _relative(key: str, value: Any, folder: Path, root: Path) -> Any:
+    if key != "law" or not isinstance(value, str) or ".py:" not in value:
+        return value
+    path, _, title = value.rpartition(":")
+    if not Path(path).is_relative_to(root):
+        return value
+    return f"{Path(os.path.relpath(path, folder)).as_posix()}:{title}"
 
 
 def _located(key: str, value: Any, folder: Path) -> Any:

@@ -2,114 +2,17 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NormalLaw, PerNode, normal_law
+from fecontact.laws import surface_kernels
+from fecontact.laws.contract import NormalLaw, NotNegative, PerNode, Positive, Range
 
 _TAU = 2.0 * math.pi
 _ROOT_HALF = math.sqrt(0.5)
 _DENSITY = 1.0 / math.sqrt(_TAU)
-
-
-@normal_law
-def _uniform(u, v, p):  # type: ignore[no-untyped-def]
-    stiffness, height, damping = p[0], p[1], p[2]
-    s = u / height
-    if s <= 0.0:
-        return 0.0, 0.0, 0.0
-    if s < 1.0:
-        bearing, slope = s, 1.0 / height
-        force = stiffness * height * 0.5 * s * s
-    else:
-        bearing, slope = 1.0, 0.0
-        force = stiffness * height * (s - 0.5)
-    force += damping * bearing * v
-    if force <= 0.0:
-        return 0.0, 0.0, 0.0
-    return force, stiffness * bearing + damping * slope * v, damping * bearing
-
-
-@normal_law
-def _parabolic(u, v, p):  # type: ignore[no-untyped-def]
-    stiffness, height, damping = p[0], p[1], p[2]
-    s = u / height
-    if s <= 0.0:
-        return 0.0, 0.0, 0.0
-    compression, bearing, density = s - 0.5, 1.0, 0.0
-    if s < 1.0:
-        compression = s * s * s * (1.0 - 0.5 * s)
-        bearing = s * s * (3.0 - 2.0 * s)
-        density = 6.0 * s * (1.0 - s)
-    force = stiffness * height * compression + damping * bearing * v
-    if force <= 0.0:
-        return 0.0, 0.0, 0.0
-    return force, stiffness * bearing + damping * density / height * v, damping * bearing
-
-
-@normal_law
-def _cosine(u, v, p):  # type: ignore[no-untyped-def]
-    stiffness, height, damping = p[0], p[1], p[2]
-    s = u / height
-    if s <= 0.0:
-        return 0.0, 0.0, 0.0
-    compression, bearing, density = s - 0.5, 1.0, 0.0
-    if s < 1.0:
-        x = _TAU * s
-        cosine = math.cos(x)
-        density = 1.0 - cosine
-        if x > 0.5:
-            bearing = s - math.sin(x) / _TAU
-            compression = 0.5 * s * s - density / (_TAU * _TAU)
-        else:
-            # The differences above would lose their digits.
-            y = x * x
-            density = 2.0 * math.sin(0.5 * x) ** 2
-            bearing = x * y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (
-                1.0 - y / 110.0)))) / _TAU
-            compression = y * y / 24.0 * (1.0 - y / 30.0 * (1.0 - y / 56.0 * (1.0 - y / 90.0 * (
-                1.0 - y / 132.0)))) / (_TAU * _TAU)
-    force = stiffness * height * compression + damping * bearing * v
-    if force <= 0.0:
-        return 0.0, 0.0, 0.0
-    return force, stiffness * bearing + damping * density / height * v, damping * bearing
-
-
-@normal_law
-def _gaussian(u, v, p):  # type: ignore[no-untyped-def]
-    stiffness, height, damping, deviation = p[0], p[1], p[2], p[3]
-    highest, first_moment, norm = p[4], p[5], p[6]
-    s = u / height
-    if s <= 0.0:
-        return 0.0, 0.0, 0.0
-    compression, bearing, density = s - 0.5, 1.0, 0.0
-    if s < 1.0:
-        t = (s - 0.5) / deviation
-        y, b = s / deviation, 0.5 / deviation
-        normal = _DENSITY * math.exp(-0.5 * t * t)
-        density = norm * normal / deviation
-        if y * (b + 1.0) > 0.1:
-            part = 0.5 * math.erfc(-_ROOT_HALF * t)
-            bearing = norm * (part - highest)
-            compression = norm * (deviation * (t * part + normal - first_moment) - s * highest)
-        else:
-            # The differences above would lose their digits: series in Hermite polynomials.
-            scale = norm * _DENSITY * math.exp(-0.5 * b * b)
-            before, hermite, term = 0.0, 1.0, y
-            bearing, compression = 0.0, 0.0
-            for n in range(10):
-                bearing += hermite * term
-                compression += hermite * term * y / (n + 2.0)
-                before, hermite = hermite, b * hermite - n * before
-                term *= y / (n + 2.0)
-            bearing *= scale
-            compression *= scale * deviation
-    force = stiffness * height * compression + damping * bearing * v
-    if force <= 0.0:
-        return 0.0, 0.0, 0.0
-    return force, stiffness * bearing + damping * density / height * v, damping * bearing
 
 
 @dataclass(frozen=True)
@@ -146,17 +49,12 @@ class RoughSurface(NormalLaw):
     uniform heights.
     """
 
-    kernel: ClassVar = _uniform
+    kernel: ClassVar = surface_kernels.uniform
     extensive: ClassVar = frozenset({"stiffness", "damping"})
 
-    stiffness: PerNode = 0.3e6
-    roughness_height: PerNode = 5.2e-6
-    damping: PerNode = 6.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness", "roughness_height")
-        self.require("zero or above", lambda x: x >= 0, "damping")
+    stiffness: Positive = 0.3e6
+    roughness_height: Positive = 5.2e-6
+    damping: NotNegative = 6.0
 
     @property
     def penetration_scale(self) -> float:
@@ -207,7 +105,7 @@ class ParabolicSurface(RoughSurface):
         For a stiffness or roughness height that is not positive, or a negative damping.
     """
 
-    kernel: ClassVar = _parabolic
+    kernel: ClassVar = surface_kernels.parabolic
 
     def _energy(
         self, s: NDArray[np.float64], table: NDArray[np.float64]
@@ -235,7 +133,7 @@ class CosineSurface(RoughSurface):
         For a stiffness or roughness height that is not positive, or a negative damping.
     """
 
-    kernel: ClassVar = _cosine
+    kernel: ClassVar = surface_kernels.cosine
 
     def _energy(
         self, s: NDArray[np.float64], table: NDArray[np.float64]
@@ -269,13 +167,10 @@ class GaussianSurface(RoughSurface):
         For values outside these ranges.
     """
 
-    kernel: ClassVar = _gaussian
+    kernel: ClassVar = surface_kernels.gaussian
 
-    deviation: PerNode = 1.0 / 6.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("at least 0.02 and at most 1", lambda x: (x >= 0.02) & (x <= 1), "deviation")
+    deviation: Annotated[PerNode, Range(
+        "at least 0.02 and at most 1", lambda x: (x >= 0.02) & (x <= 1.0))] = 1.0 / 6.0
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters (n, 7): the fields, and three integrals of the density at the highest peak."""

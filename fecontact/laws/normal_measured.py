@@ -13,6 +13,7 @@ from fecontact.errors import InputError, require_positive
 from fecontact.laws.contract import PerNode, normal_law
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.records import read_columns
+from fecontact.laws.surface_kernels import bed_of_asperities
 
 _INTERVALS, _HEAD, _KNOT = 64, 3, 3
 _HALF = np.linspace(0.0, 1.0, _INTERVALS // 2 + 1) ** 2 / 2.0
@@ -23,8 +24,7 @@ _UNIFORM = (0.0, 0.5, 1.0)
 
 @normal_law
 def _measured(u, v, p):  # type: ignore[no-untyped-def]
-    stiffness, height, damping = p[0], p[1], p[2]
-    s = u / height
+    s = u / p[1]
     if s <= 0.0:
         return 0.0, 0.0, 0.0
     if s < 1.0:
@@ -50,10 +50,7 @@ def _measured(u, v, p):  # type: ignore[no-untyped-def]
         density = (m + x * (2.0 * b + x * 3.0 * c)) / length
     else:
         compression, bearing, density = p[_HEAD + _KNOT * _INTERVALS] + s - 1.0, 1.0, 0.0
-    force = stiffness * height * compression + damping * bearing * v
-    if force <= 0.0:
-        return 0.0, 0.0, 0.0
-    return force, stiffness * bearing + damping * density / height * v, damping * bearing
+    return bed_of_asperities(v, p, compression, bearing, density)
 
 
 @dataclass(frozen=True)

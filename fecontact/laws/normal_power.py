@@ -6,7 +6,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NormalLaw, PerNode, normal_law
+from fecontact.laws.contract import (
+    NormalLaw,
+    NotNegative,
+    OneOrAbove,
+    PerNode,
+    Positive,
+    UpToOne,
+    normal_law,
+)
 
 
 @normal_law
@@ -66,7 +74,7 @@ class PowerContact(_Power):
     stiffness : float or (n,) sequence
         K of the whole face, or of each node, positive [N/m^n].
     exponent : float or (n,) sequence
-        n, at least 1.
+        n, one or above.
     damping_factor : float or (n,) sequence
         chi, zero or above [s/m].
 
@@ -83,15 +91,9 @@ class PowerContact(_Power):
 
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: PerNode
-    exponent: PerNode = 1.5
-    damping_factor: PerNode = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness")
-        self.require("at least 1", lambda x: x >= 1, "exponent")
-        self.require("zero or above", lambda x: x >= 0, "damping_factor")
+    stiffness: Positive
+    exponent: OneOrAbove = 1.5
+    damping_factor: NotNegative = 0.0
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters (n, 4): K, 1, n, chi."""
@@ -122,7 +124,7 @@ class RestitutionContact(_Power):
     reference_velocity : float or (n,) sequence
         v_r, positive [m/s].
     exponent : float or (n,) sequence
-        n, at least 1.
+        n, one or above.
     damping_model : 'hunt-crossley', 'lankarani-nikravesh' or 'flores'
 
     Raises
@@ -141,16 +143,14 @@ class RestitutionContact(_Power):
     extensive: ClassVar = frozenset({"stiffness"})
     choices: ClassVar = {"damping_model": ("hunt-crossley", "lankarani-nikravesh", "flores")}
 
-    stiffness: PerNode
+    stiffness: Positive
     restitution: PerNode
-    reference_velocity: PerNode
-    exponent: PerNode = 1.5
+    reference_velocity: Positive
+    exponent: OneOrAbove = 1.5
     damping_model: str = "hunt-crossley"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness", "reference_velocity")
-        self.require("at least 1", lambda x: x >= 1, "exponent")
         if self.damping_model == "lankarani-nikravesh":
             self.require("zero to 1", lambda e: (e >= 0) & (e <= 1), "restitution")
         else:
@@ -225,16 +225,10 @@ class PowerLawContact(_Power):
 
     extensive: ClassVar = frozenset({"nominal_area"})
 
-    nominal_area: PerNode
-    coefficient: PerNode
-    exponent: PerNode = 0.5
-    damping_factor: PerNode = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "nominal_area", "coefficient")
-        self.require("above zero and at most 1", lambda x: (x > 0) & (x <= 1), "exponent")
-        self.require("zero or above", lambda x: x >= 0, "damping_factor")
+    nominal_area: Positive
+    coefficient: Positive
+    exponent: UpToOne = 0.5
+    damping_factor: NotNegative = 0.0
 
     @property
     def penetration_scale(self) -> float:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NormalLaw, PerNode, normal_law
+from fecontact.laws.contract import NormalLaw, NotNegative, PerNode, Positive, normal_law
 
 _FARTHEST, _DEEPEST = -50.0, 60.0
 
@@ -59,14 +59,9 @@ class ExponentialContact(NormalLaw):
     kernel: ClassVar = _exponential
     extensive: ClassVar = frozenset({"force"})
 
-    force: PerNode
-    decay_length: PerNode
-    damping_factor: PerNode = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "force", "decay_length")
-        self.require("zero or above", lambda x: x >= 0, "damping_factor")
+    force: Positive
+    decay_length: Positive
+    damping_factor: NotNegative = 0.0
 
     @property
     def penetration_scale(self) -> float:
@@ -184,18 +179,12 @@ class GreenwoodWilliamson(NormalLaw):
     kernel: ClassVar = _greenwood
     extensive: ClassVar = frozenset({"asperities"})
 
-    asperities: PerNode
-    asperity_radius: PerNode
-    composite_modulus: PerNode
-    height_deviation: PerNode
+    asperities: Positive
+    asperity_radius: Positive
+    composite_modulus: Positive
+    height_deviation: Positive
     separation: PerNode = 3.0
-    damping_factor: PerNode = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "asperities", "asperity_radius",
-                     "composite_modulus", "height_deviation")
-        self.require("zero or above", lambda x: x >= 0, "damping_factor")
+    damping_factor: NotNegative = 0.0
 
     @property
     def penetration_scale(self) -> float:

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NormalLaw, PerNode, normal_law
+from fecontact.laws.contract import NormalLaw, NotNegative, OneOrAbove, Positive, normal_law
 
 
 @normal_law
@@ -44,13 +44,8 @@ class LinearContact(NormalLaw):
     kernel: ClassVar = _linear
     extensive: ClassVar = frozenset({"stiffness", "damping"})
 
-    stiffness: PerNode
-    damping: PerNode = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness")
-        self.require("zero or above", lambda x: x >= 0, "damping")
+    stiffness: Positive
+    damping: NotNegative = 0.0
 
     @property
     def penetration_scale(self) -> float:
@@ -101,7 +96,7 @@ class TwoSidedStop(NormalLaw):
     clearance : float or (n,) sequence
         s: way between touching the one and the other stop, zero or above [m].
     exponent : float or (n,) sequence
-        n, at least 1.
+        n, one or above.
     damping_factor : float or (n,) sequence
         chi, zero or above [s/m].
 
@@ -114,16 +109,10 @@ class TwoSidedStop(NormalLaw):
     kernel: ClassVar = _two_sided
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: PerNode
-    clearance: PerNode
-    exponent: PerNode = 1.0
-    damping_factor: PerNode = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("above zero", lambda x: x > 0, "stiffness")
-        self.require("zero or above", lambda x: x >= 0, "clearance", "damping_factor")
-        self.require("at least 1", lambda x: x >= 1, "exponent")
+    stiffness: Positive
+    clearance: NotNegative
+    exponent: OneOrAbove = 1.0
+    damping_factor: NotNegative = 0.0
 
     @property
     def penetration_scale(self) -> float:
@@ -166,11 +155,7 @@ class PrescribedForce(NormalLaw):
     kernel: ClassVar = _prescribed
     extensive: ClassVar = frozenset({"force"})
 
-    force: PerNode
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("zero or above", lambda x: x >= 0, "force")
+    force: NotNegative
 
     @property
     def penetration_scale(self) -> float:

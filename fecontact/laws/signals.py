@@ -241,8 +241,7 @@ class Sweep(Signal):
         require_finite("Sweep", amplitude=self.amplitude)
         require_one_of("Sweep", "kind", self.kind, ("linear", "logarithmic"))
         require = require_not_negative if self.kind == "linear" else require_positive
-        owner = "Sweep" if self.kind == "linear" else "Sweep, logarithmic"
-        require(owner, start_frequency_hz=self.start_frequency_hz,
+        require("Sweep", start_frequency_hz=self.start_frequency_hz,
                 end_frequency_hz=self.end_frequency_hz)
         require_positive("Sweep", duration=self.duration)
 

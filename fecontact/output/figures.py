@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.analysis.quantities import Point, point_name
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.contact_states import STATE_COLOURS, state_names
 from fecontact.output.units import suitable_unit
 
 if TYPE_CHECKING:
@@ -15,12 +17,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Point = str | int | tuple[float, float]
 
 # Colours that people with colour-blindness tell apart (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
-STATES = (("open", "#e3e0da"), ("stick", "#0072b2"), ("slip", "#e69f00"))
-STATES_WITHOUT_FRICTION = (STATES[0], ("contact", "#009e73"))
+# Of energies and powers, by the place where they are stored, come in or are lost.
+ENERGY_COLOURS = {
+    "kinetic": "#0072b2", "elastic": "#56b4e9", "modal_damping": "#56b4e9",
+    "drive_spring": "#d55e00", "drive_work": "#d55e00", "dashpots": "#d55e00",
+    "contact": "#009e73", "ground_work": "#009e73", "contact_damping": "#009e73",
+    "belt_work": "#e69f00", "friction": "#e69f00", "load_work": "#cc79a7",
+}
+_MAP_COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
 _AXES = ("x", "y")
 
 _LINE_BINS = 2000  # each drawn by its lowest and highest value
@@ -61,14 +68,14 @@ def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Fig
             factor = _labelled(axes[row, column], f"{quantity} {name}", unit,
                                *(value[:, row] for value in values))
             for number, (point, value) in enumerate(zip(points, values, strict=True)):
-                axes[row, column].plot(*_thinned(time, value[:, row] / factor),
+                axes[row, column].plot(*thinned(time, value[:, row] / factor),
                                        color=COLOURS[number % len(COLOURS)],
                                        linewidth=1.2 if number else 2.0, label=point_name(point))
     for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
                                (axes[2, 1], "friction force", trajectory.friction_force)):
         total = forces.sum(axis=1)
         factor = _labelled(axis, f"total {name}", "N", total)
-        axis.plot(*_thinned(time, total / factor), color="#303030")
+        axis.plot(*thinned(time, total / factor), color="#303030")
     figure.align_ylabels(axes)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center",
                   ncols=max(1, min(len(points), 6)))
@@ -126,17 +133,17 @@ def contact_map_figure(trajectory: Trajectory) -> "Figure":
                              cmap="viridis", vmin=0.0, vmax=float(pressure.max()) / factor or 1.0)
     figure.colorbar(image, ax=upper, label=f"contact pressure [{pressure_symbol}]", pad=0.01)
 
-    states = STATES if trajectory.friction_force.any() else STATES_WITHOUT_FRICTION
+    states = state_names(trajectory)
     state = np.minimum(trajectory.contact_state, len(states) - 1)
     counts = np.stack([np.add.reduceat((state == k).astype(np.int32), starts, axis=0)
                        for k in range(len(states))])
     # A column of several times shows contact if there was any, as the pressure above it does.
     counts[0] *= counts[1:].sum(axis=0) == 0
     image = lower.pcolormesh(edges / time_unit, places, _rows(counts.argmax(axis=0), nodes),
-                             cmap=ListedColormap([colour for _, colour in states]),
+                             cmap=ListedColormap([_MAP_COLOURS[name] for name in states]),
                              norm=BoundaryNorm(np.arange(len(states) + 1) - 0.5, len(states)))
     bar = figure.colorbar(image, ax=lower, label="state", pad=0.01, ticks=range(len(states)))
-    bar.ax.set_yticklabels([name for name, _ in states])
+    bar.ax.set_yticklabels(states)
     bar.ax.tick_params(length=0)
     figure.align_ylabels([upper, lower])
     lower.set_xlabel(f"time [{symbol}]")
@@ -165,25 +172,16 @@ def energies_figure(trajectory: Trajectory) -> "Figure":
         shown = {name: term for name, term in terms.items() if term.any()}
         factor = _labelled(axis, title, "J", total, *shown.values())
         for name, term in shown.items():
-            axis.plot(*_thinned(time, term / factor), color=COLOURS[names.index(name)],
+            axis.plot(*thinned(time, term / factor), color=ENERGY_COLOURS[name],
                       label=name.removesuffix("_work").replace("_", " "))
         if not shown:
             axis.set(ylim=(-1.0, 1.0), yticks=[0.0])
-        axis.plot(*_thinned(time, total / factor), color="#303030", linewidth=1.8, label="total",
+        axis.plot(*thinned(time, total / factor), color="#303030", linewidth=1.8, label="total",
                   zorder=1.5)
         axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     figure.align_ylabels(axes)
     axes[0].set_title(f"error of the energy balance: {energies.imbalance:.1e} of the largest term")
     return figure
-
-
-def point_name(point: Point) -> str:
-    """A point for people: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
-    if isinstance(point, str):
-        return point
-    if isinstance(point, int | np.integer):
-        return f"contact node {point}"
-    return f"({point[0]:g}, {point[1]:g}) m"
 
 
 def _usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
@@ -211,7 +209,7 @@ def _labelled(axis: "Axes", name: str, unit: str, *values: Array) -> float:
     return factor
 
 
-def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
+def thinned(x: Array, y: Array) -> tuple[Array, Array]:
     """A long line by the lowest and the highest of every few points, so that no peak is lost."""
     few = len(x) // _LINE_BINS
     if few < 4:

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.output.force_chart import ForceChart
 from fecontact.output.motion import COLOURS, Motion
-from fecontact.output.scene import COLOUR_MAPS, DARK, FORCE_COLOUR, STATE_COLOURS
+from fecontact.output.scene import COLOUR_MAPS, DARK, FORCE_COLOUR, NODE_COLOURS, needed_height
 from fecontact.output.units import quantity, suitable_unit
 
 Image = NDArray[np.uint8]
 
 _DPI = 100
 _FONT = 10.5  # points at 960 x 540
-_STATES = ("open", "stick", "slip")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,17 +53,32 @@ class Furniture:
         """Height of the strip below the scene in pixels."""
         return 2 * round(34 * self.size)
 
+    @cached_property
+    def chart_height(self) -> int:
+        """Height of the chart of forces in pixels: of room that a flat body leaves, zero for none.
+
+        The scene keeps a third more than it needs, and at least half.
+        """
+        room = self.height - self.header_height - self.footer_height
+        left = min(room - 4.0 / 3.0 * needed_height(self.motion) * self.width, 0.5 * room)
+        return 2 * int(0.5 * left) if left >= 110.0 * self.size else 0
+
     @property
     def scene_height(self) -> int:
         """What is left for the scene, in pixels."""
-        return self.height - self.header_height - self.footer_height
+        return self.height - self.header_height - self.footer_height - self.chart_height
 
     def around(self, scene: Image, frame: int) -> Image:
         """The whole picture (height, width, 3) from that of the scene."""
         header = self._header.copy()
         clock = self._clock(frame)
         header[:, -clock.shape[1] :] = clock
-        return np.concatenate([header, scene, self._footer])
+        chart = [self._chart.image(frame)] if self.chart_height else []
+        return np.concatenate([header, *chart, scene, self._footer])
+
+    @cached_property
+    def _chart(self) -> ForceChart:
+        return ForceChart(self.motion, self.width, self.chart_height, _FONT * self.size)
 
     def _strip(self, width: int, height: int) -> tuple[Any, Any]:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -147,9 +162,9 @@ class Furniture:
 
         self._text(figure, 0.55, 0.80, "contact nodes")
         x = 0.70
-        for name, colour in zip(_STATES, STATE_COLOURS, strict=True):
+        for name in self.motion.state_names:
             figure.add_artist(Line2D([x], [0.80], marker="o", markersize=8.5 * self.size,
-                                     markerfacecolor=colour, markeredgecolor=DARK,
+                                     markerfacecolor=NODE_COLOURS[name], markeredgecolor=DARK,
                                      markeredgewidth=0.8 * self.size, linestyle=""))
             self._text(figure, x + 0.013, 0.80, name)
             x += 0.09

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fecontact.errors import InputError, choices, nearest, require_positive
 from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.contact_states import state_names
 from fecontact.output.frames import (
     blocks,
     contact_forces,
@@ -78,8 +79,13 @@ class Motion:
 
     @cached_property
     def states(self) -> NDArray[np.int8]:
-        """States (F, n) of the contact nodes."""
-        return self.trajectory.contact_state[self.indices]
+        """States (F, n) of the contact nodes, as numbers of :attr:`state_names`."""
+        return np.minimum(self.trajectory.contact_state[self.indices], len(self.state_names) - 1)
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states: without any friction force a node is open or in contact."""
+        return state_names(self.trajectory)
 
     @cached_property
     def largest_force(self) -> float:

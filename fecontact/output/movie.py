@@ -50,7 +50,7 @@ def render(
     ground on them, the longest arrow being the largest force of the movie. The marks on flat
     ground travel in scale too, so that a node that sticks stays with them; over waves, whose
     length is true, so are the travel of the ground and the drift of the body along it. Scale and
-    colour range hold for all frames.
+    colour range hold for all frames. Above flat bodies stand the total contact forces over time.
 
     Parameters
     ----------

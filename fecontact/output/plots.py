@@ -1,22 +1,15 @@
 """Plots as files: PNG, PDF or SVG, written whole or not at all."""
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fecontact.basis import ModalBasis
-from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.mode_convergence import ModeConvergence
 from fecontact.output import figures
 from fecontact.output.figures import Point
 from fecontact.output.mode_shapes import convergence_figure, modes_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_SUFFIXES = (".png", ".pdf", ".svg")
+from fecontact.output.saving import save_figure as _save
 
 
 def plot_history(trajectory: Trajectory, path: str | Path, points: Sequence[Point] = ()) -> Path:
@@ -172,23 +165,3 @@ def plot_convergence(result: ModeConvergence, path: str | Path) -> Path:
         For another suffix, or a file that cannot be written.
     """
     return _save(path, lambda: convergence_figure(result))
-
-
-def _save(path: str | Path, figure: Callable[[], "Figure"]) -> Path:
-    path = Path(path)
-    if path.suffix.lower() not in _SUFFIXES:
-        raise InputError(f"{path} must end in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}.")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
-    from matplotlib import rc_context
-
-    part = path.with_name(path.name + ".part")
-    try:
-        with rc_context(figures.STYLE):
-            figure().savefig(part, format=path.suffix[1:].lower())
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error}).") from None
-    finally:
-        part.unlink(missing_ok=True)
-    return path

@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.output.contact_states import STATE_COLOURS
 from fecontact.output.motion import Motion
 from fecontact.output.probe import known_window
 
 Array = NDArray[np.float64]
 
 COLOUR_MAPS = {"displacement": "viridis", "von_mises": "cividis"}
-STATE_COLOURS = ("#ffffff", "#0072b2", "#e69f00")  # open, stick, slip
+NODE_COLOURS = {"open": "#ffffff", **STATE_COLOURS}
 FORCE_COLOUR = "#b2182b"
 DARK = "#303030"
 _GROUND, _SURFACE, _MARKS, _OUTLINE = "#e9e7e3", "#4d4d4d", "#9b978f", "#8c8c8c"
@@ -81,13 +82,10 @@ class Scene:
 
     def _aim(self, aspect: float) -> None:
         """Place the camera so that body and ground fill the picture in all frames."""
-        left, right, bottom, top = self._motion.box
+        left, right, _, _ = self._motion.box
         level = self._motion.ground_level
-        low, high = self._motion.trajectory.system.ground.height_range
-        body = max(top - level, self._motion.scale * high, 0.0)
-        below = max(level - bottom, -self._motion.scale * low)
-        height = max((right - left) / (1.0 - 2.0 * _MARGIN) / aspect,
-                     body / (1.0 - _DEPTH - _MARGIN), (body + below) / (1.0 - 3.0 * _MARGIN))
+        body, below = _reach(self._motion)
+        height = max((right - left) / (1.0 - 2.0 * _MARGIN) / aspect, _needed(body, below))
         depth = max(_DEPTH * height, 0.46 * (height - body), below + 2.0 * _MARGIN * height)
         middle = 0.5 * (left + right)
         self._height, self._bottom = height, level - depth
@@ -197,8 +195,9 @@ class Scene:
         corners = np.zeros((7 * n, 2))
         self._arrows = [self._add("force", corners, faces=cells, color=FORCE_COLOUR)
                         for cells in (quads, heads)]
+        colours = [NODE_COLOURS[name] for name in self._motion.state_names]
         self._state_colours = np.array([[int(text[k : k + 2], 16) for k in (1, 3, 5)]
-                                        for text in STATE_COLOURS], dtype=np.uint8)
+                                        for text in colours], dtype=np.uint8)
 
     def _draw_contact(self, frame: int) -> None:
         centres = self._motion.contact_places(frame)
@@ -224,6 +223,24 @@ class Scene:
         shaft, wing = 0.0045 * thick * across, 0.014 * thick * across
         return np.stack([tail - shaft, neck - shaft, neck + shaft, tail + shaft,
                          neck - wing, tips, neck + wing], axis=1).reshape(-1, 2)
+
+
+def needed_height(motion: Motion) -> float:
+    """Height of the scene that body and ground need, as a part of its width."""
+    left, right, _, _ = motion.box
+    return _needed(*_reach(motion)) * (1.0 - 2.0 * _MARGIN) / (right - left)
+
+
+def _reach(motion: Motion) -> tuple[float, float]:
+    """How far the body, or the ground, is drawn above and below the level of the ground [m]."""
+    _, _, bottom, top = motion.box
+    low, high = motion.trajectory.system.ground.height_range
+    return (max(top - motion.ground_level, motion.scale * high, 0.0),
+            max(motion.ground_level - bottom, -motion.scale * low))
+
+
+def _needed(body: float, below: float) -> float:
+    return max(body / (1.0 - _DEPTH - _MARGIN), (body + below) / (1.0 - 3.0 * _MARGIN))
 
 
 def _reduced(image: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:

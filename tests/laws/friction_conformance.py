@@ -96,7 +96,7 @@ def check_memory_law(law, sliding_velocity=None):
         for trial in range(40):
             F = float(rng.choice([0.0, 0.2, 1.0, 14.0])) * share[node]
             # Sizes below, about and beyond those of sliding.
-            reach = _sliding_memory(law, F or 1.0, fastest, share, node)
+            reach = _reach(law, F or 1.0, fastest, p)
             z = reach * rng.uniform(-1.3, 1.3, s)
             v = fastest * float(rng.choice([-1.0, 1.0])) * 10.0 ** rng.uniform(-4.0, 0.0)
             if trial % 10 == 0:
@@ -106,15 +106,22 @@ def check_memory_law(law, sliding_velocity=None):
         _check_fading(law, p, fastest)
         for loop in range(3):
             F = 2.0 * share[node]
-            reach = _sliding_memory(law, F, fastest, share, node)
+            reach = _reach(law, F, fastest, p)
             taken, moved = cycle_energy(law, p, F, reach, fastest, loop)
             assert taken >= -1e-5 * moved
 
 
-def _sliding_memory(law, F, v, share, node):
-    n = len(share)
-    z = law.initial_memory(np.full(n, F), np.full(n, v), share)[node]
-    return np.where(z == 0.0, law.state_scale, np.abs(z))
+def sliding_memory(law, F, v, p):
+    """Internal variables of steady sliding, by implicit Euler steps that grow until z' is 0."""
+    z, step = np.zeros(law.memory), 1e-9
+    while step < 1e12:
+        z, step = implicit_step(law, v, F, z, p, step, law.state_scale), 2.0 * step
+    return z
+
+
+def _reach(law, F, v, p):
+    z = np.abs(sliding_memory(law, F, v, p))
+    return np.where(z == 0.0, law.state_scale, z)
 
 
 def _check_memory_point(law, v, F, z, p):
@@ -157,7 +164,7 @@ def _check_steady(law, share, node, p, fastest):
     n = len(share)
     for v in (-fastest, -0.01 * fastest, 0.1 * fastest):
         F = 3.0 * share[node]
-        z = law.initial_memory(np.full(n, F), np.full(n, v), share)[node]
+        z = sliding_memory(law, F, v, p)
         force, rates = memory_outputs(law, v, F, z, p)
         assert np.abs(rates[:, 0]).max() <= 1e-9 * np.abs(rates[:, 3:] * z).max() + 1e-12
         steady = np.broadcast_to(law.steady_coefficient(v), (n,))[node]

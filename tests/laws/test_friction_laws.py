@@ -1,6 +1,8 @@
 """All friction laws without memory: forces from independent formulas, limits, inverse questions."""
 
 import math
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -9,15 +11,16 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fecontact.errors import InputError
+from fecontact.laws.contract import PerNode, Positive, Range
 from fecontact.laws.friction import (
     ConstantFriction,
-    CubicFriction,
     ExponentialFriction,
-    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
+from fecontact.laws.friction_base import MemorylessFriction
+from fecontact.laws.friction_minimum import CubicFriction, GalvanettoFriction
 
 SMOOTHINGS = ("arctan", "tanh", "square-root")
 
@@ -149,6 +152,26 @@ def test_period_of_leines_oscillator():
 
 # Inverse questions -------------------------------------------------------------------------------
 
+@pytest.mark.parametrize("law", [
+    ExponentialFriction(0.3, 0.5, 300.0, smoothing="tanh"),
+    GaussianFriction(0.3, 0.5, 2e-3, smoothing="tanh"),
+    HyperbolicFriction(0.3, 0.5, 2e-3, smoothing="tanh"),
+    GalvanettoFriction(0.3, 0.5, 300.0, smoothing="tanh"),
+], ids=lambda law: type(law).__name__)
+def test_friction_that_rises_with_velocity(law):
+    """A static coefficient below the kinetic one: from 0.3 up to 0.5, without a maximum."""
+    check_friction_law(law)
+    speeds = np.geomspace(1e-5, 1e3, 200)
+    coefficient = law.coefficient(speeds)
+    assert coefficient[0] == pytest.approx(0.3, rel=5e-3)
+    assert coefficient[-1] == pytest.approx(0.5, rel=1e-5)
+    assert (np.diff(coefficient) >= 0.0).all()
+    largest, velocity = law.largest_coefficient()
+    assert largest == pytest.approx(0.5, rel=1e-6)
+    assert velocity == math.inf
+    assert law.velocity_of_minimum() == math.inf
+
+
 def test_largest_coefficient_and_minimum_of_the_cubic():
     law = CubicFriction(0.7, 0.4, 5e-3, smoothing_slope=1e7, smoothing="square-root")
     assert law.velocity_of_minimum() == pytest.approx([5e-3], rel=1e-6)
@@ -225,3 +248,24 @@ def test_smoothing_in_the_table():
 def test_values_are_checked(kind, values, message):
     with pytest.raises(InputError, match=message):
         kind(**values)
+
+
+def test_ranges_in_annotations_hold_for_laws_of_ones_own():
+    @dataclass(frozen=True)
+    class Mine(MemorylessFriction):
+        high: Positive = 1.0
+        small: Annotated[PerNode, Range("at most 2", lambda x: x <= 2.0)] = 1.0
+        free: PerNode = -1.0
+
+    assert Mine((1.0, 2.0), 2).high == (1.0, 2.0)
+    with pytest.raises(InputError, match=r"Mine: high = \(1\.0, 0\.0\) must be above zero\."):
+        Mine((1.0, 0.0))
+    with pytest.raises(InputError, match=r"Mine: small = 2\.5 must be at most 2\."):
+        Mine(small=2.5)
+
+    @dataclass(frozen=True)
+    class Unknown(MemorylessFriction):
+        high: "Nowhere" = 1.0  # noqa: F821
+
+    with pytest.raises(InputError, match=r"Unknown: an annotation .*'Nowhere' is not defined"):
+        Unknown()

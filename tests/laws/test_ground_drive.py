@@ -8,8 +8,10 @@ from scipy.integrate import quad
 
 from fecontact.errors import InputError
 from fecontact.laws.drive import Drive, Load, PointLoad
+from fecontact.laws.fourier_series import FourierSeries
 from fecontact.laws.ground import Ground, HarmonicSpeed, SpeedRamp
-from fecontact.laws.profiles import Flat, FourierSeries, RandomRoughness, Sine
+from fecontact.laws.profiles import Flat, Sine
+from fecontact.laws.random_roughness import RandomRoughness
 from fecontact.laws.signals import Constant, Harmonic, Harmonics, Sweep
 
 

@@ -11,8 +11,12 @@ import pytest
 
 from fecontact.errors import InputError
 from fecontact.laws.contract import ground_profile
+from fecontact.laws.fourier_series import FourierSeries
 from fecontact.laws.ground import Ground
-from fecontact.laws.profiles import Flat, FourierSeries, Profile, RandomRoughness, Sine, Trace
+from fecontact.laws.profile_base import Profile
+from fecontact.laws.profiles import Flat, Sine
+from fecontact.laws.random_roughness import RandomRoughness
+from fecontact.laws.trace import Trace
 
 RNG = np.random.default_rng(3)
 TRACE_X = np.cumsum(RNG.uniform(0.5e-4, 2e-4, 40)) - 1e-3

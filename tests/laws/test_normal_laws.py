@@ -242,7 +242,7 @@ def test_energy_of_a_body_far_above_the_surface():
     (lambda: MeasuredSurface.from_heights("abc"), "heights must be a list of numbers"),
     (lambda: LinearContact(0.0), r"LinearContact: stiffness = 0\.0 must be above zero"),
     (lambda: LinearContact(1.0, -1.0), "damping = -1.0 must be zero or above"),
-    (lambda: PowerContact(1.0, 0.9), r"PowerContact: exponent = 0\.9 must be at least 1"),
+    (lambda: PowerContact(1.0, 0.9), r"PowerContact: exponent = 0\.9 must be one or above"),
     (lambda: PowerContact(1.0, 1.5, -1.0), "damping_factor"),
     (lambda: RestitutionContact(1.0, 0.0, 1.0),
      r"restitution = 0\.0 must be above zero and at most 1"),

@@ -288,7 +288,7 @@ def test_signal_of_ones_own():
     (lambda: Harmonics((1.0,), (1.0,), (1.0, 2.0)), "phases has 2 values for 1 amplitudes"),
     (lambda: Harmonics((1.0,), (-1.0,)), r"angular_frequencies\[0\] = -1\.0 must"),
     (lambda: Sweep(1.0, -1.0, 2.0, 1.0), r"Sweep: start_frequency_hz = -1\.0"),
-    (lambda: Sweep(1.0, 0.0, 2.0, 1.0, "logarithmic"), r"logarithmic: start_frequency_hz = 0\.0"),
+    (lambda: Sweep(1.0, 0.0, 2.0, 1.0, "logarithmic"), r"Sweep: start_frequency_hz = 0\.0"),
     (lambda: Sweep(1.0, 1.0, 2.0, 0.0), r"Sweep: duration = 0\.0"),
     (lambda: Sweep(1.0, 1.0, 2.0, 1.0, "log"), "kind = 'log' must be one of 'linear', 'logari"),
     (lambda: Pulse("sine", 1.0, 1.0), "Pulse: kind = 'sine' must be one of 'half-sine', 'haver"),
@@ -300,6 +300,7 @@ def test_signal_of_ones_own():
     (lambda: Tabulated((0, 1), (0, 1), interpolation="spline"), "interpolation = 'spline' must"),
     (lambda: Tabulated((0, 1), (0, 1), outside="zero"), "outside = 'zero' must be one of 'hold'"),
     (lambda: Tabulated((0, 1), (0, 1), outside="repeat"), "values must end as it begins to be"),
+    (lambda: Tabulated((0, 1, 2), (0, 3, 3e-6), outside="repeat"), "values must end as it begins"),
     (lambda: Tabulated((0, 1), (0, 1), interpolation="cubic"), "times has 2 values; at least 3"),
     (lambda: Tabulated((0,), (0,)), "times has 1 value; at least 2 are needed"),
     (lambda: Tabulated((0, 1), (0, float("nan"))), r"values\[1\] = nan must be finite"),
@@ -312,3 +313,8 @@ def test_signal_of_ones_own():
 def test_values_are_checked(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_repeated_tables_close_but_for_rounding():
+    table = Tabulated((0.0, 1.0, 2.0), (0.1, 3.1, 0.1 + 1e-12), outside="repeat")
+    assert table.values == (0.1, 3.1, 0.1)

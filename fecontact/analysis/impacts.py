@@ -1,0 +1,232 @@
+"""Impacts: contact phases of a run, with velocities, restitution, forces; and coming to rest."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.analysis.contact_motion import ContactMotion, Nodes
+from fecontact.analysis.periods import drive_period
+from fecontact.errors import AnalysisError, InputError, require_not_negative, require_positive
+from fecontact.integrate.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+# Gauss-Lobatto points and weights on [0, 1]: the ends count for the largest force.
+_PARTS = 0.5 + 0.5 * np.array([-1.0, -math.sqrt(3.0 / 7.0), 0.0, math.sqrt(3.0 / 7.0), 1.0])
+_WEIGHTS = np.array([0.05, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 0.05])
+
+
+@dataclass(frozen=True, eq=False)
+class Impacts:
+    """Contact phases in the order of their touch-down, each (k,).
+
+    A phase that was under way when the run began has no touch-down, one that went on at its end
+    no lift-off: the values there are NaN.
+
+    Attributes
+    ----------
+    touch_down, lift_off : (k,) arrays
+        When the normal force begins and when it first returns to zero [s].
+    impact_velocity, separation_velocity : (k,) arrays
+        Velocity of the nodes towards the ground at touch-down and away from it at lift-off, the
+        mean over the face for several nodes [m/s].
+    peak_force : (k,) array
+        Largest total normal force [N].
+    impulse : (k,) array
+        Integral of the total normal force [N s].
+    """
+
+    touch_down: Array
+    lift_off: Array
+    impact_velocity: Array
+    separation_velocity: Array
+    peak_force: Array
+    impulse: Array
+
+    def __len__(self) -> int:
+        return len(self.touch_down)
+
+    def __getitem__(self, chosen: slice | NDArray[np.bool_] | NDArray[np.intp]) -> "Impacts":
+        return Impacts(*(getattr(self, entry.name)[chosen] for entry in fields(self)))
+
+    @property
+    def duration(self) -> Array:
+        """Length (k,) of the contact [s]."""
+        return self.lift_off - self.touch_down
+
+    @property
+    def restitution(self) -> Array:
+        """Separation velocity over impact velocity (k,): 1 for an elastic impact of one mass.
+
+        A body whose vibrations give back what earlier impacts put into them may have more.
+        """
+        return self.separation_velocity / self.impact_velocity
+
+    def per_period(self, period: float, start: float, end: float) -> NDArray[np.intp]:
+        """Number of touch-downs in each whole period [s] from ``start`` to ``end`` [s]."""
+        require_positive("per_period", period=period)
+        count = int((end - start) / period * (1.0 + 1e-9))
+        if count < 1:
+            raise InputError(f"end = {end!r} must be at least one period of {period!r} s after "
+                             f"start = {start!r}.")
+        edges = start + period * np.arange(count + 1)
+        return np.asarray(np.histogram(self.touch_down, edges)[0])
+
+
+class Rest(NamedTuple):
+    """A chatter that came to rest.
+
+    touch_down : [s], of the contact that stays
+    at_rest : [s], from when on the velocity stays small
+    lift_off : [s], NaN if the run ends before
+    impacts : number of touch-downs since the rest before, or since the run's start, the last one
+        included
+    """
+
+    touch_down: float
+    at_rest: float
+    lift_off: float
+    impacts: int
+
+
+def find_impacts(
+    trajectory: Trajectory, nodes: Nodes = None, *, shortest_flight: float = 0.0
+) -> Impacts:
+    """Contact phases of a run.
+
+    Touch-down and lift-off are found between output times by the law's normal force; their errors
+    are of the third order in the time between outputs.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        A run with several output times in each contact.
+    nodes : int, str or None
+        A contact node by its number, a contact group, or all nodes as one face, which is in
+        contact as long as any of its nodes.
+    shortest_flight : float
+        Phases with less time between them count as one [s].
+
+    Raises
+    ------
+    InputError
+        For nodes that do not exist, a negative time, or a run with rigid stops.
+    AnalysisError
+        If a contact took place between two output times; more of them are needed.
+    """
+    require_not_negative("find_impacts", shortest_flight=shortest_flight)
+    motion = ContactMotion.of(trajectory, nodes)
+    touching = (motion.force != 0.0).any(axis=1)
+    _require_resolved(motion, touching)
+    found = motion.switches
+    rate, down = found.rate @ motion.weights, found.down
+    # A phase under way at either end of the run has NaN there.
+    head = [np.nan] if touching[0] else []
+    tail = [np.nan] if touching[-1] else []
+    begins, ends = np.append(head, found.time[down]), np.append(found.time[~down], tail)
+    begin_rate, end_rate = np.append(head, rate[down]), np.append(rate[~down], tail)
+
+    phase, pieces = motion.pieces()
+    part = np.broadcast_to(_PARTS, (len(phase), len(_PARTS)))
+    force = motion.law_force(*pieces.between(part)).sum(axis=-1)
+    impulse, peak = np.zeros(len(begins)), np.zeros(len(begins))
+    np.add.at(impulse, phase, (pieces.t1 - pieces.t0) * (force @ _WEIGHTS))
+    # The force of a two-sided stop may be of either sign.
+    np.maximum.at(peak, phase, np.abs(force).max(axis=1, initial=0.0))
+    side = np.where(impulse < 0.0, -1.0, 1.0)
+    phases = Impacts(begins, ends, side * begin_rate, -side * end_rate, peak, np.abs(impulse))
+    return _joined(phases, shortest_flight)
+
+
+def find_rests(
+    trajectory: Trajectory,
+    nodes: Nodes = None,
+    *,
+    longer_than: float | None = None,
+    slower_than: float = 0.1,
+    shortest_flight: float = 0.0,
+) -> list[Rest]:
+    """Where a run comes to rest on the ground or a stop, as chatter does after many rebounds.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    nodes : int, str or None
+        As for :func:`find_impacts`.
+    longer_than : float, optional
+        Least time of the contact [s]; a tenth of the drive's period by default.
+    slower_than : float
+        At rest the velocity stays below this part of the run's largest impact velocity.
+    shortest_flight : float
+        As for :func:`find_impacts`.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        As :func:`find_impacts`; and without a drive if ``longer_than`` is left out.
+    """
+    require_positive("find_rests", slower_than=slower_than)
+    if longer_than is None:
+        longer_than = 0.1 * drive_period(trajectory.system)
+    require_positive("find_rests", longer_than=longer_than)
+    impacts = find_impacts(trajectory, nodes, shortest_flight=shortest_flight)
+    motion = ContactMotion.of(trajectory, nodes)
+    speed = np.abs(motion.rate @ motion.weights)
+    fast = slower_than * np.nanmax(impacts.impact_velocity, initial=0.0)
+    rests: list[Rest] = []
+    before = 0
+    for number, (begin, end) in enumerate(zip(impacts.touch_down, impacts.lift_off, strict=True)):
+        first = motion.time[0] if np.isnan(begin) else begin
+        last = motion.time[-1] if np.isnan(end) else end
+        inside = np.flatnonzero((motion.time >= first) & (motion.time <= last))
+        # What lifts off again has a velocity in the end; that of the first half counts.
+        half = inside[motion.time[inside] <= 0.5 * (first + last)]
+        moving = half[speed[half] > fast]
+        if last - first <= longer_than or (len(moving) and moving[-1] == half[-1]):
+            continue
+        settled = motion.time[moving[-1] + 1] if len(moving) else first
+        rests.append(Rest(float(begin), float(settled), float(end), number + 1 - before))
+        before = number + 1
+    return rests
+
+
+def _require_resolved(motion: ContactMotion, touching: NDArray[np.bool_]) -> None:
+    """Raise if a node must have been in contact between two output times without contact.
+
+    It then comes towards the ground and leaves it, with a change of velocity that is not that of
+    a flight, whose continuation would have ended in the ground.
+    """
+    free = ~(touching[1:] | touching[:-1])[:, None]
+    turns = free & (motion.rate[:-1] > 0.0) & (motion.rate[1:] < 0.0)
+    index = np.flatnonzero(turns.any(axis=1))
+    step = np.diff(motion.time)[index, None]
+    v0, v1 = motion.rate[index], motion.rate[index + 1]
+    a0, a1 = motion.acceleration(index), motion.acceleration(index + 1)
+    change = v1 - v0
+    reached = motion.penetration[index] + step * (v0 + 0.5 * step * np.minimum(a0, 0.0))
+    hidden = turns[index] & (reached > 0.0) & (
+        np.abs(change - 0.5 * step * (a0 + a1)) > 0.5 * np.abs(change))
+    if hidden.any():
+        first = index[np.flatnonzero(hidden.any(axis=1))[0]]
+        begin, end = motion.time[first : first + 2]
+        raise AnalysisError(
+            f"A contact began and ended between the output times {begin:.6g} and {end:.6g} s, "
+            f"{end - begin:.3g} s apart; run with more outputs, at least ten in the "
+            f"shortest contact.")
+
+
+def _joined(impacts: Impacts, shortest_flight: float) -> Impacts:
+    """Phases with less time between them as one."""
+    if len(impacts) < 2 or shortest_flight <= 0.0:
+        return impacts
+    apart = impacts.touch_down[1:] - impacts.lift_off[:-1] >= shortest_flight
+    first = np.concatenate([[0], np.flatnonzero(apart) + 1])
+    last = np.append(first[1:] - 1, len(impacts) - 1)
+    return Impacts(
+        impacts.touch_down[first], impacts.lift_off[last], impacts.impact_velocity[first],
+        impacts.separation_velocity[last], np.maximum.reduceat(impacts.peak_force, first),
+        np.add.reduceat(impacts.impulse, first))

@@ -1,0 +1,281 @@
+"""Spectra and spectrograms of histories at evenly spaced times."""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.errors import InputError, require_positive
+
+Array = NDArray[np.float64]
+
+_EVEN = 1e-6  # part of the spacing by which times may be off
+
+
+class Peak(NamedTuple):
+    """A maximum of a spectrum.
+
+    frequency_hz : [Hz]
+    value : amplitude or density there
+    """
+
+    frequency_hz: float
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One-sided spectrum of a real history.
+
+    Attributes
+    ----------
+    frequency_hz : (F,) array
+        From zero to half the sampling rate [Hz].
+    values : (F,) array
+        Amplitudes in the unit u of the history, or power spectral density in u^2/Hz.
+    kind : 'amplitude' or 'density'
+    resolution_hz : float
+        One over the time that one transform sees [Hz]; frequencies may lie closer.
+    """
+
+    frequency_hz: Array
+    values: Array
+    kind: Literal["amplitude", "density"]
+    resolution_hz: float
+
+    def peaks(self, count: int = 5, *, least: float = 0.01) -> list[Peak]:
+        """The highest local maxima, between frequencies by a parabola through logarithms.
+
+        Parameters
+        ----------
+        count : int
+            Largest number of peaks.
+        least : float
+            Peaks below this part of the highest one are left out, and so are those closer than
+            four resolutions to a higher one: side lobes of the window 'hann' stay below a
+            hundredth from there on.
+        """
+        f, y = self.frequency_hz, self.values
+        tops = np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:])) + 1
+        tops = tops[np.argsort(-y[tops])]
+        found: list[Peak] = []
+        for k in tops:
+            if len(found) == count or (found and y[k] < least * found[0].value):
+                break
+            a, b, c = np.log(np.maximum(y[k - 1 : k + 2], 1e-300))
+            shift = 0.5 * (a - c) / (a - 2.0 * b + c)
+            peak = Peak(float(f[k] + shift * (f[1] - f[0])),
+                        float(np.exp(b - 0.25 * (a - c) * shift)))
+            if all(abs(peak.frequency_hz - other.frequency_hz) > 4.0 * self.resolution_hz
+                   for other in found):
+                found.append(peak)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrogram:
+    """Amplitude spectra of pieces of a history, one after the other.
+
+    Attributes
+    ----------
+    time : (P,) array
+        Middles of the pieces [s].
+    frequency_hz : (F,) array
+        [Hz].
+    values : (F, P) array
+        Amplitudes in the unit of the history.
+    resolution_hz : float
+        One over the length of a piece [Hz].
+    """
+
+    time: Array
+    frequency_hz: Array
+    values: Array
+    resolution_hz: float
+
+
+def evenly_sampled(
+    time: ArrayLike, values: ArrayLike, *, resample: bool = False
+) -> tuple[Array, Array]:
+    """A history at evenly spaced times.
+
+    Parameters
+    ----------
+    time, values : (N,) arrays
+        Ascending times [s] and values.
+    resample : bool
+        Whether values at uneven times are put, by cubic splines, at as many even ones from the
+        first to the last. Motion faster than the widest spacing is lost then.
+
+    Raises
+    ------
+    InputError
+        For fewer than eight values, values that are not finite, times that do not ascend, and
+        uneven times without ``resample``.
+    """
+    t, x = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
+    if t.ndim != 1 or t.shape != x.shape or len(t) < 8:
+        raise InputError(f"A spectrum needs times and values of one length, at least 8, not shapes "
+                         f"{t.shape} and {x.shape}.")
+    if not (np.isfinite(t).all() and np.isfinite(x).all()):
+        raise InputError("A spectrum needs finite times and values; these hold others.")
+    step = np.diff(t)
+    if not (step > 0.0).all():
+        raise InputError("A spectrum needs times that ascend; these do not.")
+    even = np.linspace(t[0], t[-1], len(t))
+    # Each time may be off by rounding, and their sum by no more.
+    if np.abs(t - even).max() <= _EVEN * step.mean() + 4.0 * np.spacing(np.abs(t).max()):
+        return even, x
+    if not resample:
+        raise InputError(f"The times lie {step.min():.4g} to {step.max():.4g} s apart, and a "
+                         f"spectrum needs even ones; leave out the uneven part, or give resample = "
+                         f"True.")
+    from scipy.interpolate import CubicSpline
+
+    return even, np.asarray(CubicSpline(t, x)(even))
+
+
+def amplitude_spectrum(
+    time: ArrayLike,
+    values: ArrayLike,
+    *,
+    window: str = "hann",
+    padding: int = 8,
+    resample: bool = False,
+) -> Spectrum:
+    r"""Amplitudes of the sines that a history consists of.
+
+    .. math:: A_k = \frac{2}{\sum_n w_n} \Big| \sum_n w_n (x_n - \bar x) e^{-2 \pi i f_k t_n} \Big|
+
+    A sine of amplitude A shows as a peak of height A; the mean is taken off.
+
+    Parameters
+    ----------
+    time, values, resample
+        As for :func:`evenly_sampled`.
+    window : str
+        Of :func:`scipy.signal.get_window`: 'hann', 'flattop' for exact heights, 'boxcar' for
+        histories that hold whole periods.
+    padding : int
+        Frequencies lie this much closer than the resolution, by zeros put behind the history.
+    """
+    from scipy.signal import get_window
+
+    t, x = evenly_sampled(time, values, resample=resample)
+    if isinstance(padding, bool) or not isinstance(padding, int) or padding < 1:
+        raise InputError(f"amplitude_spectrum: padding = {padding!r} must be a whole number above "
+                         f"zero.")
+    n, step = len(x), float(t[1] - t[0])
+    weights = get_window(window, n)
+    transform = np.fft.rfft(weights * (x - x.mean()), padding * n)
+    amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform), dtype=np.float64)
+    # The mean and the frequency of half the sampling rate have no twin at the other side.
+    amplitude[0] *= 0.5
+    if (padding * n) % 2 == 0:
+        amplitude[-1] *= 0.5
+    return Spectrum(_frequencies(padding * n, step), amplitude, "amplitude", 1.0 / (n * step))
+
+
+def power_spectral_density(
+    time: ArrayLike,
+    values: ArrayLike,
+    *,
+    piece: float | None = None,
+    window: str = "hann",
+    resample: bool = False,
+) -> Spectrum:
+    r"""Power spectral density by Welch's method, one-sided.
+
+    .. math:: \int_0^\infty S(f) df = \overline{(x - \bar x)^2}
+
+    in the square of the history's unit per Hz: the mean of the spectra of half-overlapping pieces,
+    for noise and chaos.
+
+    Parameters
+    ----------
+    time, values, resample
+        As for :func:`evenly_sampled`.
+    piece : float, optional
+        Length of the pieces [s]; an eighth of the history by default.
+    window : str
+        Of :func:`scipy.signal.get_window`.
+
+    Raises
+    ------
+    InputError
+        For a piece that is longer than the history or shorter than eight of its times.
+    """
+    from scipy.signal import welch
+
+    t, x = evenly_sampled(time, values, resample=resample)
+    step = float(t[1] - t[0])
+    count = _piece(piece if piece is not None else (t[-1] - t[0]) / 8.0, len(t), step,
+                   given=piece is not None)
+    f, density = welch(x, 1.0 / step, window, count, detrend="constant", scaling="density")
+    return Spectrum(f, density, "density", 1.0 / (count * step))
+
+
+def spectrogram(
+    time: ArrayLike,
+    values: ArrayLike,
+    *,
+    piece: float | None = None,
+    overlap: float = 0.75,
+    window: str = "hann",
+    resample: bool = False,
+) -> Spectrogram:
+    """Amplitude spectra of overlapping pieces of a history.
+
+    Each is scaled as by :func:`amplitude_spectrum`, about the piece's own mean.
+
+    Parameters
+    ----------
+    time, values, resample
+        As for :func:`evenly_sampled`.
+    piece : float, optional
+        Length of the pieces [s]; a thirty-second of the history by default.
+    overlap : float
+        Part of a piece that the next one shares, from 0 to below 1.
+    window : str
+        Of :func:`scipy.signal.get_window`.
+
+    Raises
+    ------
+    InputError
+        As :func:`power_spectral_density`, and for an overlap out of range.
+    """
+    from scipy.signal import get_window
+
+    t, x = evenly_sampled(time, values, resample=resample)
+    if not 0.0 <= overlap < 1.0:
+        raise InputError(f"spectrogram: overlap = {overlap!r} must be from 0 to below 1.")
+    step = float(t[1] - t[0])
+    count = _piece(piece if piece is not None else (t[-1] - t[0]) / 32.0, len(t), step,
+                   given=piece is not None)
+    hop = max(1, round(count * (1.0 - overlap)))
+    weights = get_window(window, count)
+    pieces = np.lib.stride_tricks.sliding_window_view(x, count)[::hop]
+    padded = 2 * count
+    transform = np.fft.rfft(weights * (pieces - pieces.mean(axis=1, keepdims=True)), padded)
+    amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform).T, dtype=np.float64)
+    amplitude[0] *= 0.5
+    amplitude[-1] *= 0.5
+    middles = t[0] + step * (0.5 * (count - 1) + hop * np.arange(len(pieces)))
+    return Spectrogram(middles, _frequencies(padded, step), amplitude, 1.0 / (count * step))
+
+
+def _frequencies(count: int, step: float) -> Array:
+    return np.asarray(np.fft.rfftfreq(count, step), dtype=np.float64)
+
+
+def _piece(length: float, times: int, step: float, *, given: bool) -> int:
+    """Number of times in a piece of some length."""
+    require_positive("A spectrum", piece=length)
+    count = round(length / step)
+    if not given:
+        return min(max(count, 8), times)
+    if not 8 <= count <= times:
+        raise InputError(f"A spectrum: piece = {length!r} s must be from {8 * step:.4g} s, eight "
+                         f"times of the history, to {times * step:.4g} s, all of it.")
+    return count

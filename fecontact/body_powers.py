@@ -1,0 +1,27 @@
+"""Compiled powers of the drive, the loads and the dampers of the body."""
+
+from fecontact.compiled import helper
+from fecontact.laws.contract import signal_at
+
+
+@helper
+def body_powers(t, y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out (8,) with the powers outside the contact, the others with zero."""
+    m = s.Tx.shape[1]
+    out[:8] = 0.0
+    for axis in range(2):
+        value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
+        pull = s.drive_stiffness[axis] * value
+        for i in range(m):
+            pull -= s.drive_shapes[axis, i] * y[i]
+        out[0] += pull * rate
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
+        for i in range(m):
+            out[3] += value * s.load_shapes[k, i] * y[m + i]
+    for i in range(m):
+        out[3] += s.constant_load[i] * y[m + i]
+        for k in range(m):
+            product = y[m + i] * y[m + k]
+            out[4] += s.modal_damping[i, k] * product
+            out[5] += (s.damping[i, k] - s.modal_damping[i, k]) * product

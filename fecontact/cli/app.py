@@ -1,0 +1,52 @@
+"""The commands of ``fecontact``, in the order of their use.
+
+Libraries that take time to load are imported inside the commands, so that help comes at once.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from cyclopts import App, Parameter
+
+from fecontact.cli import about, branches, runs, studies
+
+COMMANDS: tuple[Callable[..., int | None], ...] = (
+    studies.init,
+    studies.mesh,
+    studies.modes,
+    studies.run,
+    branches.branch,
+    runs.render,
+    runs.plot,
+    runs.export,
+    about.keys,
+    about.laws,
+    about.demo,
+    about.doctor,
+)
+
+
+def _version() -> str:
+    from fecontact import __version__
+
+    return __version__
+
+
+app = App(
+    name="fecontact",
+    help="Elastic bodies in contact with friction: from a study file to modes, motion and movies.",
+    version=_version,
+    help_format="markdown",
+    suppress_keyboard_interrupt=False,
+)
+app.meta.suppress_keyboard_interrupt = False
+for _place, _command in enumerate(COMMANDS):
+    app.command(_command, sort_key=_place)
+
+
+@app.meta.default
+def _launch(
+    *tokens: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+    debug: Annotated[bool, Parameter(negative=(), help="Show where an error comes from.")] = False,
+) -> Any:
+    return app(tokens, exit_on_error=False, print_error=False, result_action="return_value")

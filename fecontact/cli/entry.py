@@ -1,0 +1,58 @@
+"""From a command line to an exit code: errors are one sentence, without a traceback."""
+
+import sys
+
+from cyclopts import CycloptsError
+
+from fecontact.cli.app import app
+from fecontact.cli.printing import complain
+from fecontact.console import INTERRUPTED
+from fecontact.errors import FecontactError
+
+
+def main() -> None:
+    """Run the command line and leave Python with its exit code."""
+    sys.exit(execute(sys.argv[1:]))
+
+
+def execute(tokens: list[str]) -> int:
+    """Run one command line; the exit code.
+
+    0 when all went well, 1 for an error, 2 for a command line that cannot be understood, 130
+    after Ctrl-C. Errors are one sentence on stderr; ``--debug`` shows where they come from.
+    """
+    debug = "--debug" in tokens
+    try:
+        return int(app.meta(tokens, exit_on_error=False, print_error=False,
+                            result_action="return_value") or 0)
+    except CycloptsError as error:
+        return complain(str(error).replace("\n", " "), 2)
+    except FecontactError as error:
+        if debug:
+            raise
+        return complain(str(error), 1)
+    except KeyboardInterrupt:
+        return complain("interrupted.", INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output has gone; there is nobody to tell.
+        sys.stdout = None
+        return 1
+    except OSError as error:
+        if debug:
+            raise
+        return complain(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}.",
+                         1)
+    except Exception as error:
+        if _was_interrupted(error):
+            return complain("interrupted.", INTERRUPTED)
+        if debug:
+            raise
+        return complain(f"this should not happen ({type(error).__name__}: {error}); run it again "
+                         f"with --debug and report what it prints.", 1)
+
+
+def _was_interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: libraries hide it if it comes while they are loaded."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None

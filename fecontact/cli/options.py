@@ -1,0 +1,14 @@
+"""Arguments and options that several commands take."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+StudyFile = Annotated[Path, Parameter(help="Study file; `fecontact init` writes one.")]
+RunFile = Annotated[Path, Parameter(help="What `fecontact run` wrote, or the study it ran.")]
+Changes = Annotated[list[str] | None, Parameter(
+    name="--set", negative=(), show_default=False,
+    help="A key of the study and its value, `ground.speed=0.1`; may be given several times.")]
+Folder = Annotated[Path | None, Parameter(
+    name=["--output", "-o"], help="Folder for the results, instead of that of the study.")]

@@ -1,0 +1,201 @@
+"""Whether a law keeps the contract of laws, tried over the range in which it changes."""
+
+from collections.abc import Callable
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import InputError
+from fecontact.laws.contract import FrictionLaw, NormalLaw
+from fecontact.laws.cycles import cycle_work
+from fecontact.laws.evaluation import friction_values, memory_values, normal_values
+from fecontact.laws.soundness import require_sound
+
+Array = NDArray[np.float64]
+Values = Callable[[Array], Array]
+
+_SIZES = np.geomspace(1e-4, 1e4, 97)
+_SIGNED = np.concatenate([-_SIZES[::-1], [0.0], _SIZES])
+_FORCES = np.array([0.3, 14.0])
+_STEP, _SIDE = 1e-3, 1e-6
+_LOSS = 1e-4  # part of the work of a cycle that its integration may get wrong
+
+
+def check_law(law: NormalLaw | FrictionLaw) -> None:
+    """Check a law of one's own: its derivatives, its signs and its energy.
+
+    Penetrations are tried up to ten penetration scales, slip velocities up to 1e4 velocity scales,
+    internal variables up to three times their scales, for the parameters of each contact node:
+
+    - the values are finite;
+    - the derivatives are those of differences, at a corner between those of its two sides;
+    - normal laws do not pull at u > 0, their elastic force F(u, 0) does not fall, their damping
+      takes energy, and the stored energy is the integral of F(u, 0), never negative;
+    - friction is zero without normal force; without memory it opposes the slip velocity, with
+      memory no cycle of slip gives energy off.
+
+    Parameters
+    ----------
+    law : NormalLaw or FrictionLaw
+        A law with its parameters.
+
+    Raises
+    ------
+    InputError
+        For the first of these that a law does not keep, with the place and the values.
+    """
+    require_sound(law)
+    nodes = law.node_count() or 1
+    share = np.full(nodes, 1.0 / nodes)
+    rows = np.unique(law.table(share), axis=0)
+    for p in np.ascontiguousarray(rows):
+        if isinstance(law, NormalLaw):
+            _check_normal(law, p)
+        elif law.memory:
+            _check_memory(law, p, 1.0 / nodes)
+        else:
+            _check_friction(law, p)
+    if isinstance(law, NormalLaw):
+        _check_energy(law, share)
+
+
+def _check_normal(law: NormalLaw, p: Array) -> None:
+    scale = law.penetration_scale
+    u, v = (grid.ravel() for grid in np.meshgrid(
+        scale * np.concatenate([_SIGNED[np.abs(_SIGNED) <= 1.0], np.linspace(-3.0, 10.0, 131)]),
+        np.concatenate([-np.geomspace(1.0, 1e-4, 5), [0.0], np.geomspace(1e-4, 1.0, 5)])))
+
+    def forces(points: Array) -> Array:
+        return normal_values(law, p, points[:, 0], points[:, 1])[:, :1]
+
+    values = normal_values(law, p, u, v)
+    still = normal_values(law, p, u, np.zeros_like(u))
+    points, force = np.column_stack([u, v]), values[:, 0]
+    _require(law, "(u, v)", points, np.isfinite(values).all(axis=1), values, "must be finite")
+    _require(law, "(u, v)", points, (u <= 0.0) | (force >= 0.0), force, "must not pull at u > 0")
+    _require(law, "(u, v)", points, still[:, 1] >= 0.0, still[:, :2],
+             "must not fall as u grows: dF/du < 0 at v = 0")
+    damping = (force - still[:, 0]) * v
+    _require(law, "(u, v)", points, damping >= -1e-12 * np.abs(force * v), damping,
+             "must not give energy off by damping: (F(u, v) - F(u, 0)) v < 0")
+    # As dF/du and dF/dv below: what is at rest has no size of its own.
+    sizes = np.column_stack([np.maximum(np.abs(u), 1e-3 * scale), np.maximum(np.abs(v), 1e-5)])
+    _check_derivatives(law, "(u, v)", points, sizes, forces, values[:, None, 1:],
+                       ("F",), ("u", "v"))
+
+
+def _check_energy(law: NormalLaw, share: Array) -> None:
+    scale = law.penetration_scale
+    edges = scale * np.unique(np.concatenate([np.linspace(-3.0, 10.0, 2601),
+                                              _SIGNED[np.abs(_SIGNED) <= 1.0]]))
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    u = (middle[:, None] + half[:, None] * nodes).ravel()
+    stored = law.stored_energy(np.tile(edges[:, None], (1, len(share))), share)
+    for node, p in enumerate(law.table(share)):
+        force = normal_values(law, p, u, np.zeros_like(u))[:, 0].reshape(-1, len(nodes))
+        work = np.concatenate([[0.0], np.cumsum(half * (force @ weights))])
+        work -= np.interp(0.0, edges, work)
+        energy = stored[:, node]
+        error = np.abs(energy - work) <= 1e-4 * np.abs(work) + 1e-6 * np.abs(work).max()
+        _require(law, "u", edges[:, None], error, np.column_stack([energy, work]),
+                 "must be equal: stored_energy and the integral of F(u, 0)")
+        falls = energy >= -1e-9 * np.abs(energy).max()
+        # Below u = 0 a constant force or one that reaches out stores less than at u = 0.
+        _require(law, "u", edges[:, None], (edges < 0.0) | falls, energy,
+                 "must not be negative: stored_energy")
+
+
+def _check_friction(law: FrictionLaw, p: Array) -> None:
+    scale = law.velocity_scale
+    v, F = (grid.ravel() for grid in np.meshgrid(scale * _SIGNED, _FORCES))
+
+    def forces(points: Array) -> Array:
+        return friction_values(law, p, points[:, 0], points[:, 1])[:, :1]
+
+    values = friction_values(law, p, v, F)
+    points, force = np.column_stack([v, F]), values[:, 0]
+    _require(law, "(v, F)", points, np.isfinite(values).all(axis=1), values, "must be finite")
+    _require(law, "(v, F)", points, force * v >= 0.0, force,
+             "must have the sign of v, or zero: friction would give energy off")
+    open_ = friction_values(law, p, v, np.zeros_like(F))[:, 0]
+    _require(law, "(v, F)", points * [1.0, 0.0], open_ == 0.0, open_,
+             "must be zero without normal force")
+    sizes = np.column_stack([np.maximum(np.abs(v), scale), F])
+    _check_derivatives(law, "(v, F)", points, sizes, forces, values[:, None, 1:],
+                       ("R",), ("v", "F"))
+
+
+def _check_memory(law: FrictionLaw, p: Array, share: float) -> None:
+    s, rng = law.memory, np.random.default_rng(1)
+    count = 400
+    F = share * rng.choice([0.2, 1.0, 14.0], count)
+    v = law.velocity_scale * rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-4.0, 2.0, count)
+    v[::10] = 0.0
+    # Internal variables of springs grow with F, those of bristles do not.
+    grown = np.where(rng.random(count) < 0.5, 1.0, F / share)
+    z = law.state_scale * rng.uniform(-3.0, 3.0, (count, s)) * grown[:, None]
+    names = tuple(f"z[{i}]" for i in range(s))
+    where = f"({', '.join(('v', 'F', *names))})"
+
+    def outputs(points: Array) -> Array:
+        return memory_values(law, p, points[:, 0], points[:, 1], points[:, 2:])[:, :, 0]
+
+    values, points = memory_values(law, p, v, F, z), np.column_stack([v, F, z])
+    _require(law, where, points, np.isfinite(values).all(axis=(1, 2)), values[:, :, 0],
+             "must be finite")
+    open_ = memory_values(law, p, v, np.zeros(count), z)[:, 0, 0]
+    _require(law, where, points * np.where(np.arange(2 + s) == 1, 0.0, 1.0), open_ == 0.0, open_,
+             "must be zero without normal force")
+    sizes = np.column_stack([np.maximum(np.abs(v), law.velocity_scale), F, np.abs(z)])
+    _check_derivatives(law, where, points, sizes, outputs, values[:, :, 1:],
+                       ("R", *(f"{name}'" for name in names)), ("v", "F", *names))
+    for speed, reach in product(law.velocity_scale * np.array([0.1, 1.0, 10.0]),
+                                law.velocity_scale * np.array([0.03, 0.3, 3.0])):
+        work, size = cycle_work(law, p, share, speed, reach)
+        if (given := -np.cumsum(work).min()) > _LOSS * size.sum():
+            raise InputError(f"{type(law).__name__}: cycles of slip by {reach:.3g} m to and fro, "
+                             f"at most {speed:.3g} m/s fast, give off {given:.3g} J at F = "
+                             f"{share:.3g} N; friction must take energy out of all motion.")
+
+
+def _check_derivatives(
+    law: NormalLaw | FrictionLaw, where: str, points: Array, sizes: Array, outputs: Values,
+    given: Array, results: tuple[str, ...], arguments: tuple[str, ...],
+) -> None:
+    """Compare derivatives (k, r, a) of outputs (k, r) at points (k, a) with differences."""
+    here = outputs(points)
+    for a, argument in enumerate(arguments):
+        step = _STEP * sizes[:, a]
+        shift = np.zeros_like(points)
+        shift[:, a] = step
+        far = {k: outputs(points + k * shift) for k in (-2, -1, 1, 2)}
+        central = (8.0 * (far[1] - far[-1]) - (far[2] - far[-2])) / (12.0 * step[:, None])
+        near = {k: (outputs(points + k * _SIDE / _STEP * shift) - here) / (k * _SIDE / _STEP
+                                                                          * step[:, None])
+                for k in (-1, 1)}
+        size = np.max([np.abs(value) for value in far.values()], axis=0)
+        rounding = 50.0 * np.finfo(float).eps * size
+        slope = given[:, :, a]
+        slack = 1e-5 * np.abs(slope) + 1e-6 * size / sizes[:, a, None]
+        smooth = np.abs(central - slope) <= slack + rounding / step[:, None]
+        slack = (1e-3 * np.maximum(np.abs(near[-1]), np.abs(near[1])) + slack
+                 + rounding / (_SIDE / _STEP * step[:, None]))
+        low, high = np.minimum(near[-1], near[1]), np.maximum(near[-1], near[1])
+        kink = (low - slack <= slope) & (slope <= high + slack)
+        for r, result in enumerate(results):
+            shown = np.column_stack([slope[:, r], central[:, r]])
+            _require(law, where, points, smooth[:, r] | kink[:, r], shown,
+                     f"must be equal: d{result}/d{argument} as returned and by differences")
+
+
+def _require(law: NormalLaw | FrictionLaw, where: str, points: Array, holds: Any, values: Array,
+             demand: str) -> None:
+    wrong = np.flatnonzero(~holds)
+    if len(wrong):
+        place = ", ".join(f"{value:.6g}" for value in points[wrong[0]])
+        shown = ", ".join(f"{value:.6g}" for value in np.ravel(values[wrong[0]])[:4])
+        place = f"({place})" if where.startswith("(") else place
+        raise InputError(f"{type(law).__name__}: at {where} = {place} the values {shown} {demand}.")

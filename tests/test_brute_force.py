@@ -1,0 +1,133 @@
+"""Lyapunov exponents, diagrams by brute force, basins: linear systems, known regimes."""
+
+import numpy as np
+import pytest
+from oscillators import basis, impact_oscillator
+
+from fecontact import (
+    Axis,
+    ConstantFriction,
+    ContactSystem,
+    Crossing,
+    Drive,
+    Ground,
+    InputError,
+    Load,
+    PrescribedForce,
+    ProductFriction,
+    basins,
+    brute_force,
+    lyapunov_exponents,
+    strobe,
+)
+from fecontact.errors import AnalysisError
+
+
+def test_exponents_of_a_linear_oscillator():
+    """Out of contact: both pairs decay with half the damping over the mass, and 2 D w over two."""
+    system = impact_oscillator(2).with_(gap=1.0)
+    found = lyapunov_exponents(system, 2.0, initial=np.array([1e-4, 1e-5, 0.0, 0.0]), count=4,
+                               interval=0.01, rtol=1e-10)
+    A = np.block([[np.zeros((2, 2)), np.eye(2)],
+                  [-system.arrays.stiffness, -system.arrays.damping]])
+    wanted = np.sort(np.linalg.eigvals(A).real)[::-1]
+    # Pairs rotate, which blurs each exponent but not the sum of a pair.
+    assert found.exponents[:2].sum() == pytest.approx(wanted[:2].sum(), abs=2.0)
+    assert found.exponents.sum() == pytest.approx(np.trace(A), rel=1e-4)
+    assert found.history.shape == (200, 4)
+
+
+@pytest.mark.parametrize(("w", "low", "high"), [
+    (64.32, -30.0, -1.0), (30.84, -30.0, -0.3), (23.63, 3.5, 9.0)])
+def test_exponents_of_the_impact_oscillator(w, low, high):
+    """Periodic motions below zero; at 23.63 rad/s chaos, about +6 1/s."""
+    period = 2.0 * np.pi / w
+    found = lyapunov_exponents(impact_oscillator(2, w), 200 * period, transient=50 * period,
+                               initial=np.zeros(4))
+    assert low < found.exponents[0] < high
+    assert found.uncertainty[0] < 2.0
+
+
+def test_brute_force_meets_single_runs():
+    system = impact_oscillator(2)
+    values = np.linspace(60.0, 65.0, 5)
+    found = brute_force(system, "drive.angular_frequency", values, transient=60, keep=4,
+                        initial=np.zeros(4), chains=2)
+    assert found.up.shape == found.down.shape == (5, 4, 4)
+    alone = strobe(system.with_(**{"drive.angular_frequency": 60.0}), transient=60, keep=4,
+                   initial=np.zeros(4), rtol=1e-5)
+    assert (found.up[0] == alone.states[0]).all()
+    y, _ = found.observed("B", "y")
+    assert y[0] == pytest.approx(found.up[0, :, :2] @ system.basis.T[0, 1])
+    # Period one at all of these values: up and down meet.
+    assert np.abs(found.up - found.down).max() < 1e-3 * np.abs(found.up).max()
+
+    def faster(system, value):
+        return system.with_(**{"drive.angular_frequency": value})
+
+    same = brute_force(system, faster, values, transient=60, keep=4, initial=np.zeros(4),
+                       chains=2, down=False)
+    assert same.parameter == "faster"
+    assert (same.up == found.up).all()
+    assert len(same.down) == 0
+
+
+def belt(B=1.0, **changes):
+    """One mass on a belt with the product law: steady sliding and stick-slip beside each other."""
+    shape = np.array([[1.0], [0.0]])
+    return ContactSystem(
+        basis([0.0], [0.0], shape, shape), normal=PrescribedForce(B),
+        friction=ProductFriction(0.14, 1.14, 2.0, 100.0), ground=Ground(speed=1.0),
+        drive=Drive(stiffness_x=1.0, damping_x=0.04), load=Load(0.0), **changes)
+
+
+def test_basins_of_sliding_and_stick_slip():
+    """A stable equilibrium inside, a stable cycle outside; the border is an unstable cycle."""
+    values = np.linspace(-1.6, 1.6, 9)
+    found = basins(belt(), (Axis("B", "x"), values), (Axis("B", "x", "velocity"), values),
+                   transient=300.0, keep=8,
+                   section=Crossing("B", "x", of="velocity", direction="falling"))
+    kinds = {one.kind for one in found.attractors}
+    assert "equilibrium" in kinds or "periodic" in kinds
+    assert sum(one.share for one in found.attractors) == pytest.approx((found.label >= 0).mean())
+    middle = found.attractors[found.label[4, 4]]
+    assert found.label.shape == (9, 9)
+    assert middle.kind in ("equilibrium", "periodic")
+
+
+def test_basins_of_an_excited_system():
+    """Impacts at 64.32 rad/s: one motion of period one from everywhere."""
+    found = basins(impact_oscillator(2), (Axis("B", "y"), [0.0, 2e-4, 4e-4]),
+                   (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient=120, keep=6)
+    assert len(found.attractors) == 1
+    assert found.attractors[0].kind == "periodic"
+    assert len(found.attractors[0].points) == 1
+    assert found.attractors[0].share == 1.0
+
+
+def test_a_damped_mass_comes_to_rest():
+    shape = np.array([[1.0], [0.0]])
+    system = ContactSystem(
+        basis([0.0], [0.0], shape, shape), normal=PrescribedForce(1.0),
+        friction=ConstantFriction(0.0), drive=Drive(stiffness_x=4.0, damping_x=0.8))
+    found = basins(system, (Axis("B", "x"), [0.5, 1.0]), (Axis("B", "x", "velocity"), [0.0, 1.0]),
+                   transient=60.0, section=Crossing("B", "x", value=1e-3, direction="rising"))
+    assert [one.kind for one in found.attractors] == ["equilibrium"]
+    assert np.abs(found.attractors[0].points).max() < 1e-6
+
+
+def test_bad_input():
+    system = impact_oscillator(2)
+    with pytest.raises(InputError, match="ascending order"):
+        brute_force(system, "drive.angular_frequency", [2.0, 1.0])
+    with pytest.raises(InputError, match=r"no parameter 'drive\.frequency'"):
+        brute_force(system, "drive.frequency", [1.0, 2.0])
+    with pytest.raises(InputError, match="duration = 0"):
+        lyapunov_exponents(system, 0)
+    with pytest.raises(InputError, match="count = 5"):
+        lyapunov_exponents(system, 1.0, count=5)
+    with pytest.raises(AnalysisError, match="before its end"):
+        lyapunov_exponents(system, 1.0, initial=np.array([0.0, 0.0, 1e200, 0.0]))
+    with pytest.raises(InputError, match="keep = 2"):
+        basins(system, (Axis("B", "y"), [0.0]), (Axis("B", "y", "velocity"), [0.0]),
+               transient=1, keep=2)

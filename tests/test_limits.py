@@ -1,0 +1,122 @@
+"""What a run warns of and refuses; CVODE; steep smoothing; wear."""
+
+import numpy as np
+import pytest
+from oscillators import friction_oscillator, impact_oscillator
+from test_events import START, drop
+
+from fecontact import (
+    InputError,
+    NormalLaw,
+    Status,
+    normal_law,
+    simulate,
+    smoothing_cost,
+)
+
+
+def test_cvode_agrees():
+    pytest.importorskip("sksundae")
+    system = friction_oscillator(3)
+    one = simulate(system, 1.0, outputs=201, rtol=1e-8)
+    other = simulate(system, 1.0, outputs=201, method="CVODE", rtol=1e-8)
+    assert other.status is Status.FINISHED
+    size = np.abs(one.states).max(axis=0)
+    assert (np.abs(one.states - other.states).max(axis=0) < 2e-4 * size + 1e-15).all()
+    assert other.energies.imbalance < 1e-4
+    assert other.statistics["method"] == "CVODE"
+
+
+def test_cvode_drops_on_a_spring():
+    pytest.importorskip("sksundae")
+    run = simulate(drop(), 1.1, initial=START, outputs=[0.0, 1.0, 1.1], method="CVODE", rtol=1e-9)
+    assert run.states[1:, 0] == pytest.approx([-1.332162981855, -0.856394405035], rel=1e-6)
+
+
+@pytest.mark.parametrize("slope", [1e7, 1e8, 1e9])
+def test_steep_smoothing_approaches_set_valued_friction(slope):
+    """Period of the belt oscillator: 1.361213293 s set-valued, less by what the smoothing costs."""
+    system = friction_oscillator(
+        2, **{"drive.amplitude_x": 0.0, "friction.smoothing_slope": slope})
+    run = simulate(system, 5.0, outputs=50001)
+    assert run.status is Status.FINISHED
+    x = run.displacement(0)[:, 0]
+    rises = np.flatnonzero((x[:-1] < 1.4e-3) & (x[1:] >= 1.4e-3))
+    crossing = run.time[rises] + 1e-4 * (1.4e-3 - x[rises]) / (x[rises + 1] - x[rises])
+    periods = np.diff(crossing)
+    # Break-away falls by about (2 mu' / (pi k_s))^(1/2); the period with it.
+    assert periods[1:] == pytest.approx(1.361213293, rel=0.08 * np.sqrt(1e6 / slope))
+    assert run.energies.imbalance < 1e-4
+
+
+def test_users_are_told_what_smoothing_costs():
+    cost = smoothing_cost(friction_oscillator(2), 2.0 * np.pi / 13.8 * 20.0)
+    assert cost.break_away == pytest.approx(0.8, rel=1e-6)
+    v = np.logspace(-6.0, -3.0, 30001)
+    curve = (0.25 * np.exp(-1e3 * v) + 0.55) * 2.0 / np.pi * np.arctan(1e6 * v)
+    assert cost.break_away_smoothed == pytest.approx(curve.max(), rel=1e-6)
+    assert cost.orbit_difference > 0.5
+
+
+def test_options_of_set_valued_runs():
+    system = friction_oscillator(2, **{"drive.amplitude_x": 0.0})
+    run = simulate(system, 0.1, method="set-valued", static_coefficient=0.9, scheme="events")
+    assert run.status is Status.FINISHED
+    with pytest.raises(InputError, match=r"scheme = 'events' is for method = 'set-valued' alone"):
+        simulate(system, 0.1, scheme="events")
+    with pytest.raises(InputError, match=r"static_coefficient = 0\.9 is for"):
+        simulate(system, 0.1, static_coefficient=0.9, method="LSODA")
+
+
+def test_a_deep_start_is_warned_of():
+    system = impact_oscillator(2)
+    with pytest.warns(UserWarning, match=r"0\.0033 m deep in the ground"):
+        simulate(system, 1e-4, initial=np.array([-1e-3, 0.0, 0.0, 0.0]), outputs=2)
+    simulate(system, 1e-4, initial=np.array([-1e-6, 0.0, 0.0, 0.0]), outputs=2)
+
+
+@normal_law
+def _pump(u, v, p):
+    """A spring that pushes harder on the way out: a motor."""
+    if u <= 0.0:
+        return 0.0, 0.0, 0.0
+    return p[0] * u * (1.0 - 0.5 * np.tanh(100.0 * v)), p[0] * u, 0.0
+
+
+class Motor(NormalLaw):
+    """Its work is not that of the damping it claims to have."""
+
+    kernel = _pump
+
+    @property
+    def penetration_scale(self):
+        return 1e-3
+
+    def table(self, share):
+        return np.full((len(share), 1), 1e4)
+
+    def stored_energy(self, penetration, share):
+        return 3e4 * np.maximum(penetration, 0.0) ** 2
+
+
+def test_energy_from_nowhere_has_a_status():
+    """Stored energy that is claimed but not put in."""
+    system = drop().with_(normal=Motor(), gap=0.0)
+    run = simulate(system, 0.5, initial=np.array([0.05, 0.0]))
+    assert run.status is Status.ENERGY_GREW
+    assert run.energies.growth > 0.01
+    assert simulate(drop(), 0.5, initial=START).status is Status.FINISHED
+
+
+def test_wear_follows_from_friction_work():
+    """Steady sliding: depth = k mu F V t / area."""
+    system = friction_oscillator(2, **{
+        "drive.amplitude_x": 0.0, "drive.damping_x": 500.0, "ground.speed": 0.05})
+    run = simulate(system, 2.0, initial="sliding")
+    mu = float(run.friction_force[-1, 0] / run.normal_force[-1, 0])
+    wanted = 1e-13 * abs(mu) * 14.0 * 0.05 * 2.0 / (1.0 * 0.02)
+    assert run.wear_depth(1e-13, 0.02)[-1, 0] == pytest.approx(wanted, rel=1e-6)
+    with pytest.raises(InputError, match=r"width = 0"):
+        run.wear_depth(1e-13, 0)
+    with pytest.raises(InputError, match=r"coefficient = -1"):
+        run.wear_depth(-1.0, 1.0)
