@@ -139,7 +139,8 @@ class _Corners:
         start = 0
         for name, array in stacked.items():
             size = array[0].size
-            self._places.append((first._fields.index(name), slice(start, start + size), array.shape[1:]))
+            number = first._fields.index(name)
+            self._places.append((number, slice(start, start + size), array.shape[1:]))
             start += size
 
     def hold(self, values: Array) -> bool:
