@@ -56,7 +56,7 @@ def branch(
 
 
 def branch_table(found: "Branch") -> Any:
-    """Ends and special points of a branch of equilibria: where, how many growing modes, which."""
+    """Ends and special points of a branch of equilibria: where, and what changes there."""
     from fecontact.report import table
 
     born = {"supercritical": "stable orbits", "subcritical": "unstable orbits",
@@ -65,11 +65,11 @@ def branch_table(found: "Branch") -> Any:
     for index, point in enumerate(found.points):
         if point.kind is None and 0 < index < len(found) - 1:
             continue
-        hertz, growing = point.details.get("frequency_hz"), point.values["unstable"] / 2
+        hertz, unstable = point.details.get("frequency_hz"), point.values["unstable"]
         rows.append((
             point.kind or ("start" if index == 0 else "end"),
             f"{point.parameter:.7g}",
             "" if hertz is None else f"{hertz:.5g}",
             born.get(point.details.get("criticality", ""), "") if point.kind else
-            (f"{growing:g} growing" if growing else "stable")))
+            (f"unstable in {unstable} directions" if unstable else "stable")))
     return table("point", found.name, "frequency [Hz]", "", rows=rows)
