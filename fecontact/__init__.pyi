@@ -14,6 +14,10 @@ from .bifurcation.curves import fold_curve, hopf_curve
 from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
+from .bifurcation.orbit_curves import orbit_curve
+from .bifurcation.orbit_output import amplitude, orbit_history, quantity_range
+from .bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
+from .bifurcation.shooting_branch import orbits_by_shooting
 from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
@@ -184,6 +188,7 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "VectorField",
+    "amplitude",
     "amplitude_spectrum",
     "basins",
     "brute_force",
@@ -212,6 +217,12 @@ __all__ = [
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
+    "orbit_curve",
+    "orbit_history",
+    "orbits_beyond",
+    "orbits_by_shooting",
+    "orbits_from_hopf",
+    "orbits_from_motion",
     "periodicity",
     "picture",
     "plot_branches",
@@ -231,6 +242,7 @@ __all__ = [
     "plot_strobed",
     "plot_sweep",
     "power_spectral_density",
+    "quantity_range",
     "read_case",
     "read_matrix",
     "read_mesh",

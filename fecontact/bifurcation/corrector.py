@@ -2,15 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.inner_product import weighted_norm
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
 from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]
+
+# Steps of this relative size that grow again are rounding, as next to branch points.
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,19 +34,42 @@ def corrected(
     problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int
 ) -> tuple[Array, Linearisation, int] | None:
     """Newton's method at right angles to a row, from a guess; None where it does not converge."""
-    u, before = guess, np.inf
+    u, before, kept = guess, np.inf, None
+    steps: list[Array] = []
+    scale = 1.0 + norm(problem, guess)
     for count in range(1, iterations + 1):
-        linearisation = problem.linearise(u)
+        linearisation = problem.linearise(u) if kept is None else problem.evaluate(u)
         rhs = np.append(-linearisation.residual, -(row @ (u - guess)))
-        change = linearisation.solve(row, rhs)
+        change = (kept or linearisation).solve(row, rhs)
+        if kept is not None:
+            change = _improved(problem, change, steps)
         size = norm(problem, change)
+        if count > 2 and size > before and before <= _ROUNDING * scale:
+            return u, linearisation, count
         if not np.isfinite(size) or (count > 2 and size > before):
             return None
         u = u + change
-        if size <= tolerance * (1.0 + norm(problem, u)):
+        if kept is None and size <= tolerance * scale:
             return u, linearisation, count
+        # With a matrix that is kept the error falls by about the same factor each time.
+        if kept is not None and size * size / before <= max(0.1 * tolerance, 1e-13) * scale:
+            return u, problem.linearise(u), max(1, count - 2)
+        if problem.keeps_matrix:
+            keeps = kept is None or size < 0.2 * before
+            kept = (kept or linearisation) if keeps else None
+            steps = [*steps, change] if keeps else []
         before = size
     return None
+
+
+def _improved(problem: Problem, change: Array, steps: list[Array]) -> Array:
+    """A step with the matrix of the first of ``steps``, corrected by what they taught (Broyden)."""
+    weights = problem.weights()
+    for step, following in pairwise(steps):
+        along = weights * step
+        change = change + following * float(along @ change / (along @ step))
+    along = weights * steps[-1]
+    return np.asarray(change / (1.0 - float(along @ change / (along @ steps[-1]))))
 
 
 def finished(
@@ -81,5 +109,4 @@ def _tests(
 
 def norm(problem: Problem, vector: Array) -> float:
     """Length of a vector in the problem's inner product."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.sqrt(problem.weights() * vector @ vector))
+    return float(weighted_norm(problem.weights(), vector))

@@ -43,7 +43,7 @@ def located_between(
     found = []
     for name in changed(here, there):
         located = _zero(problem, here, there, settings, _test_value(name),
-                        here.tests[name], there.tests[name])
+                        here.tests[name], there.tests[name], problem.precision)
         if located is None:
             continue
         details = problem.examine(name, located.u, located.linearisation, located.tangent)
@@ -54,7 +54,8 @@ def located_between(
     for bound in settings.bounds:
         before, after = here.u[-1] - bound, there.u[-1] - bound
         if before * after < 0.0 or (after == 0.0 and before != 0.0):
-            located = _zero(problem, here, there, settings, _distance_to(bound), before, after)
+            located = _zero(problem, here, there, settings, _distance_to(bound), before, after,
+                            1e-12)
             if located is not None:
                 found.append(BranchPoint(located.u, located.tangent, located.values))
     found = _without_turns(found, row, 1e-4 * float(row @ (there.u - here.u)))
@@ -78,7 +79,7 @@ def _distance_to(bound: float) -> Callable[[Solution], float]:
 
 def _zero(
     problem: Problem, here: Solution, there: Solution, settings: Settings,
-    test: Callable[[Solution], float], before: float, after: float,
+    test: Callable[[Solution], float], before: float, after: float, precision: float,
 ) -> Solution | None:
     """The solution between two others at which a test function is zero; None at a pole or jump."""
     from scipy.optimize import brentq
@@ -88,11 +89,12 @@ def _zero(
     row = problem.weights() * here.tangent
     length = float(row @ (there.u - here.u))
     best: list[tuple[float, Solution]] = []
+    exact = max(_EXACT, 1e-2 * precision)
 
     def value(along: float) -> float:
         if along <= 0.0 or along >= length:
             return before if along <= 0.0 else after
-        found = corrected(problem, between(problem, here, there, along), row, _EXACT,
+        found = corrected(problem, between(problem, here, there, along), row, exact,
                            2 * settings.iterations)
         if found is None:
             raise _LostError
@@ -104,12 +106,14 @@ def _zero(
         return result
 
     try:
-        brentq(value, 0.0, length, xtol=1e-12 * length, rtol=1e-14, maxiter=60, disp=False)
+        brentq(value, 0.0, length, xtol=precision * length, rtol=1e-14, maxiter=60,
+               disp=False)
     except (_LostError, FecontactError):
         if not best:
             return None
     size, at = min(best, key=lambda pair: pair[0])
-    return at if size <= 1e-3 * max(abs(before), abs(after)) else None
+    # At a pole or a jump the values do not get small; how small they get else, the precision says.
+    return at if size <= max(1e-3, 50.0 * precision) * max(abs(before), abs(after)) else None
 
 
 class _LostError(Exception):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,19 @@ class Linearisation(Protocol):
 
 
 class Problem(Protocol):
-    """What is continued. Subclass it to get the defaults of the optional methods."""
+    """What is continued. Subclass it to get the defaults of the optional methods.
+
+    Attributes
+    ----------
+    keeps_matrix : bool
+        Whether Newton's method goes on with the matrix that it has as long as that serves; for
+        problems whose factorisation costs far more than a residual and a solution.
+    precision : float
+        Part of a step to which special points are located on it.
+    """
+
+    keeps_matrix: ClassVar[bool] = False
+    precision: float = 1e-12
 
     def linearise(self, u: Array) -> Linearisation:
         """The equations about u.
@@ -32,6 +44,10 @@ class Problem(Protocol):
         A FecontactError or values that are not finite make the step fail, and be halved.
         """
         ...
+
+    def evaluate(self, u: Array) -> Linearisation:
+        """The equations about u, of which only the residual will be asked for."""
+        return self.linearise(u)
 
     def weights(self) -> Array:
         """Weights w (N + 1,) of the inner product, positive."""
