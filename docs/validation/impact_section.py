@@ -202,7 +202,7 @@ impact takes, so that restitution may exceed one.
 
 ### How narrow it is
 
-Two-mode model, followed upwards and downwards over 1000 frequencies, 100 periods at each. Chaos
+Two-mode model, followed upwards and downwards over 600 frequencies, 80 periods at each. Chaos
 fills most of the range from 11 to 27 rad/s, and grows out of the chatter; above, different motions
 exist side by side: {hysteresis}.
 
