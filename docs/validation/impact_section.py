@@ -167,16 +167,16 @@ What the source does not give, and what is taken here:
 ### Regimes
 
 Found by the program from the motion, strobed once a drive period: a motion repeats if it comes back
-to within 0.2 % of its size, or 3 % if it comes to rest on the stop. Exponents of
-orbits are those of their largest multipliers, by derivatives of the motion; those with a standard
-error are mean growths over 400 periods of motions that do not repeat to 0.1 %.
+to within 0.2 % of its size, or 3 % if it comes to rest on the stop. Exponents of orbits are those
+of their largest multipliers, by derivatives of the motion; those with a standard error are mean
+growths over 400 periods of motions that do not repeat to 0.1 %.
 
 {regimes}
 
 At 9.845 rad/s the rough contact is hardly damped at small penetrations, and with the rotation and
 one bending mode some ripple is left when the spring lifts the pendulum off. It differs from period
-to period: with two modes these are alike to 1 or 2 % only, and the exponent is slightly positive
-(smaller in longer runs). With a third mode they repeat exactly. "Rests" are contacts of a tenth of
+to period: with two modes these are alike to 1 or 2 % only, and the exponent is close to zero. With
+a third mode they repeat exactly. "Rests" are contacts of a tenth of
 a period or more in which the velocity stays below a tenth of the largest impact velocity.
 
 ### Figures

@@ -94,11 +94,11 @@ over v_0.
 
 {printed}
 
-From these equations the first Hopf point and the fold below it lie 5.7 % and 1.2 % above the
-print, while everything else agrees to its last digit but the third doubling, which rounds to 9.37:
-the print seems wrong there. Between T1 and H1 steady sliding and a stable orbit exist side by side,
-as the source says, and the unstable orbit between them parts the starts. The three stable motions
-at 3.8 m/s, found by runs of 400 s: {attractors}.
+The first Hopf point and the fold of the orbits born there lie 5.7 % and 1.2 % above the print,
+which seems wrong in these two places: with the same constants all the rest agrees to the last digit
+printed, but for the third doubling, which rounds to 9.37. Between T1 and H1 steady sliding and a
+stable orbit exist side by side, as the source says; the unstable orbit between them parts the
+starts. The three stable motions at 3.8 m/s, found by runs of 400 s: {attractors}.
 
 {exact}
 
