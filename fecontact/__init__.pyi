@@ -7,8 +7,15 @@ from .analysis.window import window
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .bifurcation.basins import Attractor, Axis, Basins, basins
+from .bifurcation.branch import Branch
 from .bifurcation.brute_force import BruteForce, brute_force
+from .bifurcation.contact_field import contact_field
+from .bifurcation.curves import fold_curve, hopf_curve
+from .bifurcation.equilibria import find_equilibrium
+from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
+from .bifurcation.stability_map import stability_map
+from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
@@ -67,6 +74,7 @@ from .output.analysis_plots import (
     plot_spectrum,
 )
 from .output.dataset import to_xarray
+from .output.diagrams import plot_branches, plot_eigenvalues, plot_stability_map
 from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
@@ -88,6 +96,7 @@ __all__ = [
     "Beam",
     "Block",
     "BoucWenFriction",
+    "Branch",
     "BruteForce",
     "Constant",
     "ConstantFriction",
@@ -161,31 +170,39 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "VectorField",
     "amplitude_spectrum",
     "basins",
     "brute_force",
     "check_law",
+    "contact_field",
     "count_periods",
     "ensemble",
+    "equilibrium_branch",
     "event",
     "export_csv",
     "export_mat",
     "export_netcdf",
     "export_pvd",
+    "find_equilibrium",
     "find_impacts",
     "find_rests",
+    "fold_curve",
     "forcing_period",
     "frequency_response",
     "friction_law",
     "generate",
     "history",
+    "hopf_curve",
     "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
     "periodicity",
     "picture",
+    "plot_branches",
     "plot_contact_map",
+    "plot_eigenvalues",
     "plot_energies",
     "plot_friction_work",
     "plot_history",
@@ -195,6 +212,7 @@ __all__ = [
     "plot_response",
     "plot_spectrogram",
     "plot_spectrum",
+    "plot_stability_map",
     "power_spectral_density",
     "read_case",
     "read_matrix",
@@ -206,9 +224,11 @@ __all__ = [
     "simulate",
     "smoothing_cost",
     "spectrogram",
+    "stability_map",
     "static_equilibrium",
     "strobe",
     "strobed_states",
+    "switched_branch",
     "to_xarray",
     "window",
     "write_case",

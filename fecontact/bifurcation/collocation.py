@@ -1,0 +1,230 @@
+"""Periodic orbits by orthogonal collocation: the equations, and their linearisation."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.interpolation import (
+    Rule,
+    at_points,
+    equidistributed,
+    extremes,
+    interpolate,
+    node_times,
+    rule,
+    to_nodes,
+)
+from fecontact.bifurcation.linearised import Linearised
+from fecontact.bifurcation.problem import Problem
+from fecontact.bifurcation.vector_field import VectorField
+from fecontact.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Collocation(Problem):
+    """Equations of a periodic orbit of x' = f(t, x, p), one parameter free.
+
+    With time scaled to [0, 1], x is a polynomial of degree m on each of N intervals, continuous
+    and periodic, and meets x' = T f at the m Gauss points of each. The error falls as h^(m + 1),
+    at the ends of the intervals as h^(2 m). If f does not depend on t, the period T is an unknown
+    and the phase is fixed by int <x, y'> = 0 with the orbit y before; else T is ``periods`` times
+    the period of the forcing.
+
+    The unknowns are ``u = [nodes (N m d), T if it is unknown, parameter]``.
+
+    Attributes
+    ----------
+    field : VectorField
+    values : (k,) array
+        Parameters; the free one is taken from u.
+    free : int
+        Index of the free parameter.
+    mesh : (N + 1,) array
+        Ends of the intervals, from 0 to 1.
+    degree : int
+        m.
+    reference : (N m, d) array
+        Nodes of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        What counts as one in the length of a step: of each state (root mean square over the
+        orbit), of the period, of the parameter.
+    periods : int
+        Periods of the forcing in one of the orbit.
+    age : int
+        Steps since the mesh was made.
+    renewal : int
+        Steps from one mesh to the next, 0 for never.
+    limits : (d,) array, optional
+        Up to these the scales of the states grow with the orbit; without limits they stay.
+    precision : float
+        Part of a step to which special points are located. Above 1e-6 their normal forms are
+        left out.
+    """
+
+    field: VectorField
+    values: Array
+    free: int
+    mesh: Array
+    degree: int
+    reference: Array
+    scales: Array
+    periods: int = 1
+    age: int = 0
+    renewal: int = 1
+    limits: Array | None = None
+    precision: float = 1e-12
+
+    keeps_matrix: ClassVar[bool] = True
+
+    @property
+    def autonomous(self) -> bool:
+        """Whether the period is an unknown."""
+        return self._forcing_period is None
+
+    @property
+    def intervals(self) -> int:
+        """Number N of intervals."""
+        return len(self.mesh) - 1
+
+    @property
+    def size(self) -> int:
+        """Number N m d of nodal unknowns."""
+        return self.reference.size
+
+    @property
+    def common(self) -> int:
+        """Number of unknowns that all intervals share."""
+        return 2 if self.autonomous else 1
+
+    @cached_property
+    def _forcing_period(self) -> float | None:
+        return self.field.forcing_period(self.values)
+
+    @cached_property
+    def rule(self) -> Rule:
+        """Basis polynomials and Gauss points."""
+        return rule(self.degree)
+
+    @cached_property
+    def widths(self) -> Array:
+        """Widths (N,) of the intervals."""
+        return np.diff(self.mesh)
+
+    @cached_property
+    def times(self) -> Array:
+        """Times (N m,) of the Gauss points in [0, 1]."""
+        return (self.mesh[:-1, None] + self.widths[:, None] * self.rule.points).reshape(-1)
+
+    @cached_property
+    def phase_row(self) -> Array:
+        """Row (N m d,) of the phase condition."""
+        _, slopes = self.at_gauss_points(self.reference)
+        row = np.empty_like(self.reference)
+        to_nodes(slopes, self.rule.weights[:, None] * self.rule.values, np.ones(self.intervals),
+                 row)
+        return row.reshape(-1)
+
+    def at_gauss_points(self, nodes: Array) -> tuple[Array, Array]:
+        """States (N m, d) and their slopes over one interval, h x', at the Gauss points."""
+        x, slopes = np.empty_like(nodes), np.empty_like(nodes)
+        at_points(nodes, self.rule.values, self.rule.slopes, x, slopes)
+        return x, slopes
+
+    def nodes(self, u: Array) -> Array:
+        """Nodes (N m, d) of the orbit."""
+        return u[: self.size].reshape(self.reference.shape)
+
+    def period(self, u: Array) -> float:
+        """Period T [s] of the orbit."""
+        if self.autonomous:
+            return float(u[self.size])
+        given = self.field.forcing_period(self.parameters(u))
+        assert given is not None
+        return self.periods * given
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[self.free] = u[-1]
+        return values
+
+    def linearise(self, u: Array) -> Linearised:
+        """Residual and linearisation at u; what is not asked for is not computed."""
+        return Linearised(self, u)
+
+    def weights(self) -> Array:
+        """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""
+        return self._weights
+
+    @cached_property
+    def _weights(self) -> Array:
+        d = self.field.dimension
+        times = np.repeat(self.widths / self.degree, self.degree)
+        nodal = (times[:, None] / self.scales[:d] ** 2).reshape(-1)
+        return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
+
+    def tests(
+        self, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, float]:
+        """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
+        found: dict[str, float] = linearisation.floquet.tests(tangent)
+        return found
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Period, stability, mesh and the extremes of the states."""
+        stability = linearisation.floquet
+        low, high = extremes(self.nodes(u), self.degree)
+        return {"period": self.period(u), "multipliers": stability.multipliers,
+                "unstable": stability.unstable, "stable": stability.stable,
+                "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
+                "maximum": high}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """Details of a special point; None for a neutral saddle."""
+        from fecontact.bifurcation.orbit_normal_forms import examined
+
+        return examined(kind, self, u, linearisation, self.precision < 1e-6)
+
+    def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
+        """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
+        problem = replace(self, age=self.age + 1, scales=self._grown(u))
+        if self.renewal and problem.age >= self.renewal:
+            mesh = equidistributed(self.mesh, self.nodes(u), self.degree, self.intervals)
+            return problem.on_mesh(mesh, u, tangent)
+        return replace(problem, reference=self.nodes(u).copy()), u, tangent
+
+    def _grown(self, u: Array) -> Array:
+        """Scales of states, period and parameter, larger where the orbit has outgrown them."""
+        d = self.field.dimension
+        if self.limits is None:
+            return self.scales
+        larger = np.clip(np.ptp(self.nodes(u), axis=0) / 2.0, self.scales[:d], self.limits)
+        if (larger <= 1.5 * self.scales[:d]).all():
+            return self.scales
+        return np.concatenate([larger, self.scales[d:]])
+
+    def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
+        """Problem, u and tangent on another mesh."""
+        times = node_times(mesh, self.degree)
+        d = self.field.dimension
+        both = interpolate(self.mesh, np.concatenate([self.nodes(u), self.nodes(tangent)], axis=1),
+                           times)
+        reference = np.ascontiguousarray(both[:, :d])
+        problem = replace(self, mesh=mesh, age=0, reference=reference)
+        return (problem, np.concatenate([reference.reshape(-1), u[self.size :]]),
+                np.concatenate([both[:, d:].reshape(-1), tangent[self.size :]]))
+
+
+def require_mesh(intervals: int, degree: int) -> None:
+    """Raise :class:`InputError` unless this many intervals of this degree can be used."""
+    if not (isinstance(intervals, int | np.integer) and intervals >= 2):
+        raise InputError(f"intervals = {intervals!r} must be a whole number of at least 2.")
+    if not (isinstance(degree, int | np.integer) and 2 <= degree <= 7):
+        raise InputError(f"degree = {degree!r} must be a whole number from 2 to 7.")

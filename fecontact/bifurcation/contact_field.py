@@ -1,0 +1,164 @@
+"""A contact system as a vector field of some of its parameters."""
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation import contact_field_kernels as kernels
+from fecontact.bifurcation.forcing import forcing_period
+from fecontact.bifurcation.system_family import SystemFamily
+from fecontact.bifurcation.vector_field import Array, VectorField
+from fecontact.system import ContactSystem
+
+# Step of central differences in a parameter, relative to its value.
+_STEP = 2e-4
+# Arrays that decide on what is given in time.
+_FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
+                      "profile_parameters", "friction_scale_parameters",
+                      "ground_motion_parameters"})
+
+
+class ContactField(VectorField):
+    """See :func:`contact_field`."""
+
+    def __init__(self, family: SystemFamily) -> None:
+        self._family = family
+        self.parameters = MappingProxyType(dict(family.parameters))
+        base = family.base
+        modes = range(1, base.basis.modes + 1)
+        self.state_names = (*(f"q{i}" for i in modes), *(f"q{i}'" for i in modes),
+                            *(f"z{j}.{k + 1}" for j in range(base.basis.contact_nodes)
+                              for k in range(base.memory)))
+        self._affine = [False] * len(self.parameters)
+        self._calls = [0] * len(self.parameters)
+        varying = family.varying
+        self._constant_period = varying is not None and not self._moves_forcing(varying)
+
+    def _moves_forcing(self, varying: frozenset[str]) -> bool:
+        moved = varying & _FORCING
+        ground = self._family.base.ground
+        flat = not ground.wavy and ground.friction_variation is None and ground.motion is None
+        if flat and "profile_parameters" not in moved:
+            moved = moved - {"ground_motion_parameters"}
+        return bool(moved)
+
+    def system(self, values: Array | None = None) -> ContactSystem:
+        """The contact system for parameter values (k,); the base values by default.
+
+        Raises
+        ------
+        InputError
+            If a value is out of its parameter's range.
+        """
+        return self._family.system(self.values if values is None else values)
+
+    def rates(self, t: Array, x: Array, values: Array) -> Array:
+        """Rates (N, d); see :meth:`VectorField.rates`."""
+        f = np.empty_like(x)
+        kernels.batch_rates(t, x, self._family.arrays(values), f)
+        return f
+
+    def derivatives(
+        self, t: Array, x: Array, values: Array, active: Iterable[int] = ()
+    ) -> tuple[Array, Array, Array]:
+        """Rates and their derivatives; see :meth:`VectorField.derivatives`."""
+        chosen = tuple(active)
+        n, d = x.shape
+        f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(chosen)))
+        kernels.batch_derivatives(t, x, self._family.arrays(values), f, J)
+        for place, index in enumerate(chosen):
+            P[:, :, place] = self._parameter_derivative(t, x, values, index, f)
+        return f, J, P
+
+    def _parameter_derivative(
+        self, t: Array, x: Array, values: Array, index: int, f: Array
+    ) -> Array:
+        """df/dp (N, d): one difference where f is affine in p, else of fourth order."""
+        h = self._step(values, index)
+        above = self._beside(t, x, values, index, h)
+        # Seven times out of eight what was found is trusted: a wrong guess here could only slow
+        # Newton's method down.
+        self._calls[index] += 1
+        if self._affine[index] and self._calls[index] % 8:
+            return np.asarray((above - f) / h)
+        below = self._beside(t, x, values, index, -h)
+        curvature = np.abs(above - f - (f - below)).max(initial=0.0)
+        self._affine[index] = curvature <= 1e-14 * np.abs(f).max(initial=0.0)
+        if self._affine[index]:
+            return np.asarray((above - below) / (2.0 * h))
+        total = 8.0 * (above - below)
+        total -= self._beside(t, x, values, index, 2.0 * h)
+        total += self._beside(t, x, values, index, -2.0 * h)
+        return np.asarray(total / (12.0 * h))
+
+    def _beside(self, t: Array, x: Array, values: Array, index: int, step: float) -> Array:
+        f = np.empty_like(x)
+        kernels.batch_rates(t, x, self._family.beside(values, index, step), f)
+        return f
+
+    def _step(self, values: Array, index: int) -> float:
+        """Small beside the value, and beside the widths of the laws where it moves the ground."""
+        value = abs(float(values[index]))
+        h = _STEP * (value if value > 0.0 else 1.0)
+        name = list(self.parameters)[index]
+        if name == "ground.speed":
+            return max(min(h, 0.005 * self._family.base.velocity_scale), 1e-8 * value)
+        if name == "gap":
+            return max(min(h, 0.002 * self._family.base.penetration_scale), 1e-8 * value)
+        return h
+
+    def forcing_period(self, values: Array) -> float | None:
+        """Common period [s] of drive, loads and ground; None where nothing depends on time.
+
+        Raises
+        ------
+        AnalysisError
+            If what is given in time has no common period.
+        """
+        return self._base_period if self._constant_period else forcing_period(self.system(values))
+
+    @cached_property
+    def _base_period(self) -> float | None:
+        return forcing_period(self.system())
+
+    def displacement_row(self, point: str | int, direction: str = "x") -> Array:
+        """Row (d,) that gives the displacement of a point [m] from a state.
+
+        ``point`` is 'B', 'C', a named point or the number of a contact node, ``direction`` 'x',
+        'y' or 'rotation'.
+        """
+        basis = self._family.base.basis
+        row = np.zeros(self.dimension)
+        axis = ("x", "y", "rotation").index(direction)
+        row[: basis.modes] = basis.T[basis.point_index(point), axis]
+        return row
+
+
+def contact_field(
+    system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str]
+) -> ContactField:
+    """A contact system as a vector field x' = f(t, x, p), x = [q, q', z].
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Smoothed laws; the state derivatives are the system's own, those to parameters are
+        differences of fourth order.
+    parameters : mapping, or sequence of str
+        Dotted names of the system's parameters, with values or None for the value that the system
+        has; or names of your own with a pair (value, function), the function making a system from
+        a system and a value::
+
+            contact_field(system, {"ground.speed": None, "B": (10.0, with_normal_force)})
+
+        They are set in the order given.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, or it has a value per node.
+    """
+    return ContactField(SystemFamily(system, parameters))

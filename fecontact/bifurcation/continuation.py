@@ -1,0 +1,158 @@
+"""Pseudo-arclength continuation of the solutions of N equations in N + 1 unknowns.
+
+Solutions G(u) = 0 form branches. From a point on one, a step goes along the tangent and Newton's
+method comes back to the branch at right angles to it. Sizes and angles are those of an inner
+product ``<a, b> = sum w a b`` that the problem gives. The last unknown is the parameter.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.branch import BranchPoint, Status
+from fecontact.bifurcation.corrector import Solution, corrected, finished, norm
+from fecontact.bifurcation.location import between, changed, located_between
+from fecontact.bifurcation.problem import Linearisation, Problem, Settings
+from fecontact.errors import FecontactError, InputError
+
+Array = NDArray[np.float64]
+
+__all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
+
+
+@dataclass(frozen=True)
+class End:
+    """How a continuation ended, and what the last failed step complained of."""
+
+    status: Status
+    message: str = ""
+
+
+def continuation(
+    problem: Problem,
+    u: Array,
+    settings: Settings,
+    *,
+    tangent: Array | None = None,
+    direction: float = 1.0,
+) -> Generator[BranchPoint, None, End]:
+    """Points of a branch one by one, from a solution (or something near to one) on.
+
+    Special points come in their places between the regular ones. The generator returns how the
+    branch ended.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is continued.
+    u : (N + 1,) array
+        Start; corrected at right angles to ``tangent``, or at the given parameter.
+    settings : Settings
+        How.
+    tangent : (N + 1,) array, optional
+        Direction of the first step.
+    direction : float
+        Sign of the first change of the parameter, where there is no tangent.
+
+    Raises
+    ------
+    FecontactError
+        If there is no solution near the start.
+    """
+    start = start_of(problem, u, settings, tangent, direction)
+    yield BranchPoint(start.u, start.tangent, start.values)
+    here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
+    stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
+    while count < settings.points:
+        try:
+            there = _step(problem, here, step, settings)
+        except FecontactError as error:
+            there, message = None, str(error)
+        if there is None or not _believable(problem, here, there, step, settings):
+            step *= 0.5
+            if step < settings.smallest_step:
+                return End(Status.STALLED, message)
+            continue
+        for located in located_between(problem, here, there, settings):
+            yield located
+            if located.kind in stops:
+                return End(Status.STOPPED)
+            if located.kind is None:
+                return End(Status.BOUND)
+        if fixed_mesh and count > 2 and _passes(problem, here, there, start):
+            yield BranchPoint(start.u, start.tangent, start.values)
+            return End(Status.CLOSED)
+        yield BranchPoint(there.u, there.tangent, there.values)
+        count += 1
+        step = _next_step(problem, here, there, step, settings)
+        here = there
+        adapted = problem.adapted(here.u, here.tangent)
+        if adapted is not None:
+            problem, moved, turned = adapted
+            turned = turned / norm(problem, turned)
+            fixed_mesh = fixed_mesh and np.array_equal(moved, here.u)
+            here = Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
+    return End(Status.POINTS)
+
+
+def start_of(
+    problem: Problem, u: Array, settings: Settings, tangent: Array | None, direction: float
+) -> Solution:
+    """The solution near u, with its tangent."""
+    row = np.zeros(len(u))
+    if tangent is None:
+        row[-1] = 1.0 if direction >= 0.0 else -1.0
+    else:
+        row = problem.weights() * tangent / norm(problem, tangent)
+    found = corrected(problem, np.array(u, dtype=float), row, settings.tolerance,
+                       3 * settings.iterations)
+    if found is None:
+        raise InputError(f"There is no solution near the start at the parameter {u[-1]:.6g}; give "
+                         f"a start that is closer to one.")
+    return finished(problem, *found, row, settings)
+
+
+def _step(problem: Problem, here: Solution, step: float, settings: Settings) -> Solution | None:
+    row = problem.weights() * here.tangent
+    found = corrected(problem, here.u + step * here.tangent, row, settings.tolerance,
+                       settings.iterations)
+    return None if found is None else finished(problem, *found, row, settings)
+
+
+def _believable(
+    problem: Problem, here: Solution, there: Solution, step: float, settings: Settings
+) -> bool:
+    """Whether a step neither turns too much nor passes over more than its tests can tell."""
+    turn = float(problem.weights() * here.tangent @ there.tangent)
+    if turn < np.cos(settings.largest_turn):
+        return False
+    jump = abs(int(there.values.get("unstable", 0)) - int(here.values.get("unstable", 0)))
+    if not settings.locate or step < 1e-3 * settings.step:
+        return True
+    return jump <= 2 * len(changed(here, there))
+
+
+def _next_step(
+    problem: Problem, here: Solution, there: Solution, step: float, settings: Settings
+) -> float:
+    """Longer after quick convergence on a straight piece, shorter after slow."""
+    factor = {1: 2.0, 2: 2.0, 3: 1.5, 4: 1.1}.get(there.iterations, 0.7)
+    turn = np.arccos(min(1.0, float(problem.weights() * here.tangent @ there.tangent)))
+    if turn > 0.0:
+        factor = min(factor, max(0.5, 0.5 * settings.largest_turn / turn))
+    return min(factor * step, settings.largest_step)
+
+
+def _passes(problem: Problem, here: Solution, there: Solution, start: Solution) -> bool:
+    """Whether the start of the branch lies on the step from here to there."""
+    weights = problem.weights()
+    if len(start.u) != len(here.u) or float(weights * here.tangent @ start.tangent) < 0.9:
+        return False
+    length = float(weights * here.tangent @ (there.u - here.u))
+    along = float(weights * here.tangent @ (start.u - here.u))
+    if not 0.0 < along <= length:
+        return False
+    aside = start.u - between(problem, here, there, along)
+    return norm(problem, aside) < 1e-2 * length

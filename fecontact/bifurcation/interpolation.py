@@ -1,0 +1,254 @@
+"""Piecewise polynomials of collocation: their values, slopes and monitor of error.
+
+On each interval of the mesh the solution is a polynomial of degree m, given at m + 1 equally
+spaced nodes, the ends among them; it meets the equation at the m Gauss points.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.compiled import borrowed, f8, kernel, matrix, vector
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """Polynomials of degree m on [0, 1] and the Gauss points.
+
+    Attributes
+    ----------
+    points, weights : (m,) array
+        Gauss points and weights.
+    values, slopes : (m, m + 1) array
+        The basis polynomials and their derivatives there.
+    node_weights : (m + 1,) array
+        Integrals of the basis polynomials.
+    top : (m + 1,) array
+        Derivatives of order m of the basis polynomials.
+    fine : (k, m + 1) array
+        The basis polynomials at many places in order.
+    """
+
+    points: Array
+    weights: Array
+    values: Array
+    slopes: Array
+    node_weights: Array
+    top: Array
+    fine: Array
+
+
+@cache
+def rule(degree: int) -> Rule:
+    """The rule with m = ``degree`` Gauss points."""
+    roots, weights = np.polynomial.legendre.leggauss(degree)
+    points = (roots + 1.0) / 2.0
+    nodes = np.linspace(0.0, 1.0, degree + 1)
+    basis = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
+    basis = [p / p(node) for p, node in zip(basis, nodes, strict=True)]
+    return Rule(
+        points, weights / 2.0,
+        np.array([[p(x) for p in basis] for x in points]),
+        np.array([[p.deriv()(x) for p in basis] for x in points]),
+        np.array([p.integ()(1.0) - p.integ()(0.0) for p in basis]),
+        np.array([p.deriv(degree)(0.0) for p in basis]),
+        np.array([[p(x) for p in basis] for x in np.linspace(0.0, 1.0, 8 * degree + 1)]))
+
+
+@kernel(types.void(matrix, matrix, matrix, matrix, matrix))
+def at_points(nodes, values, slopes, x, rates):  # type: ignore[no-untyped-def]
+    """Fill x and rates (N m, d), values and interval-scaled slopes, from nodes (N m, d)."""
+    nodes, x, rates = borrowed(nodes), borrowed(x), borrowed(rates)
+    m = len(values)
+    total, d = nodes.shape
+    for j in range(total // m):
+        for point in range(m):
+            row = j * m + point
+            for i in range(d):
+                x[row, i] = 0.0
+                rates[row, i] = 0.0
+            for k in range(m + 1):
+                node = j * m + k
+                if node == total:
+                    node = 0
+                value, slope = values[point, k], slopes[point, k]
+                for i in range(d):
+                    x[row, i] += value * nodes[node, i]
+                    rates[row, i] += slope * nodes[node, i]
+
+
+@kernel(types.void(matrix, matrix, vector, f8, vector))
+def fill_residual(slopes, f, widths, T, out):  # type: ignore[no-untyped-def]
+    """Fill the first N m d entries of out with slopes - h T f."""
+    slopes, f, out = borrowed(slopes), borrowed(f), borrowed(out)
+    total, d = f.shape
+    m = total // len(widths)
+    for j in range(len(widths)):
+        step = widths[j] * T
+        for row in range(j * m, (j + 1) * m):
+            for i in range(d):
+                out[row * d + i] = slopes[row, i] - step * f[row, i]
+
+
+@kernel(types.void(matrix, matrix, vector, matrix))
+def to_nodes(at_points, values, widths, out):  # type: ignore[no-untyped-def]
+    """Fill out (N m, d), the nodes' weights in sum_j h_j sum_c values_ck at_points_jc x_jk."""
+    at_points, out = borrowed(at_points), borrowed(out)
+    m = len(values)
+    total, d = out.shape
+    out[:] = 0.0
+    for j in range(total // m):
+        for point in range(m):
+            row = j * m + point
+            for k in range(m + 1):
+                node = j * m + k
+                if node == total:
+                    node = 0
+                weight = widths[j] * values[point, k]
+                for i in range(d):
+                    out[node, i] += weight * at_points[row, i]
+
+
+@kernel(types.void(vector, matrix, vector, matrix))
+def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
+    """Fill out (k, d); the times need not be in order."""
+    mesh, nodes, times, out = borrowed(mesh), borrowed(nodes), borrowed(times), borrowed(out)
+    N = len(mesh) - 1
+    total, d = nodes.shape
+    m = total // N
+    weights = np.empty(m + 1)
+    j = 0
+    for row in range(len(times)):
+        t = times[row]
+        while j > 0 and t < mesh[j]:
+            j -= 1
+        while j < N - 1 and t >= mesh[j + 1]:
+            j += 1
+        place = (t - mesh[j]) / (mesh[j + 1] - mesh[j]) * m
+        for k in range(m + 1):
+            weight = 1.0
+            for other in range(m + 1):
+                if other != k:
+                    weight *= (place - other) / (k - other)
+            weights[k] = weight
+        out[row] = 0.0
+        for k in range(m + 1):
+            node = j * m + k
+            if node == total:
+                node = 0
+            for i in range(d):
+                out[row, i] += weights[k] * nodes[node, i]
+
+
+def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
+    """Values (k, d) at times (k,) in [0, 1] of the periodic solution with nodes (N m, d)."""
+    result = np.empty((len(times), nodes.shape[1]))
+    _interpolate(mesh, nodes, times, result)
+    return result
+
+
+@kernel(types.void(matrix, matrix, vector, vector))
+def _extremes(nodes, fine, low, high):  # type: ignore[no-untyped-def]
+    """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k places."""
+    nodes, fine = borrowed(nodes), borrowed(fine)
+    total, d = nodes.shape
+    m = fine.shape[1] - 1
+    for i in range(d):
+        low[i], high[i] = nodes[0, i], nodes[0, i]
+    for node in range(total):
+        for i in range(d):
+            low[i] = min(low[i], nodes[node, i])
+            high[i] = max(high[i], nodes[node, i])
+    values = np.empty(len(fine))
+    for i in range(d):
+        # The top of a polynomial lies near the highest of its nodes: only those intervals count.
+        margin = 0.002 * (high[i] - low[i])
+        top, bottom = high[i], low[i]
+        for j in range(total // m):
+            near = False
+            for k in range(m + 1):
+                value = nodes[(j * m + k) % total, i]
+                near = near or value > top - margin or value < bottom + margin
+            if not near:
+                continue
+            for row in range(len(fine)):
+                value = 0.0
+                for k in range(m + 1):
+                    value += fine[row, k] * nodes[(j * m + k) % total, i]
+                values[row] = value
+            for row in range(1, len(fine) - 1):
+                left, here, right = values[row - 1], values[row], values[row + 1]
+                bend = left - 2.0 * here + right
+                if (here - left) * (right - here) <= 0.0 and bend != 0.0:
+                    peak = here - (right - left) ** 2 / (8.0 * bend)
+                    high[i], low[i] = max(high[i], peak), min(low[i], peak)
+
+
+def extremes(nodes: Array, degree: int) -> tuple[Array, Array]:
+    """Smallest and largest value (d,) of each state over the orbit with nodes (N m, d)."""
+    low, high = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
+    _extremes(nodes, rule(degree).fine, low, high)
+    return low, high
+
+
+def node_times(mesh: Array, degree: int) -> Array:
+    """Times (N m,) of the nodes, without the last one."""
+    return (mesh[:-1, None] + np.diff(mesh)[:, None] * np.arange(degree) / degree).reshape(-1)
+
+
+@kernel(types.void(vector, matrix, vector, vector))
+def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
+    """Fill share (N,) with h |x^(m+1)|^(1/(m+1)) of each interval."""
+    mesh, nodes, top, share = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(share)
+    N = len(share)
+    total, d = nodes.shape
+    m = total // N
+    derivative, steep = np.empty(N), np.zeros(N)
+    for i in range(d):
+        low, high = nodes[0, i], nodes[0, i]
+        for node in range(total):
+            low, high = min(low, nodes[node, i]), max(high, nodes[node, i])
+        if high <= low:
+            continue
+        for j in range(N):
+            value = 0.0
+            for k in range(m + 1):
+                value += top[k] * nodes[(j * m + k) % total, i]
+            derivative[j] = value / (mesh[j + 1] - mesh[j]) ** m
+        for j in range(N):
+            after = (j + 1) % N
+            spacing = (mesh[j + 1] - mesh[j] + mesh[after + 1] - mesh[after]) / 2.0
+            jump = abs(derivative[after] - derivative[j]) / (spacing * (high - low))
+            steep[j] += jump / 2.0
+            steep[after] += jump / 2.0
+    for j in range(N):
+        steep[j] = steep[j] ** (1.0 / (m + 1))
+    for j in range(N):
+        mean = (steep[j - 1] + 2.0 * steep[j] + steep[(j + 1) % N]) / 4.0
+        share[j] = mean * (mesh[j + 1] - mesh[j])
+
+
+def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> Array:
+    """A mesh on which each interval has the same share of the error of interpolation.
+
+    The error on an interval of width h is h^(m+1) |x^(m+1)|; its root of order m + 1 is spread
+    evenly (de Boor). The derivative of order m + 1 comes from the jumps of that of order m.
+    Each state counts by its own range over the orbit.
+    """
+    widths = np.diff(mesh)
+    share = np.zeros(len(widths))
+    _monitor(mesh, nodes, rule(degree).top, share)
+    total = share.sum()
+    if not 0.0 < total < np.inf:
+        return np.linspace(0.0, 1.0, intervals + 1)
+    # A part is spread evenly over time: no interval gets longer than ten times the mean.
+    share = share / total + 0.1 * widths
+    cumulative = np.concatenate([[0.0], np.cumsum(share)])
+    result = np.interp(np.linspace(0.0, cumulative[-1], intervals + 1), cumulative, mesh)
+    result[0], result[-1] = 0.0, 1.0
+    return result

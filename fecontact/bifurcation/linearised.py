@@ -1,0 +1,117 @@
+"""The collocation equations of a periodic orbit about some u."""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation import elimination
+from fecontact.bifurcation.bordered import Border, Bordered
+from fecontact.bifurcation.floquet import Floquet, floquet_of
+from fecontact.bifurcation.interpolation import fill_residual
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.collocation import Collocation
+
+Array = NDArray[np.float64]
+
+_DIFFERENCE = 1e-5  # relative step in a parameter that moves the period of the forcing
+
+
+class Linearised:
+    """Residual of the collocation equations at u, and solutions of systems with their derivative.
+
+    Residual: the collocation rows (N m d), interval by interval, Gauss point by Gauss point, and
+    the phase condition where the period is unknown.
+    """
+
+    def __init__(self, problem: "Collocation", u: Array) -> None:
+        self.problem, self.u = problem, u
+        self._last: tuple[Array, float, Bordered] | None = None
+
+    @cached_property
+    def _points(self) -> tuple[Array, Array]:
+        return self.problem.at_gauss_points(self.problem.nodes(self.u))
+
+    @cached_property
+    def period(self) -> float:
+        """Period T [s]."""
+        return self.problem.period(self.u)
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual (N m d + 1,), without the last entry for forced systems."""
+        problem = self.problem
+        x, slopes = self._points
+        if "derivatives" in self.__dict__:
+            f = self.derivatives[0]
+        else:
+            f = problem.field.rates(problem.times * self.period, x, problem.parameters(self.u))
+        out = np.empty(problem.size + problem.common - 1)
+        fill_residual(slopes, f, problem.widths, self.period, out)
+        if problem.autonomous:
+            out[-1] = problem.phase_row @ self.u[: problem.size]
+        return out
+
+    @cached_property
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        """Rates and their derivatives to state and parameter at the Gauss points."""
+        problem, T = self.problem, self.period
+        x, _ = self._points
+        values = problem.parameters(self.u)
+        f, J, P = problem.field.derivatives(problem.times * T, x, values, (problem.free,))
+        if not problem.autonomous:
+            self._add_forcing(x, values, P)
+        return f, J, P
+
+    def _add_forcing(self, x: Array, values: Array, P: Array) -> None:
+        """Let P be the derivative of T f(T tau, x, p) / T where the parameter moves T."""
+        problem, T = self.problem, self.period
+        h = _DIFFERENCE * max(abs(values[problem.free]), 1e-3)
+        sides = []
+        for sign in (1.0, -1.0):
+            beside = values.copy()
+            beside[problem.free] += sign * h
+            period = problem.field.forcing_period(beside)
+            assert period is not None
+            sides.append((beside, problem.periods * period))
+        if sides[0][1] == T == sides[1][1]:
+            return
+        up, down = (period * problem.field.rates(problem.times * period, x, beside)
+                    for beside, period in sides)
+        P[:, :, 0] = (up - down) / (2.0 * h * T)
+
+    @cached_property
+    def factors(self) -> elimination.Factors:
+        """The condensed equations."""
+        problem = self.problem
+        f, J, P = self.derivatives
+        factors = elimination.factors_for(problem.intervals, problem.degree, f.shape[1],
+                                          problem.common)
+        elimination.condense(J, f, P, problem.widths, self.period, problem.rule.values,
+                             problem.rule.slopes, int(problem.autonomous), factors)
+        return factors
+
+    @cached_property
+    def _phase(self) -> "Border":
+        row = np.concatenate([self.problem.phase_row, np.zeros(self.problem.common)])
+        return Border(self.factors, row)
+
+    def bordered(self, row: Array, closing: float = 1.0) -> "Bordered":
+        """The matrix [[G_u], [row]]; ``closing`` = -1 is for x(1) = -x(0)."""
+        if self._last is not None and self._last[0] is row and self._last[1] == closing:
+            return self._last[2]
+        borders = [self._phase] if self.problem.autonomous else []
+        bordered = Bordered(self.factors, [*borders, Border(self.factors, row)], closing)
+        self._last = row, closing, bordered
+        return bordered
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        return self.bordered(row).solve(rhs)
+
+    @cached_property
+    def floquet(self) -> Floquet:
+        """Multipliers and stability."""
+        return floquet_of(self.factors, self.problem.autonomous)

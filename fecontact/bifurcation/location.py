@@ -1,0 +1,112 @@
+"""Locating special points between two points of a branch."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.branch import BranchPoint
+from fecontact.bifurcation.corrector import Solution, corrected, finished
+from fecontact.bifurcation.problem import Problem, Settings
+from fecontact.errors import FecontactError
+
+Array = NDArray[np.float64]
+
+# Newton's method for special points goes on to steps of this relative size.
+_EXACT = 1e-10
+
+
+def changed(here: Solution, there: Solution) -> list[str]:
+    """Names of the test functions that change sign from one point to the next."""
+    return [name for name, after in there.tests.items()
+            if (before := here.tests.get(name, 0.0)) * after < 0.0
+            or (after == 0.0 and before != 0.0)]
+
+
+def between(problem: Problem, here: Solution, there: Solution, along: float) -> Array:
+    """Cubic between two points of a branch, at a length along the first one's tangent."""
+    row = problem.weights() * here.tangent
+    length = float(row @ (there.u - here.u))
+    x = along / length
+    slope = there.tangent / float(row @ there.tangent)
+    chord = there.u - here.u
+    return np.asarray(
+        here.u + length * x * (1.0 - x) ** 2 * here.tangent + x * x * (3.0 - 2.0 * x) * chord
+        + length * x * x * (x - 1.0) * slope)
+
+
+def located_between(
+    problem: Problem, here: Solution, there: Solution, settings: Settings
+) -> list[BranchPoint]:
+    """Special points between two regular ones, in order; one without a kind is on a bound."""
+    row = problem.weights() * here.tangent
+    found = []
+    for name in changed(here, there):
+        located = _zero(problem, here, there, settings, _test_value(name),
+                        here.tests[name], there.tests[name], problem.precision)
+        if located is None:
+            continue
+        details = problem.examine(name, located.u, located.linearisation, located.tangent)
+        if details is not None:
+            kind = str(details.get("kind", name))
+            rest = {key: value for key, value in details.items() if key != "kind"}
+            found.append(BranchPoint(located.u, located.tangent, located.values, kind, rest))
+    for bound in settings.bounds:
+        before, after = here.u[-1] - bound, there.u[-1] - bound
+        if before * after < 0.0 or (after == 0.0 and before != 0.0):
+            located = _zero(problem, here, there, settings, _distance_to(bound), before, after,
+                            1e-12)
+            if located is not None:
+                found.append(BranchPoint(located.u, located.tangent, located.values))
+    return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
+
+
+def _test_value(name: str) -> Callable[[Solution], float]:
+    return lambda at: at.tests[name]
+
+
+def _distance_to(bound: float) -> Callable[[Solution], float]:
+    return lambda at: float(at.u[-1]) - bound
+
+
+def _zero(
+    problem: Problem, here: Solution, there: Solution, settings: Settings,
+    test: Callable[[Solution], float], before: float, after: float, precision: float,
+) -> Solution | None:
+    """The solution between two others at which a test function is zero; None at a pole or jump."""
+    from scipy.optimize import brentq
+
+    if after == 0.0:
+        return there
+    row = problem.weights() * here.tangent
+    length = float(row @ (there.u - here.u))
+    best: list[tuple[float, Solution]] = []
+    exact = max(_EXACT, 1e-2 * precision)
+
+    def value(along: float) -> float:
+        if along <= 0.0 or along >= length:
+            return before if along <= 0.0 else after
+        found = corrected(problem, between(problem, here, there, along), row, exact,
+                           2 * settings.iterations)
+        if found is None:
+            raise _LostError
+        # The test functions are those of this very point, not of the last Newton step.
+        u, _, count = found
+        at = finished(problem, u, problem.linearise(u), count, row, settings)
+        result = test(at)
+        best.append((abs(result), at))
+        return result
+
+    try:
+        brentq(value, 0.0, length, xtol=precision * length, rtol=1e-14, maxiter=60,
+               disp=False)
+    except (_LostError, FecontactError):
+        if not best:
+            return None
+    size, at = min(best, key=lambda pair: pair[0])
+    # At a pole or a jump the values do not get small; how small they get else, the precision says.
+    return at if size <= max(1e-3, 50.0 * precision) * max(abs(before), abs(after)) else None
+
+
+class _LostError(Exception):
+    pass

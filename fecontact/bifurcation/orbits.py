@@ -1,0 +1,222 @@
+"""Branches of periodic orbits: following them, and going over to others at special points."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.bifurcation import orbit_starts
+from fecontact.bifurcation.branch import Branch, BranchPoint
+from fecontact.bifurcation.collocation import Collocation
+from fecontact.bifurcation.continuation import Settings, continuation
+from fecontact.bifurcation.equilibria import Equilibrium
+from fecontact.bifurcation.equilibrium_branch import default_scales
+from fecontact.bifurcation.follow import follow
+from fecontact.bifurcation.interpolation import equidistributed
+from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
+from fecontact.bifurcation.vector_field import VectorField
+from fecontact.errors import FecontactError, InputError
+
+Array = NDArray[np.float64]
+
+# Special points of a branch, and the distance to both sides over which they are located again.
+_KINDS = ("fold", "period doubling", "Neimark-Sacker", "branch point")
+_NEAR = (1e-3, 1e-2)
+
+
+def orbits_from_hopf(
+    field: VectorField, branch: Branch, point: BranchPoint, *, settings: Settings | None = None,
+    bounds: tuple[float, float] | None = None, intervals: int = 50, degree: int = 4,
+    scales: ArrayLike | None = None, width: float | None = None,
+) -> Branch:
+    """The branch of orbits that is born at a Hopf point.
+
+    Parameters
+    ----------
+    field : VectorField
+        The system, with the parameters by which it was followed before.
+    branch, point : Branch, BranchPoint
+        A branch of equilibria, and a special point of the kind 'Hopf' on it.
+    settings : Settings, optional
+        How the branch is followed.
+    bounds : (float, float), optional
+        Range of the parameter, as in the settings.
+    intervals, degree : int
+        Collocation at ``degree`` Gauss points on each of so many intervals.
+    scales : (d,) sequence, optional
+        Amplitudes of the states that count as one in the length of a step. Without them they are
+        those of the field, and grow with the orbits.
+    width : float, optional
+        Width of the diagram in the parameter; by default that of the bounds.
+
+    Returns
+    -------
+    Branch
+        Stored of each orbit: 'period' [s], 'multipliers' (d,), 'unstable' (number of those
+        outside the unit circle), 'trivial_error' (distance from one of the multiplier that is
+        one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
+
+        - 'fold',
+        - 'period doubling' and 'Neimark-Sacker': with coefficient and criticality, see
+          :mod:`fecontact.bifurcation.orbit_normal_forms`,
+        - 'branch point': where two branches of orbits cross.
+
+    Raises
+    ------
+    InputError
+        If the point is no Hopf point, or there are no orbits near it.
+    """
+    if point.kind != "Hopf":
+        raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is "
+                         f"{point.kind or 'a regular point'!r}, but orbits are born at points of "
+                         f"the kind 'Hopf'.")
+    free = field.index(branch.name)
+    values = np.array(branch.attributes["parameter_values"], dtype=float)
+    values[free] = point.parameter
+    state = np.ascontiguousarray(point.u[:-1])
+    chosen = settings_of(settings, bounds)
+    sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
+    start = orbit_starts.from_hopf(
+        field, values, free, state, float(point.details["angular_frequency"]),
+        point.details["eigenvector"], intervals, degree,
+        np.append(sizes, width_of(width, chosen, point.parameter)))
+    return _followed(start, chosen, limits)
+
+
+def orbits_from_motion(
+    field: VectorField, parameter: str, times: ArrayLike, states: ArrayLike, *,
+    values: ArrayLike | None = None, period: float | None = None, periods: int = 1,
+    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
+    intervals: int = 50, degree: int = 4, scales: ArrayLike | None = None,
+    width: float | None = None, direction: float = 1.0, both: bool = False,
+) -> Branch:
+    """The branch through the orbit to which a motion has settled.
+
+    Parameters
+    ----------
+    parameter : str
+        The one that is varied.
+    times, states : (k,) and (k, d) array
+        The motion, over at least one period; its end counts.
+    values : (k,) sequence, optional
+        Parameters of the motion, the base values of the field by default.
+    period : float, optional
+        Its period [s]; without it the last return to where the motion ends.
+    periods : int
+        Periods of the forcing in one of the orbit, for forced systems.
+    direction, both
+        Sign of the first change of the parameter; whether to go to both sides.
+
+    field, settings, bounds, intervals, degree, scales, width
+        See :func:`orbits_from_hopf`, and there for the result; the scales are the amplitudes of
+        the motion by default.
+
+    Raises
+    ------
+    InputError
+        If the samples do not cover a period.
+    AnalysisError
+        If Newton's method finds no orbit near them.
+    """
+    free = field.index(parameter)
+    given = field.values if values is None else np.array(values, dtype=float)
+    chosen = settings_of(settings, bounds)
+    amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
+    sizes, limits = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
+    problem, u = orbit_starts.corrected(*orbit_starts.from_samples(
+        field, given, free, times, states, period, intervals, degree, periods,
+        np.append(sizes, width_of(width, chosen, given[free]))))
+    return _followed((problem, u, None), chosen, limits, direction=direction, both=both)
+
+
+def orbits_beyond(
+    field: VectorField, branch: Branch, point: BranchPoint, *, settings: Settings | None = None,
+    bounds: tuple[float, float] | None = None, intervals: int | None = None,
+    direction: float = 1.0,
+) -> Branch:
+    """The other branch at a special point of a branch of orbits.
+
+    At a 'period doubling' it is that of the orbits of twice the period (with twice the intervals,
+    unless ``intervals`` says otherwise), at a 'branch point' the one that crosses. ``direction``
+    chooses the half of a branch that crosses. The others are those of :func:`orbits_from_hopf`.
+
+    Raises
+    ------
+    InputError
+        If no other orbits begin at a point of this kind.
+    """
+    problem, u, tangent = restored(field, branch, point)
+    chosen = settings_of(settings, bounds)
+    if point.kind == "period doubling":
+        problem, u, tangent = orbit_starts.doubled(problem, u, intervals)
+    elif point.kind == "branch point":
+        problem, u, tangent = orbit_starts.crossing(problem, u, tangent)
+    else:
+        raise InputError(f"At the point at {branch.name} = {point.parameter:.6g}, "
+                         f"{point.kind or 'a regular point'!r}, no other orbits begin; choose one "
+                         f"of the kind 'period doubling' or 'branch point'.")
+    tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
+    # The first step leaves the point, where the branches cannot be told apart.
+    return _followed((problem, u + chosen.step * tangent, tangent), chosen, None)
+
+
+def restored(
+    field: VectorField, branch: Branch, point: BranchPoint
+) -> tuple[Collocation, Array, Array]:
+    """Problem, unknowns and tangent of a point of a branch of orbits, to go on from."""
+    known = branch.attributes
+    if "degree" not in known or "mesh" not in point.values:
+        raise InputError("The branch is not one of periodic orbits.")
+    mesh, values = np.asarray(point.values["mesh"]), np.array(known["parameter_values"],
+                                                                  dtype=float)
+    values[field.index(branch.name)] = point.parameter
+    degree, d = int(known["degree"]), field.dimension
+    nodes = point.u[: (len(mesh) - 1) * degree * d].reshape(-1, d).copy()
+    problem = Collocation(field, values, field.index(branch.name), mesh, degree, nodes,
+                          np.asarray(known["scales"]), int(known["periods"]))
+    return problem, point.u, point.tangent
+
+
+def _followed(
+    start: tuple[Collocation, Array, Array | None], settings: Settings, limits: Array | None,
+    **options: Any,
+) -> Branch:
+    problem, u, tangent = start
+    field = problem.field
+    attributes: dict[str, Any] = {
+        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
+        "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
+        "periods": problem.periods}
+    name = list(field.parameters)[problem.free]
+    # What is special is located once more below, on a mesh of its own.
+    branch = follow(replace(problem, limits=limits, precision=1e-3), u, settings, name=name,
+                    tangent=tangent, attributes=attributes, **options)
+    points = tuple(_sharpened(field, branch, index) if point.kind in _KINDS else point
+                   for index, point in enumerate(branch.points))
+    return replace(branch, points=points)
+
+
+def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
+    """A special point located once more, on the mesh that suits its own orbit."""
+    point = branch.points[index]
+    problem, u, _ = restored(field, branch, point)
+    # At branch points the tangent is not defined; that of a neighbour serves for all kinds.
+    neighbour = next((other for other in branch.points[index::-1] if other.kind is None),
+                     branch.points[-1])
+    before, start, direction = restored(field, branch, neighbour)
+    tangent = before.on_mesh(problem.mesh, start, direction)[2]
+    mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, problem.intervals)
+    problem, u, tangent = problem.on_mesh(mesh, u, tangent)
+    problem = replace(problem, renewal=0)
+    # The scales may have grown along the branch.
+    tangent = tangent / np.sqrt(problem.weights() @ tangent**2)
+    for near in _NEAR:
+        settings = Settings(step=2.0 * near, largest_step=2.0 * near, points=2)
+        try:
+            for found in continuation(problem, u - near * tangent, settings, tangent=tangent):
+                if found.kind == point.kind:
+                    return replace(found, tangent=tangent)
+        except FecontactError:
+            continue
+    return point

@@ -1,0 +1,132 @@
+"""What is continued, and how."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import InputError, require_positive
+
+Array = NDArray[np.float64]
+
+
+class Linearisation(Protocol):
+    """The equations about some u."""
+
+    @property
+    def residual(self) -> Array:
+        """The residual G(u) (N,)."""
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution (N + 1,) of ``[[dG/du], [row]] x = rhs``."""
+
+
+class Problem(Protocol):
+    """What is continued. Subclass it to get the defaults of the optional methods.
+
+    Attributes
+    ----------
+    keeps_matrix : bool
+        Whether Newton's method goes on with the matrix that it has as long as that serves; for
+        problems whose factorisation costs far more than a residual and a solution.
+    precision : float
+        Part of a step to which special points are located on it.
+    """
+
+    keeps_matrix: ClassVar[bool] = False
+    precision: float = 1e-12
+
+    def linearise(self, u: Array) -> Linearisation:
+        """The equations about u.
+
+        A FecontactError or values that are not finite make the step fail, and be halved.
+        """
+        ...
+
+    def weights(self) -> Array:
+        """Weights w (N + 1,) of the inner product, positive."""
+        ...
+
+    def point(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, Any]:
+        """What is stored of a solution: numbers, arrays; the same names for each.
+
+        Where it holds 'unstable', a number of unstable directions, a step is halved whose changes
+        of it are more than two for each test function that changes sign.
+        """
+        ...
+
+    def tests(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, float]:
+        """Functions whose zeros are special points, by kind; folds are found without."""
+        return {}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Linearisation, tangent: Array
+    ) -> Mapping[str, Any] | None:
+        """Details of a special point that was located; None if it is none of that kind.
+
+        The key 'kind' replaces the kind.
+        """
+        return {}
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
+        """The problem on a better mesh, with u and tangent on it, after each step; None to stay."""
+        return None
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a branch is followed.
+
+    Lengths are those of the problem's inner product; the problems of this package scale it so
+    that one is the width of the diagram.
+
+    Parameters
+    ----------
+    step, smallest_step, largest_step : float
+        First step, and limits of the steps.
+    points : int
+        Number of regular points after which the branch ends.
+    bounds : tuple
+        Least and largest value of the parameter; the last point lies on the bound.
+    tolerance : float
+        Newton's method ends with a step of this size, relative to 1 + the size of u; what is left
+        then is of the order of its square. Special points are located to 1e-10.
+    iterations : int
+        Newton steps before a step counts as failed.
+    largest_turn : float
+        Largest angle between tangents of neighbouring points [rad].
+    locate : bool
+        Whether special points are located, besides the events.
+    stop_at : sequence of str
+        Kinds of special points, or events, at which the branch ends.
+    events : mapping
+        Functions of the stored values (and 'parameter') whose zeros are points of the kind by
+        which they are called.
+    """
+
+    step: float = 0.01
+    smallest_step: float = 1e-7
+    largest_step: float = 0.05
+    points: int = 400
+    bounds: tuple[float, float] = (-np.inf, np.inf)
+    tolerance: float = 1e-7
+    iterations: int = 7
+    largest_turn: float = 0.6
+    locate: bool = True
+    stop_at: Iterable[str] = ()
+    events: Mapping[str, Callable[[Mapping[str, Any]], float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_positive("Settings", step=self.step, smallest_step=self.smallest_step,
+                         largest_step=self.largest_step, tolerance=self.tolerance,
+                         points=self.points, iterations=self.iterations,
+                         largest_turn=self.largest_turn)
+        if not self.smallest_step <= self.step <= self.largest_step:
+            raise InputError(f"Settings: step = {self.step:g} must lie between smallest_step = "
+                             f"{self.smallest_step:g} and largest_step = {self.largest_step:g}.")
+        low, high = self.bounds
+        if not low < high:
+            raise InputError(f"Settings: bounds = {self.bounds!r} must be two values of the "
+                             f"parameter, the smaller one first.")

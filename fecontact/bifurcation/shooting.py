@@ -1,0 +1,257 @@
+"""Periodic orbits of contact systems by multiple shooting with the compiled integrator."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation import elimination
+from fecontact.bifurcation.bordered import Border, Bordered
+from fecontact.bifurcation.collocation import Collocation
+from fecontact.bifurcation.contact_field import ContactField
+from fecontact.bifurcation.floquet import Floquet, floquet_of
+from fecontact.bifurcation.interpolation import interpolate
+from fecontact.bifurcation.problem import Problem
+from fecontact.errors import AnalysisError, InputError
+from fecontact.integrate.sensitivity import Sensitivity, sensitivity
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.trajectory import Status
+
+Array = NDArray[np.float64]
+
+# Times at which the states of a segment are kept, for their extremes.
+_SAMPLES = 33
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting(Problem):
+    """Equations of a periodic orbit of a contact system, one parameter free.
+
+    The period is cut into K segments; the run from the start x_j of each ends at the start of the
+    next. The integrator chooses its own steps, so that steep friction (k_s = 1e6 s/m) and many
+    states cost no more than in a run; collocation needs a mesh that resolves them. If nothing
+    depends on time, the period T is an unknown, and the phase is fixed by <f(y_0), x_0 - y_0> = 0
+    with the start y_0 of the orbit before; else T is ``periods`` times the period of the forcing.
+
+    The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. What is stored,
+    and the tests for special points, are those of
+    :class:`fecontact.bifurcation.collocation.Collocation`; minimum and maximum are those of
+    samples.
+
+    Attributes
+    ----------
+    field : ContactField
+    values : (k,) array
+        Parameters; the free one is taken from u.
+    free : int
+        Index of the free parameter.
+    mesh : (K + 1,) array
+        Ends of the segments, from 0 to 1.
+    reference : (d,) array
+        Start of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        What counts as one in the length of a step: of each state, the period, the parameter.
+    periods : int
+        Periods of the forcing in one of the orbit.
+    rtol : float
+        Relative tolerance of the runs.
+    """
+
+    field: ContactField
+    values: Array
+    free: int
+    mesh: Array
+    reference: Array
+    scales: Array
+    periods: int = 1
+    rtol: float = 1e-9
+
+    keeps_matrix: ClassVar[bool] = True
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether the period is an unknown."""
+        return self.field.forcing_period(self.values) is None
+
+    @property
+    def common(self) -> int:
+        """Number of unknowns that all segments share."""
+        return 2 if self.autonomous else 1
+
+    def starts(self, u: Array) -> Array:
+        """Starts (K, d) of the segments."""
+        return np.ascontiguousarray(u[: -self.common].reshape(-1, self.field.dimension))
+
+    def period(self, u: Array) -> float:
+        """Period T [s] of the orbit."""
+        if self.autonomous:
+            return float(u[-2])
+        given = self.field.forcing_period(self.parameters(u))
+        assert given is not None
+        return self.periods * given
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[self.free] = u[-1]
+        return values
+
+    @cached_property
+    def phase_row(self) -> Array:
+        """Direction (d,) of the motion at the reference, of length one in the scaled states."""
+        f = self.field.rates(np.zeros(1), self.reference[None], self.values)[0]
+        row = f / self.scales[: len(f)] ** 2
+        return row / np.linalg.norm(row * self.scales[: len(f)])
+
+    def linearise(self, u: Array) -> "Shot":
+        """Residual and linearisation at u; what is not asked for is not computed."""
+        return Shot(self, u)
+
+    def weights(self) -> Array:
+        """Weights of the inner product: mean of the scaled starts, T, parameter."""
+        d = self.field.dimension
+        nodal = (np.diff(self.mesh)[:, None] / self.scales[:d] ** 2).reshape(-1)
+        return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[Shooting, Array, Array]":
+        """The problem for the next step: the phase fixed by u."""
+        return replace(self, reference=self.starts(u)[0].copy(),
+                       values=self.parameters(u)), u, tangent
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
+        return linearisation.floquet.tests(tangent)
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Period, stability, segments and the extremes of the states."""
+        stability = linearisation.floquet
+        states = np.concatenate([run.states for run in linearisation.runs])
+        return {"period": self.period(u), "multipliers": stability.multipliers,
+                "unstable": stability.unstable, "stable": stability.stable,
+                "trivial_error": stability.trivial_error, "mesh": self.mesh,
+                "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """The kind of a torus bifurcation; None for a neutral saddle."""
+        return linearisation.floquet.confirmed(kind)
+
+
+def shooting_from(
+    problem: Collocation, u: Array, segments: int = 4, rtol: float = 1e-9
+) -> tuple[Shooting, Array]:
+    """The same orbit by shooting over so many segments of equal time, with its first guess.
+
+    Raises
+    ------
+    InputError
+        If the field is not that of a contact system, or the number of segments is not positive.
+    """
+    field = problem.field
+    if not isinstance(field, ContactField):
+        raise InputError("Shooting runs contact systems; make the field with contact_field, or "
+                         "stay with collocation.")
+    if not (isinstance(segments, int | np.integer) and segments >= 1):
+        raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
+    mesh = np.linspace(0.0, 1.0, segments + 1)
+    starts = interpolate(problem.mesh, problem.nodes(u), mesh[:-1])
+    result = Shooting(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
+                      problem.scales, problem.periods, rtol)
+    return result, np.concatenate([starts.reshape(-1), u[problem.size :]])
+
+
+class Shot:
+    """Residual of the shooting equations at u, and solutions of systems with their derivative."""
+
+    def __init__(self, problem: Shooting, u: Array) -> None:
+        self.problem, self.u = problem, u
+        self._last: tuple[Array, Bordered] | None = None
+
+    @cached_property
+    def _system(self) -> Any:
+        return self.problem.field.system(self.problem.parameters(self.u))
+
+    @cached_property
+    def _times(self) -> Array:
+        T = self.problem.period(self.u)
+        if not T > 0.0:
+            raise AnalysisError("The period became negative.")
+        return self.problem.mesh * T
+
+    @cached_property
+    def runs(self) -> list[Sensitivity]:
+        """The segments, with derivatives to their starts and the parameter."""
+        problem = self.problem
+        values = problem.parameters(self.u)
+
+        def system_at(_: Any, value: float) -> Any:
+            beside = values.copy()
+            beside[problem.free] = value
+            return problem.field.system(beside)
+
+        return [sensitivity(self._system, float(end), t_start=float(begin), initial=start,
+                            outputs=_SAMPLES, parameter=(system_at, float(self.u[-1])),
+                            rtol=problem.rtol)
+                for start, begin, end in zip(problem.starts(self.u), self._times[:-1],
+                                             self._times[1:], strict=True)]
+
+    @cached_property
+    def _ends(self) -> Array:
+        if "runs" in self.__dict__:
+            return np.array([run.states[-1] for run in self.runs])
+        ends = []
+        for start, begin, end in zip(self.problem.starts(self.u), self._times[:-1],
+                                     self._times[1:], strict=True):
+            run = simulate(self._system, float(end), t_start=float(begin), initial=start,
+                           outputs=2, rtol=self.problem.rtol)
+            if run.status is not Status.FINISHED:
+                raise AnalysisError(f"The run of a segment did not reach its end: "
+                                    f"{run.status.value}")
+            ends.append(run.states[-1])
+        return np.array(ends)
+
+    @cached_property
+    def residual(self) -> Array:
+        """Gaps (K d,) between the segments, and the phase condition if the period is unknown."""
+        problem = self.problem
+        starts = problem.starts(self.u)
+        gaps = (self._ends - np.roll(starts, -1, axis=0)).reshape(-1)
+        if not problem.autonomous:
+            return gaps
+        return np.append(gaps, problem.phase_row @ (starts[0] - problem.reference))
+
+    @cached_property
+    def factors(self) -> elimination.Factors:
+        """The chained equations."""
+        problem = self.problem
+        K, d = len(problem.mesh) - 1, problem.field.dimension
+        factors = elimination.factors_for(K, 1, d, problem.common)
+        values = problem.parameters(self.u)
+        for j, run in enumerate(self.runs):
+            factors.local[j, :, :d] = run.monodromy
+            factors.local[j, :, d : 2 * d] = -np.eye(d)
+            factors.local[j, :, -1] = run.parameter_derivative
+            if problem.autonomous:
+                f = problem.field.rates(np.zeros(1), run.states[-1:].copy(), values)[0]
+                factors.local[j, :, -2] = (problem.mesh[j + 1] - problem.mesh[j]) * f
+        elimination.chain_intervals(factors)
+        return factors
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        if self._last is None or self._last[0] is not row:
+            borders = [Border(self.factors, row)]
+            if self.problem.autonomous:
+                phase = np.zeros_like(row)
+                phase[: len(self.problem.phase_row)] = self.problem.phase_row
+                borders.insert(0, Border(self.factors, phase))
+            self._last = row, Bordered(self.factors, borders, 1.0)
+        return self._last[1].solve(rhs)
+
+    @cached_property
+    def floquet(self) -> Floquet:
+        """Multipliers and stability."""
+        return floquet_of(self.factors, self.problem.autonomous)

@@ -1,0 +1,71 @@
+"""Branches of periodic orbits by shooting."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.bifurcation.branch import Branch
+from fecontact.bifurcation.contact_field import ContactField
+from fecontact.bifurcation.follow import follow
+from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
+from fecontact.bifurcation.orbit_starts import from_samples
+from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.shooting import shooting_from
+from fecontact.errors import AnalysisError, InputError
+
+Array = NDArray[np.float64]
+
+
+def orbits_by_shooting(
+    field: ContactField, parameter: str, times: ArrayLike, states: ArrayLike, *,
+    values: ArrayLike | None = None, period: float | None = None, periods: int = 1,
+    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
+    segments: int = 4, rtol: float = 1e-9, scales: ArrayLike | None = None,
+    width: float | None = None, direction: float = 1.0, both: bool = False,
+) -> Branch:
+    """The branch through the orbit to which a motion of a contact system has settled.
+
+    By multiple shooting with the compiled integrator, for steep friction and many states, where
+    collocation (:func:`fecontact.bifurcation.orbits.orbits_from_motion`) needs many intervals.
+    The stored values have the same names; minimum and maximum are those of samples, and period
+    doublings come without normal forms.
+
+    Parameters
+    ----------
+    field : ContactField
+        From :func:`fecontact.contact_field`.
+    parameter : str
+        The one that is varied.
+    times, states : (k,) and (k, d) array
+        The motion, over at least one period; its end counts.
+    segments : int
+        Pieces of the period, each run for itself: more of them for unstable orbits.
+    rtol : float
+        Relative tolerance of the runs.
+    values, period, periods, settings, bounds, scales, width, direction, both
+        See :func:`fecontact.bifurcation.orbits.orbits_from_motion`.
+
+    Raises
+    ------
+    InputError
+        If the samples do not cover a period, or the field is not one of a contact system.
+    AnalysisError
+        If Newton's method finds no orbit near them.
+    """
+    free = field.index(parameter)
+    given = field.values if values is None else np.array(values, dtype=float)
+    chosen = settings_of(settings, bounds)
+    amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
+    sizes, _ = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
+    problem, u = shooting_from(*from_samples(
+        field, given, free, times, states, period, 200, 4, periods,
+        np.append(sizes, width_of(width, chosen, given[free]))), segments, rtol)
+    attributes = {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
+                  "parameter_values": given, "scales": problem.scales, "segments": segments,
+                  "periods": periods}
+    try:
+        return follow(problem, u, chosen, name=parameter, direction=direction, both=both,
+                      attributes=attributes)
+    except InputError as error:
+        raise AnalysisError(f"No periodic orbit was found at {parameter} = {given[free]:.6g} near "
+                            f"the motion: Newton's method does not converge; run it longer until "
+                            f"it has settled, or take more than {segments} segments.") from error

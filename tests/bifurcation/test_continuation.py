@@ -1,0 +1,188 @@
+"""Pseudo-arclength continuation of curves that are known."""
+
+import numpy as np
+import pytest
+
+from fecontact.bifurcation.branch import Branch, Status
+from fecontact.bifurcation.continuation import Problem, Settings, continuation
+from fecontact.bifurcation.follow import follow
+from fecontact.errors import AnalysisError, InputError
+
+
+class Linear:
+    def __init__(self, residual, matrix):
+        self.residual, self.matrix = residual, matrix
+
+    def solve(self, row, rhs):
+        return np.linalg.solve(np.vstack([self.matrix, row]), rhs)
+
+
+class Plane(Problem):
+    """One equation g(x, p) = 0."""
+
+    def __init__(self, function, slopes):
+        self.function, self.slopes = function, slopes
+
+    def linearise(self, u):
+        return Linear(np.array([self.function(*u)]), np.array([self.slopes(*u)]))
+
+    def weights(self):
+        return np.ones(2)
+
+    def point(self, u, linearisation, tangent):
+        return {"x": u[0], "unstable": int(linearisation.matrix[0, 0] > 0.0)}
+
+
+CUBIC = Plane(lambda x, p: p + x - x**3, lambda x, p: (1.0 - 3.0 * x * x, 1.0))
+CIRCLE = Plane(lambda x, p: x * x + p * p - 1.0, lambda x, p: (2.0 * x, 2.0 * p))
+FOLD = 2.0 / 27.0**0.5
+
+
+def test_s_shaped_curve_and_its_folds():
+    branch = follow(CUBIC, np.array([-1.5, -1.87]), Settings(bounds=(-2.0, 2.0)), name="p")
+    assert branch.status is Status.BOUND
+    assert branch.parameter[-1] == pytest.approx(2.0, rel=1e-12)
+    x, p = branch.column("x"), branch.parameter
+    assert p == pytest.approx(x**3 - x, abs=1e-9)
+    assert [point.kind for point in branch.special] == ["fold", "fold"]
+    assert [point.parameter for point in branch.special] == pytest.approx([FOLD, -FOLD], rel=1e-12)
+    assert [point.u[0] for point in branch.special] == pytest.approx([-(3.0**-0.5), 3.0**-0.5],
+                                                                     rel=1e-8)
+    assert (np.diff(x) > 0.0).all()
+    assert np.diff(x).max() < 0.06
+
+
+def test_closed_curve_ends_at_its_start():
+    branch = follow(CIRCLE, np.array([1.0, 0.0]), Settings(largest_step=0.1))
+    assert branch.status is Status.CLOSED
+    assert branch.points[-1].u == pytest.approx([1.0, 0.0], abs=1e-14)
+    angle = np.unwrap(np.arctan2(branch.parameter, branch.column("x")))
+    assert angle[-1] - angle[0] == pytest.approx(2.0 * np.pi, abs=1e-12)
+    assert (np.diff(angle) > 0.0).all()
+
+
+def test_both_directions_and_restart():
+    settings = Settings(bounds=(-0.3, 0.2))
+    branch = follow(CUBIC, np.array([0.0, 0.0]), settings, both=True)
+    assert branch.parameter[[0, -1]] == pytest.approx([-0.3, 0.2], rel=1e-12)
+    assert (np.diff(branch.parameter) > 0.0).all()
+    middle = branch.points[len(branch) // 2]
+    again = follow(CUBIC, middle.u, settings, tangent=-middle.tangent)
+    assert again.parameter[-1] == pytest.approx(-0.3, rel=1e-12)
+    assert (again.points[0].u == pytest.approx(middle.u, abs=1e-12))
+    turned = branch.reversed()
+    assert (turned.parameter == branch.parameter[::-1]).all()
+    assert (turned.points[3].tangent == -branch.points[-4].tangent).all()
+
+
+def test_events_and_stops():
+    events = {"x = 0.1": lambda values: values["x"] - 0.1}
+    start = np.array([-1.2, -1.2**3 + 1.2])
+    branch = follow(CUBIC, start, Settings(events=events, stop_at=["x = 0.1"]))
+    assert branch.status is Status.STOPPED
+    assert branch.points[-1].kind == "x = 0.1"
+    assert branch.points[-1].u == pytest.approx([0.1, 0.1**3 - 0.1], rel=1e-12)
+    first = follow(CUBIC, start, Settings(stop_at="fold"))
+    assert [point.kind for point in first.special] == ["fold"]
+    plain = follow(CUBIC, start, Settings(locate=False, bounds=(-2.0, 2.0)))
+    assert plain.special == ()
+
+
+def test_poles_are_no_special_points():
+    class Pole(Plane):
+        def tests(self, u, linearisation, tangent):
+            return {"pole": 1.0 / (u[0] - 0.123), "zero": u[0] + 0.321}
+
+    branch = follow(Pole(CUBIC.function, CUBIC.slopes), np.array([-1.0, 0.0]),
+                    Settings(bounds=(-2.0, 2.0)))
+    assert sorted(point.kind for point in branch.special) == ["fold", "fold", "zero"]
+    assert branch.of_kind("zero")[0].u[0] == pytest.approx(-0.321, rel=1e-12)
+
+
+def test_crossings_that_hide_each_other_are_told_apart():
+    """Two pairs cross in one long step: the test changes sign twice, the count of four tells."""
+    class TwoPairs(Plane):
+        def point(self, u, linearisation, tangent):
+            return {"unstable": 2 * int(u[1] > 0.5) + 2 * int(u[1] > 0.52)}
+
+        def tests(self, u, linearisation, tangent):
+            return {"Hopf": (u[1] - 0.5) * (u[1] - 0.52)}
+
+    line = TwoPairs(lambda x, p: x, lambda x, p: (1.0, 0.0))
+    branch = follow(line, np.zeros(2), Settings(step=0.2, largest_step=0.2, bounds=(-1.0, 1.0)))
+    assert [point.parameter for point in branch.special] == pytest.approx([0.5, 0.52], rel=1e-10)
+
+
+def test_end_of_existence_keeps_the_branch():
+    def root(x, p):
+        if p > 0.5:
+            raise AnalysisError("There is nothing beyond 0.5.")
+        return x - p
+
+    branch = follow(Plane(root, lambda x, p: (1.0, -1.0)), np.zeros(2), Settings())
+    assert branch.status is Status.STALLED
+    assert branch.message == "There is nothing beyond 0.5."
+    assert 0.4999 < branch.parameter[-1] <= 0.5
+    assert "what was computed until then is kept" in branch.status.value
+
+
+def test_sharp_corner_is_not_jumped():
+    """A hyperbola's two arms come within 0.02: the steps must not jump from one to the other."""
+    near = Plane(lambda x, p: x * x - p * p - 1e-4, lambda x, p: (2.0 * x, -2.0 * p))
+    branch = follow(near, np.array([1.0, -1.0]), Settings(bounds=(-2.0, 1.0), largest_step=0.2))
+    assert (branch.column("x") > 0.0).all()
+    assert branch.points[-1].u[0] == pytest.approx(np.sqrt(1.0001), rel=1e-12)
+
+
+def test_points_come_one_by_one():
+    steps = continuation(CIRCLE, np.array([1.0, 0.0]), Settings(points=5), direction=-1.0)
+    points = [next(steps) for _ in range(5)]
+    assert all(point.u[1] < 0.0 for point in points[1:])
+    with pytest.raises(StopIteration) as stop:
+        next(steps)
+    assert stop.value.value.status is Status.POINTS
+
+
+def test_no_solution_near_the_start():
+    with pytest.raises(InputError, match="no solution near the start at the parameter 3"):
+        follow(CIRCLE, np.array([0.1, 3.0]), Settings())
+
+
+@pytest.mark.parametrize(("options", "message"), [
+    ({"step": -1.0}, r"step = -1.0 must be a finite number above zero"),
+    ({"step": 0.2}, "step = 0.2 must lie between"),
+    ({"bounds": (1.0, 1.0)}, "the smaller one first"),
+])
+def test_settings_are_checked(options, message):
+    with pytest.raises(InputError, match=message):
+        Settings(**options)
+
+
+def test_files(tmp_path):
+    class Ragged(Plane):
+        def point(self, u, linearisation, tangent):
+            return {"x": u[0], "mesh": np.arange(3 + int(u[0] > 0.0)), "pair": u[0] + 1j}
+
+        def examine(self, kind, u, linearisation, tangent):
+            return {"vector": np.array([1.0, 2j]), "note": "as expected"}
+
+    branch = follow(Ragged(CUBIC.function, CUBIC.slopes), np.array([-1.2, -0.5]),
+                    Settings(bounds=(-1.0, 1.0)), name="p", attributes={"who": ["a", "b"]})
+    path = branch.save(tmp_path / "branch.h5")
+    found = Branch.load(path)
+    assert (found.name, found.status, len(found)) == ("p", branch.status, len(branch))
+    for mine, theirs in zip(branch, found, strict=True):
+        assert (mine.u == theirs.u).all()
+        assert (mine.tangent == theirs.tangent).all()
+        assert mine.kind == theirs.kind
+        assert mine.values["pair"] == theirs.values["pair"]
+        assert mine.values["mesh"].tolist() == theirs.values["mesh"].tolist()
+        assert mine.details.keys() == theirs.details.keys()
+    assert found.of_kind("fold")[0].details["note"] == "as expected"
+    assert found.of_kind("fold")[0].details["vector"].tolist() == [1.0, 2j]
+    assert [bytes(name).decode() for name in found.attributes["who"]] == ["a", "b"]
+    with pytest.raises(InputError, match="stores no value 'y'; it has: 'mesh', 'pair', 'x'"):
+        branch.column("y")
+    path.write_bytes(b"nothing")
+    with pytest.raises(InputError, match="not an HDF5 file"):
+        Branch.load(path)

@@ -1,0 +1,163 @@
+"""Curves of folds and Hopf points in two parameters, against normal forms and polynomials."""
+
+import numpy as np
+import pytest
+from systems_for_bifurcations import friction_slope, lorenz_field, two_mass_field, two_mass_jacobian
+
+from fecontact.bifurcation.branch import Status
+from fecontact.bifurcation.curves import fold_curve, hopf_curve
+from fecontact.bifurcation.equilibria import Equilibrium
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.vector_field import VectorField
+from fecontact.errors import InputError
+
+BOX = {"b": (-2.0, 2.0), "c": (-2.0, 2.0)}
+
+
+def takens(t, x, p, out):
+    """Normal form of Bogdanov and Takens: folds 4 b = c^2, Hopf points b = 0, c < 0, w^2 = -c."""
+    out[0] = x[1]
+    out[1] = p[0] + p[1] * x[0] + x[0] * x[0] - x[0] * x[1]
+
+
+def cusp(t, x, p, out):
+    """Folds 27 b^2 = 4 c^3."""
+    out[0] = p[0] + p[1] * x[0] - x[0] * x[0] * x[0]
+
+
+def bautin(t, x, p, out):
+    """Hopf points b = 0, w = 1, with the first Lyapunov coefficient 2 c."""
+    r = x[0] * x[0] + x[1] * x[1]
+    a = p[0] + p[1] * r - r * r
+    out[0] = a * x[0] - x[1]
+    out[1] = a * x[1] + x[0]
+
+
+def test_bogdanov_takens():
+    field = VectorField.from_function(takens, {"b": -1.0, "c": -1.0}, 2)
+    branch = equilibrium_branch(field, "b", [-0.6, 0.0], bounds=(-2.0, 2.0))
+    hopf = hopf_curve(field, ("b", "c"), branch.of_kind("Hopf")[0], bounds=BOX)
+    assert hopf.status is Status.STOPPED
+    end, = hopf.of_kind("Bogdanov-Takens")
+    assert [end.values["b"], end.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-10)
+    assert end is hopf.points[-1]
+    assert hopf.points[0].values["c"] == pytest.approx(-2.0, rel=1e-12)
+    assert hopf.column("b") == pytest.approx(np.zeros(len(hopf)), abs=1e-12)
+    frequency = np.sqrt(np.abs(hopf.column("c"))) / (2.0 * np.pi)
+    assert hopf.column("frequency_hz") == pytest.approx(frequency, abs=1e-7)
+    fold = fold_curve(field, ("b", "c"), branch.of_kind("fold")[0], bounds=BOX)
+    assert fold.column("b") == pytest.approx(0.25 * fold.column("c") ** 2, abs=1e-12)
+    assert sorted([fold.points[0].values["c"], fold.points[-1].values["c"]]) == pytest.approx(
+        [-2.0, 2.0], rel=1e-12)
+    point, = fold.special
+    assert point.kind == "Bogdanov-Takens"
+    assert [point.values["b"], point.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-10)
+
+
+def test_cusp():
+    field = VectorField.from_function(cusp, {"b": -1.0, "c": 1.0}, 1)
+    branch = equilibrium_branch(field, "b", [-1.5], bounds=(-2.0, 2.0))
+    curve = fold_curve(field, ("b", "c"), branch.of_kind("fold")[0], bounds=BOX)
+    assert 27.0 * curve.column("b") ** 2 == pytest.approx(4.0 * curve.column("c") ** 3, abs=1e-10)
+    point, = curve.special
+    assert point.kind == "cusp"
+    assert [point.values["b"], point.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-10)
+    ends = [curve.points[k].values["c"] for k in (0, -1)]
+    assert ends == pytest.approx([2.0, 2.0], rel=1e-12)
+
+
+def test_bautin():
+    field = VectorField.from_function(bautin, {"b": -1.0, "c": 1.0}, 2)
+    start, = equilibrium_branch(field, "b", bounds=(-2.0, 2.0)).of_kind("Hopf")
+    curve = hopf_curve(field, ("b", "c"), start, bounds=BOX)
+    point, = curve.special
+    assert point.kind == "Bautin"
+    assert [point.values["b"], point.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert curve.column("first_lyapunov") == pytest.approx(2.0 * curve.column("c"), rel=1e-8,
+                                                           abs=1e-9)
+
+
+def zero_hopf(t, x, p, out):
+    """A fold a = x^2 and a pair with the real part b - c + x, w = 3."""
+    out[0] = p[0] - x[0] * x[0]
+    out[1] = (p[1] + x[0]) * x[1] - 3.0 * x[2]
+    out[2] = (p[1] + x[0]) * x[2] + 3.0 * x[1]
+
+
+def double_hopf(t, x, p, out):
+    """Two pairs, with real parts a and b, w = 1 and 2."""
+    out[0], out[1] = p[0] * x[0] - x[1], p[0] * x[1] + x[0]
+    out[2], out[3] = p[1] * x[2] - 2.0 * x[3], p[1] * x[3] + 2.0 * x[2]
+
+
+def test_zero_hopf_and_double_hopf():
+    field = VectorField.from_function(zero_hopf, {"a": 0.25, "b": 0.3}, 3)
+    branch = equilibrium_branch(field, "a", [0.5, 0.0, 0.0], bounds=(-1.0, 1.0), direction=-1.0)
+    box = {"a": (-1.0, 1.0), "b": (-1.0, 1.0)}
+    folds = fold_curve(field, ("a", "b"), branch.of_kind("fold")[0], bounds=box)
+    point, = folds.special
+    assert point.kind == "zero-Hopf"
+    assert [point.values["a"], point.values["b"]] == pytest.approx([0.0, 0.0], abs=1e-10)
+    assert point.details["frequency_hz"] == pytest.approx(3.0 / (2.0 * np.pi), rel=1e-10)
+    curve = hopf_curve(field, ("a", "b"), branch.of_kind("Hopf")[0], bounds=box)
+    assert curve.column("a") == pytest.approx(curve.column("b") ** 2, abs=1e-12)
+    assert "zero-Hopf" in [point.kind for point in curve.special]
+    field = VectorField.from_function(double_hopf, {"a": -1.0, "b": -0.5}, 4)
+    start, = equilibrium_branch(field, "a", bounds=(-1.0, 1.0)).of_kind("Hopf")
+    curve = hopf_curve(field, ("a", "b"), start, bounds=box)
+    point, = curve.of_kind("double Hopf")
+    assert point.values["b"] == pytest.approx(0.0, abs=1e-10)
+    assert point.details["second_frequency_hz"] == pytest.approx(1.0 / np.pi, rel=1e-9)
+    assert curve.column("unstable_besides")[[0, -1]].tolist() in ([0, 2], [2, 0])
+
+
+def characteristic_border(B, v0):
+    """Resultant of the even and odd parts of the characteristic polynomial, zero for l = i w."""
+    a = np.poly(two_mass_jacobian(B, v0))
+    return (a[1] * a[2] * a[3] - a[3] ** 2 - a[1] ** 2 * a[4]) / (abs(a[3]) ** 2 + 1e-300)
+
+
+def test_border_of_steady_sliding_in_force_and_speed():
+    """Both curves satisfy Hurwitz' condition; B and mu' enter as their product."""
+    field = two_mass_field(0.5)
+    branch = equilibrium_branch(field, "B", bounds=(0.0, 12.0))
+    box = {"B": (0.0, 30.0), "ground.speed": (0.5, 3.0)}
+    bautin_points = []
+    for start in branch.of_kind("Hopf"):
+        curve = hopf_curve(field, ("B", "ground.speed"), start, bounds=box)
+        B, speed = curve.column("B"), curve.column("ground.speed")
+        assert (B.min() < 7.5) & (B.max() == pytest.approx(30.0, rel=1e-12))
+        assert speed.min() == pytest.approx(0.5, rel=1e-12)
+        assert B * friction_slope(speed) == pytest.approx(
+            np.full(len(B), start.parameter * friction_slope(1.0)), rel=1e-9)
+        border = [characteristic_border(*pair) for pair in zip(B, speed, strict=True)]
+        assert np.abs(border).max() < 1e-8
+        assert curve.column("frequency_hz") == pytest.approx(
+            np.full(len(B), start.details["frequency_hz"]), rel=1e-9)
+        bautin_points += curve.of_kind("Bautin")
+    assert bautin_points == []
+
+
+def test_lorenz_border():
+    """Hopf points rho = sigma (sigma + b + 3) / (sigma - b - 1)."""
+    field = lorenz_field()
+    start = equilibrium_branch(field, "rho", [1.0, 1.0, 1.0], bounds=(1.5, 30.0)).of_kind("Hopf")[0]
+    curve = hopf_curve(field, ("rho", "sigma"), start,
+                       bounds={"rho": (1.0, 60.0), "sigma": (4.0, 40.0)})
+    sigma, b = curve.column("sigma"), 8.0 / 3.0
+    assert curve.column("rho") == pytest.approx(sigma * (sigma + b + 3.0) / (sigma - b - 1.0),
+                                                rel=1e-9)
+    assert sigma.max() == pytest.approx(40.0, rel=1e-12)
+    assert (curve.column("first_lyapunov") > 0.0).all()
+
+
+def test_kind_errors():
+    field = two_mass_field(0.5)
+    start = Equilibrium(field, field.values, np.zeros(4))
+    with pytest.raises(InputError, match="two different parameters, not 'B' twice"):
+        hopf_curve(field, ("B", "B"), start)
+    with pytest.raises(InputError, match=r"bounds are given for 'v', .*: 'B', 'ground\.speed'"):
+        hopf_curve(field, ("B", "ground.speed"), start, bounds={"v": (0.0, 1.0)})
+    plain = VectorField.from_function(cusp, {"b": -1.0, "c": 1.0}, 1)
+    with pytest.raises(InputError, match="all eigenvalues are real"):
+        hopf_curve(plain, ("b", "c"), Equilibrium(plain, plain.values, np.zeros(1)))

@@ -1,0 +1,92 @@
+"""Bifurcation diagrams: what is drawn, and how."""
+
+import numpy as np
+import pytest
+from systems_for_bifurcations import mode_coupling, two_mass_field
+
+from fecontact.bifurcation.branch import Branch, BranchPoint
+from fecontact.bifurcation.contact_field import contact_field
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.stability_map import stability_map
+from fecontact.errors import InputError
+from fecontact.output.diagrams import (
+    branches_figure,
+    eigenvalues_figure,
+    plot_branches,
+    plot_eigenvalues,
+    plot_stability_map,
+    stability_map_figure,
+)
+
+
+def point(p, x, stable, kind=None):
+    return BranchPoint(np.array([x, p]), np.array([0.0, 1.0]),
+                       {"state": np.array([x, -x]), "stable": stable, "size": 2.0 * x}, kind)
+
+
+BRANCH = Branch("p", (point(0.0, 1.0, True), point(1.0, 2.0, True),
+                      point(1.5, 2.5, True, "Hopf"), point(2.0, 3.0, False),
+                      point(3.0, 4.0, False), point(2.5, 4.5, False, "fold"),
+                      point(2.0, 5.0, True)))
+
+
+def test_stable_parts_are_solid_unstable_ones_dashed():
+    axis = branches_figure([BRANCH], 0).axes[0]
+    lines = [line for line in axis.lines if line.get_linestyle() != "None"]
+    assert [line.get_xdata().tolist() for line in lines] == [
+        [0.0, 1.0, 1.5], [1.5, 2.0, 3.0, 2.5], [2.5, 2.0]]
+    assert [line.is_dashed() for line in lines] == [False, True, False]
+    assert lines[1].get_ydata().tolist() == [2.5, 3.0, 4.0, 4.5]
+    marks = [line for line in axis.lines if line.get_linestyle() == "None"]
+    assert [(line.get_marker(), line.get_xdata()[0], line.get_ydata()[0]) for line in marks] == [
+        ("o", 1.5, 2.5), ("s", 2.5, 4.5)]
+    assert [text.get_text() for text in axis.texts] == ["H", "F"]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
+        "stable", "unstable", "Hopf (H)", "fold (F)"]
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("p", "state 0")
+
+
+def test_quantities_and_numbers_of_points():
+    twice = Branch("p", (*BRANCH.points, point(3.0, 7.0, True, "Hopf"), point(4.0, 8.0, True)))
+    axis = branches_figure([twice, BRANCH], "size", lambda at: 10.0 * at.parameter, "ten p",
+                           names=["first", "second"]).axes[0]
+    assert axis.lines[0].get_xdata().tolist() == [0.0, 10.0, 15.0]
+    assert axis.lines[0].get_ydata().tolist() == [2.0, 4.0, 5.0]
+    # The Hopf point at 1.5 is on both branches, and is marked once.
+    assert [text.get_text() for text in axis.texts] == ["H1", "H2", "F"]
+    assert axis.get_xlabel() == "ten p"
+    assert axis.lines[0].get_color() != axis.lines[3].get_color()
+    with pytest.raises(InputError, match=r"'state' is not one number .* 'size', 'stable'"):
+        branches_figure([BRANCH], "state")
+
+
+def test_flutter_shows_frequencies_that_meet(tmp_path):
+    field = contact_field(mode_coupling(0.1), ["friction.friction_coefficient"])
+    branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(0.0, 1.0))
+    upper, lower = eigenvalues_figure(branch, "friction").axes
+    modes = [line for line in upper.lines if len(line.get_xdata()) == len(branch)]
+    mu = branch.parameter
+    expected = np.emath.sqrt(1.0 - 4.0 * mu / 3.0)
+    w = [np.sqrt(2.0 + sign * expected - 0.0025) for sign in (-1.0, 1.0)]
+    before = mu < 0.7
+    for line, exact in zip(sorted(modes, key=lambda line: line.get_ydata()[0]), w, strict=True):
+        assert line.get_ydata()[before] == pytest.approx(exact.real[before] / (2.0 * np.pi),
+                                                         rel=1e-6)
+    growth = [line.get_ydata() for line in lower.lines if len(line.get_xdata()) == len(branch)]
+    assert np.max(growth[0][-1:] + growth[1][-1:]) == pytest.approx(-0.1, rel=1e-6)
+    assert [text.get_text() for text in upper.texts] == ["0.2251 Hz"]
+    assert plot_eigenvalues(branch, tmp_path / "modes.png").stat().st_size > 10_000
+
+
+def test_map_and_files(tmp_path):
+    found = stability_map(two_mass_field(), {"B": np.linspace(0.5, 9.0, 12),
+                                             "ground.speed": np.linspace(0.8, 2.0, 10)})
+    axis = stability_map_figure(found).axes[0]
+    shown = np.ma.asarray(axis.collections[0].get_array()).reshape(10, 12)
+    assert (shown.mask == (found.unstable == 0).T).all()
+    assert shown.compressed() == pytest.approx(found.frequency_hz.T[~shown.mask])
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("B", "ground.speed")
+    assert plot_stability_map(found, tmp_path / "map.pdf").exists()
+    assert plot_branches(BRANCH, tmp_path / "branch.svg", "size").exists()
+    with pytest.raises(InputError, match="must end in"):
+        plot_branches(BRANCH, tmp_path / "branch.gif")

@@ -1,0 +1,169 @@
+"""Equilibria, complex modes, stability maps: closed forms, and a run in time."""
+
+import numpy as np
+import pytest
+from systems_for_bifurcations import (
+    belt,
+    friction_slope,
+    lorenz_field,
+    mode_coupling,
+    two_mass_field,
+    two_mass_jacobian,
+)
+
+from fecontact import (
+    ConstantFriction,
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    Ground,
+    Load,
+    Material,
+    Mesh,
+    RoughSurface,
+    simulate,
+)
+from fecontact.bifurcation.contact_field import contact_field
+from fecontact.bifurcation.equilibria import find_equilibrium
+from fecontact.bifurcation.stability_map import stability_map
+from fecontact.bifurcation.vector_field import VectorField
+from fecontact.errors import AnalysisError, InputError
+from fecontact.laws.signals import Constant
+
+
+def test_lorenz_equilibria():
+    field = lorenz_field()
+    found = find_equilibrium(field, {"rho": 20.0}, start=[5.0, 5.0, 15.0])
+    root = np.sqrt(19.0 * 8.0 / 3.0)
+    assert found.state == pytest.approx([root, root, 19.0], rel=1e-13)
+    assert found.stable
+    assert found.eigenvalues.sum().real == pytest.approx(-10.0 - 1.0 - 8.0 / 3.0, rel=1e-13)
+    origin = find_equilibrium(field, {"rho": 20.0})
+    assert origin.unstable_directions == 1
+    # (l + b) [(l + sigma) (l + 1) - sigma rho] = 0
+    expected = [0.5 * (-11.0 + np.sqrt(81.0 + 40.0 * 20.0)), -8.0 / 3.0,
+                0.5 * (-11.0 - np.sqrt(81.0 + 40.0 * 20.0))]
+    assert origin.eigenvalues.real == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(("B", "speed"), [(1.0, 1.0), (2.5, 1.0), (9.0, 1.3)])
+def test_two_masses_have_the_eigenvalues_of_the_equations(B, speed):
+    found = find_equilibrium(two_mass_field(B, speed))
+    expected = np.linalg.eigvals(two_mass_jacobian(B, speed))
+    assert np.sort_complex(found.eigenvalues) == pytest.approx(np.sort_complex(expected),
+                                                               abs=1e-12)
+    modes = found.modes
+    pairs = np.sort_complex(expected[expected.imag > 0.0])
+    order = np.argsort(pairs.imag)
+    assert modes.frequencies_hz == pytest.approx(pairs.imag[order] / (2.0 * np.pi), rel=1e-12)
+    assert modes.damping_ratios == pytest.approx(-pairs.real[order] / np.abs(pairs[order]),
+                                                 abs=1e-12)
+    assert modes.growing().size == int((pairs.real > 0.0).sum())
+    # Both springs carry the friction forces B mu.
+    T = found.field.system().basis.contact_T[:, 0]
+    force = B * 0.14 * (1.0 + 1.14 * np.exp(-2.0 * speed)) * np.arctan(100.0 * speed)
+    stiffness = np.array([[3.0, -1.0], [-1.0, 1.0]])
+    assert stiffness @ (T @ found.state[:2]) == pytest.approx([force, force], rel=1e-12)
+
+
+def test_mode_coupling_flutter():
+    """M = I, K = [[2, 1 - 4 mu / 3], [1, 2]]: l^2 = -2 +- sqrt(1 - 4 mu / 3)."""
+    field = contact_field(mode_coupling(), ["friction.friction_coefficient"])
+    for mu in (0.2, 0.5, 0.74, 0.76, 0.9):
+        modes = find_equilibrium(field, {"friction.friction_coefficient": mu}).modes
+        root = np.emath.sqrt(1.0 - 4.0 * mu / 3.0)
+        expected = np.sqrt(-2.0 + np.array([root, -root]) + 0j)
+        growth = np.abs(expected.real).max()
+        assert (modes.damping_ratios * np.abs(modes.eigenvalues)).min() == pytest.approx(
+            -growth, abs=1e-7)
+        assert np.sort(2.0 * np.pi * modes.frequencies_hz) == pytest.approx(
+            np.sort(np.abs(expected.imag)), rel=1e-7)
+        assert bool(modes.damping_ratios.min() < -1e-6) == (mu > 0.75)
+    shape = modes.displacement(field, 0)
+    assert shape.shape == (3, 3)
+    assert shape[2, 0] == pytest.approx(modes.shapes[:2, 0] @ field.system().basis.T[2, 0])
+
+
+def beam(mu=0.55):
+    """A free steel beam on a belt, on a contact so compliant that it is not pressed in fully."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.2, 40), np.linspace(0.0, 0.02, 5))
+    number = np.arange(x.size).reshape(5, 40)
+    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
+                     axis=-1).reshape(-1, 4)
+    mesh = Mesh(np.column_stack([x.ravel(), y.ravel()]), cells,
+                {"contact": np.column_stack([number[0, :-1], number[0, 1:]])})
+    body = ElasticBody(mesh, Material.named("steel"), 0.01)
+    basis = body.modal_basis(20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
+    return ContactSystem(
+        basis, normal=RoughSurface(6e6, 5.2e-6, 6.0), friction=ConstantFriction(mu, 1e6),
+        ground=Ground(speed=0.01), load=Load(14.0),
+        drive=Drive(stiffness_x=5610.0, damping_x=0.768, motion_x=Constant(-9.5 / 5610.0)))
+
+
+def test_flutter_of_a_beam_on_a_belt():
+    """With constant friction: none at 0.2, at 0.55 growth as the motion in time shows it."""
+    system = beam()
+    field = contact_field(system, ["friction.friction_coefficient"])
+    assert find_equilibrium(field, {"friction.friction_coefficient": 0.2}).stable
+    found = find_equilibrium(field)
+    modes = found.modes
+    k = int(np.argmin(modes.damping_ratios))
+    assert modes.growing() == pytest.approx([668.6], abs=0.1)
+    growth = modes.eigenvalues[k]
+    shape, m = modes.shapes[:, k], system.basis.modes
+    size = 1e-9 / np.abs(system.basis.contact_T[:, 1] @ shape[:m]).max()
+    run = simulate(system, 0.02, initial=found.state + size * shape.real, outputs=81, rtol=1e-9)
+    moved = (run.modal_coordinates - found.state[:m]) @ system.basis.T_matrix.T
+    expected = size * (np.exp(growth * run.time)[:, None] * shape[:m]).real @ (
+        system.basis.T_matrix.T)
+    assert np.abs(moved - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+def test_stability_map_of_two_masses():
+    """The border is B mu'(v) = const, where the Jacobian of the equations has it."""
+    B, speed = np.linspace(0.5, 9.0, 18), np.linspace(0.8, 2.0, 13)
+    found = stability_map(two_mass_field(), {"B": B, "ground.speed": speed})
+    for i in range(len(B)):
+        for j in range(len(speed)):
+            expected = np.linalg.eigvals(two_mass_jacobian(B[i], speed[j]))
+            assert found.growth_rate[i, j] == pytest.approx(expected.real.max(), abs=1e-11)
+            assert found.unstable[i, j] == (expected.real > 0.0).sum()
+            critical = expected[np.argmax(expected.real)]
+            assert found.frequency_hz[i, j] == pytest.approx(abs(critical.imag) / (2.0 * np.pi),
+                                                             rel=1e-9)
+    product = np.multiply.outer(B, friction_slope(speed))
+    stable = found.unstable == 0
+    assert product[stable].min() > product[~stable].max()
+
+
+def test_map_has_gaps_where_there_is_no_equilibrium():
+    def fold(t, x, p, out):
+        out[0] = p[0] - x[0] * x[0] + p[1]
+
+    field = VectorField.from_function(fold, {"a": 1.0, "b": 0.0}, 1)
+    found = stability_map(field, {"a": [1.0, 0.5, -0.5], "b": [0.0, 0.25]}, start=[1.0])
+    assert found.unstable.tolist() == [[0, 0], [0, 0], [-1, -1]]
+    assert np.isnan(found.critical[2]).all()
+    assert found.states[:2, :, 0] == pytest.approx(np.sqrt([[1.0, 1.25], [0.5, 0.75]]), rel=1e-9)
+    assert found.growth_rate[:2] == pytest.approx(-2.0 * found.states[:2, :, 0])
+
+
+def test_kind_errors():
+    def nothing(t, x, p, out):
+        out[0] = 1.0 + p[0] * x[0] * x[0]
+
+    field = VectorField.from_function(nothing, {"a": 1.0}, 1)
+    with pytest.raises(AnalysisError, match=r"No equilibrium was found for a = 1 .* give a start"):
+        find_equilibrium(field, start=[0.3])
+    with pytest.raises(InputError, match="must have 1 values"):
+        find_equilibrium(field, start=[0.3, 1.0])
+    driven = belt().with_(**{"drive.amplitude_x": 1e-3, "drive.angular_frequency": 10.0})
+    with pytest.raises(AnalysisError, match=r"driven with the period 0\.628319 s"):
+        find_equilibrium(contact_field(driven, []))
+    free = belt().with_(drive=Drive())
+    with pytest.raises(AnalysisError, match="nothing holds the body against a translation along"):
+        find_equilibrium(contact_field(free, []))
+    with pytest.raises(InputError, match="over two parameters, not 1"):
+        stability_map(field, {"a": [1.0]})
+    with pytest.raises(InputError, match=r"did you mean 'ground\.speed'"):
+        stability_map(two_mass_field(), {"B": [1.0], "ground.sped": [1.0]})

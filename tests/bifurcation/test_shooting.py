@@ -1,0 +1,94 @@
+"""Periodic orbits by shooting: the belt with steep friction, and collocation as a check."""
+
+import numpy as np
+import pytest
+from systems_for_bifurcations import belt, lorenz_field, two_mass_field
+
+from fecontact import simulate
+from fecontact.bifurcation.contact_field import contact_field
+from fecontact.bifurcation.continuation import continuation
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.interpolation import interpolate
+from fecontact.bifurcation.orbit_output import quantity_range
+from fecontact.bifurcation.orbits import orbits_from_hopf, restored
+from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.shooting import shooting_from
+from fecontact.bifurcation.shooting_branch import orbits_by_shooting
+from fecontact.errors import AnalysisError, InputError
+
+
+@pytest.fixture(scope="module")
+def two_masses():
+    field = two_mass_field()
+    sliding = equilibrium_branch(field, "B", bounds=(0.3, 9.0))
+    return field, orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], intervals=150,
+                                   bounds=(0.3, 9.0))
+
+
+@pytest.mark.parametrize("kind", ["fold", "period doubling"])
+def test_special_points_agree_with_collocation(two_masses, kind):
+    field, branch = two_masses
+    point, = branch.of_kind(kind)
+    problem, u, tangent = restored(field, branch, point)
+    shot, v = shooting_from(problem, u, 3, 1e-11)
+    along = np.append(interpolate(problem.mesh, problem.nodes(tangent), shot.mesh[:-1]).reshape(-1),
+                      tangent[problem.size:])
+    along /= np.sqrt(shot.weights() @ along**2)
+    near = Settings(step=2e-3, largest_step=2e-3, points=3)
+    found, = [at for at in continuation(shot, v - 1e-3 * along, near, tangent=along)
+              if at.kind == kind]
+    assert found.parameter == pytest.approx(point.parameter, rel=1e-9)
+    assert found.values["period"] == pytest.approx(point.values["period"], rel=1e-9)
+
+
+def test_multipliers_agree_with_collocation(two_masses):
+    field, branch = two_masses
+    point = min((at for at in branch.points if at.values["stable"]),
+                key=lambda at: abs(at.parameter - 1.5))
+    problem, u, _ = restored(field, branch, point)
+    for segments in (1, 5):
+        shot, v = shooting_from(problem, u, segments, 1e-10)
+        linearised = shot.linearise(v)
+        assert np.abs(linearised.residual).max() < 1e-7
+        assert linearised.floquet.multipliers[:2] == pytest.approx(
+            point.values["multipliers"][:2], rel=1e-6)
+
+
+def test_belt_with_steep_friction():
+    system = belt(speed=1e-3)
+    field = contact_field(system, {"ground.speed": None})
+    run = simulate(system, 12.0, initial=np.array([0.0, 0.0]), outputs=24001, rtol=1e-8)
+    branch = orbits_by_shooting(field, "ground.speed", run.time[-6000:], run.states[-6000:],
+                                bounds=(1e-3, 4e-3), segments=2)
+    first = branch.points[0]
+    row = field.displacement_row(0)
+    assert first.values["period"] == pytest.approx(1.264348, abs=2e-6)
+    assert branch.parameter[-1] == pytest.approx(4e-3, rel=1e-9)
+    assert branch.column("stable").all()
+    # Samples: the largest displacements are met to the square of their spacing.
+    assert row @ first.values["maximum"] == pytest.approx(1.953714e-3, rel=5e-3)
+    assert branch.column("trivial_error").max() < 1e-4
+
+
+def test_kind_errors(two_masses):
+    field, branch = two_masses
+    problem, u, _ = restored(field, branch, branch.points[5])
+    with pytest.raises(InputError, match="segments = 0 must be"):
+        shooting_from(problem, u, 0)
+    t = np.linspace(0.0, 20.0, 400)
+    states = np.stack([np.cos(t), -np.sin(t), np.sin(t), np.cos(t)], axis=1) * 50.0
+    with pytest.raises(AnalysisError, match=r"at B = 1 near the motion: Newton.*4 segments"):
+        orbits_by_shooting(field, "B", t, states, period=1.0)
+    lorenz = lorenz_field()
+    with pytest.raises(InputError, match="contact_field, or stay with collocation"):
+        orbits_by_shooting(lorenz, "rho", t, states[:, :3], period=2.0 * np.pi)
+    shot = orbits_by_shooting_point(field, problem, u)
+    with pytest.raises(InputError, match="found by shooting"):
+        quantity_range(shot, field.displacement_row(0))
+
+
+def orbits_by_shooting_point(field, problem, u):
+    shot, v = shooting_from(problem, u, 3)
+    row = np.zeros(len(v))
+    row[-1] = 1.0
+    return next(continuation(shot, v, Settings(points=1), tangent=row))

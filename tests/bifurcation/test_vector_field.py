@@ -1,0 +1,230 @@
+"""Vector fields: derivatives against closed forms and against each other."""
+
+import math
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+from systems_for_bifurcations import (
+    belt,
+    friction_slope,
+    lorenz,
+    lorenz_field,
+    two_mass_system,
+    with_damping,
+    with_force,
+)
+
+from fecontact import (
+    ContactSystem,
+    Drive,
+    ExponentialFriction,
+    Ground,
+    Harmonic,
+    Load,
+    LuGreFriction,
+    ModalBasis,
+    PointLoad,
+    RoughSurface,
+    Sine,
+    Trace,
+)
+from fecontact.bifurcation.contact_field import contact_field
+from fecontact.bifurcation.vector_field import VectorField
+from fecontact.errors import AnalysisError, InputError
+
+PLACES = np.random.default_rng(4).normal(size=(7, 3)) * 5.0
+TIMES = np.zeros(7)
+
+
+def lorenz_jacobian(t, x, p, out):
+    out[0, 0], out[0, 1], out[0, 2] = -p[1], p[1], 0.0
+    out[1, 0], out[1, 1], out[1, 2] = p[0] - x[2], -1.0, -x[0]
+    out[2, 0], out[2, 1], out[2, 2] = x[1], x[0], -p[2]
+
+
+def expected_lorenz(x, rho=2.0, sigma=10.0, b=8.0 / 3.0):
+    J = np.empty((len(x), 3, 3))
+    for place, out in zip(x, J, strict=True):
+        lorenz_jacobian(0.0, place, (rho, sigma, b), out)
+    P = np.zeros((len(x), 3, 2))
+    P[:, 1, 0], P[:, 2, 1] = x[:, 0], -x[:, 2]
+    return J, P
+
+
+@pytest.mark.parametrize(("options", "way", "tolerance"), [
+    ({}, "complex", 1e-14),
+    ({"differentiation": "differences"}, "differences", 1e-10),
+    ({"jacobian": lorenz_jacobian}, "complex", 1e-14),
+])
+def test_derivatives_of_a_function(options, way, tolerance):
+    field = lorenz_field(**options)
+    assert field.differentiation == way
+    f, J, P = field.derivatives(TIMES, PLACES, field.values, (0, 2))
+    expected_J, expected_P = expected_lorenz(PLACES)
+    assert np.abs(J - expected_J).max() < tolerance * 20.0
+    assert np.abs(P - expected_P).max() < tolerance * 20.0
+    assert (f == field.rates(TIMES, PLACES, field.values)).all()
+    out = np.empty(3)
+    lorenz(0.0, PLACES[2], field.values, out)
+    assert f[2] == pytest.approx(out, rel=1e-14)
+    assert all(array.flags.c_contiguous for array in (f, J, P))
+
+
+def rest(t, x, p, out):
+    out[0] = math.exp(-p[0] * abs(x[0])) * math.atan(p[1] * x[0])
+
+
+@numba.njit
+def magnitude(x):
+    return np.abs(x)
+
+
+def rest_inside(t, x, p, out):
+    out[0] = np.exp(-p[0] * magnitude(x[0])) * np.arctan(p[1] * x[0])
+
+
+@pytest.mark.parametrize("function", [rest, rest_inside])
+def test_what_is_not_analytic_is_differenced(function):
+    """The complex step would lose the derivative of |x|."""
+    field = VectorField.from_function(function, {"b": 2.0, "k": 3.0}, 1)
+    assert field.differentiation == "differences"
+    x = np.array([[0.4], [-0.7]])
+    _, J, _ = field.derivatives(np.zeros(2), x, field.values)
+    exact = np.exp(-2.0 * np.abs(x)) * (-2.0 * np.sign(x) * np.arctan(3.0 * x)
+                                        + 3.0 / (1.0 + 9.0 * x * x))
+    assert J[:, :, 0] == pytest.approx(exact, rel=1e-9)
+    with pytest.raises(InputError, match=r"complex step|complex numbers"):
+        VectorField.from_function(function, {"b": 2.0, "k": 3.0}, 1, differentiation="complex")
+
+
+def test_kind_errors_of_functions():
+    with pytest.raises(InputError, match=r"no parameter 'roh' \(did you mean 'rho'\?\).*'sigma'"):
+        lorenz_field().values_with(roh=3.0)
+    with pytest.raises(InputError, match="must be one of 'automatic', 'complex'"):
+        lorenz_field(differentiation="exact")
+    with pytest.raises(InputError, match="3 numbers above zero"):
+        lorenz_field(scales=[1.0, 2.0])
+
+    def unusable(t, x, p, out):
+        out[0] = x.no_such_thing
+
+    with pytest.raises(InputError, match=r"not one of the form f\(t, x, p, out\)"):
+        VectorField.from_function(unusable, {}, 1)
+
+
+# Contact systems -----------------------------------------------------------------------------
+
+def squared(system, a):
+    return with_force(system, a * a)
+
+
+def test_contact_system_and_its_parameters():
+    system = two_mass_system(2.0)
+    field = contact_field(system, {"B": (2.0, with_force), "D": (0.1, with_damping),
+                                   "ground.speed": None})
+    values = np.array([3.0, 0.15, 1.7])
+    x = np.random.default_rng(1).normal(size=(50, 4))
+    f, J, P = field.derivatives(np.zeros(50), x, values, (0, 1, 2))
+    made = field.system(values)
+    assert f == pytest.approx(np.array([made.rhs(0.0, y) for y in x]), abs=1e-13)
+    assert pytest.approx(np.array([made.jacobian(0.0, y) for y in x]), abs=1e-12) == J
+    # The mass-normalised equations, by hand.
+    T = made.basis.contact_T[:, 0]
+    v = x[:, 2:] @ T.T - 1.7
+    size = np.abs(v)
+    mu = 0.14 * (1.0 + 1.14 * np.exp(-2.0 * size)) * np.arctan(100.0 * v)
+    assert P[:, 2:, 0] == pytest.approx(-mu @ T, abs=1e-11)
+    assert P[:, 2:, 1] == pytest.approx(-x[:, 2:] @ made.basis.damping.T / 0.15, abs=1e-10)
+    assert P[:, 2:, 2] == pytest.approx(3.0 * friction_slope(size) @ T, rel=1e-8, abs=1e-7)
+    assert (P[:, :2] == 0.0).all()
+
+
+@pytest.mark.parametrize("friction", [ExponentialFriction(0.8, 0.5, 3.0, 50.0), LuGreFriction()])
+def test_many_nodes_waves_memory_and_drive(friction):
+    """Rates and Jacobian are those of the system, some nodes open and some closed."""
+    rng = np.random.default_rng(3)
+    T = rng.normal(size=(6, 3, 3))
+    basis = ModalBasis(np.array([0.0, 2.0, 5.0]), 0.1 * np.eye(3), T,
+                       rng.normal(size=(6, 2)), np.ones(4))
+    system = ContactSystem(
+        basis, normal=RoughSurface(10.0, 2.0, 0.5), friction=friction,
+        ground=Ground(0.3, profile=Sine(0.3, 2.0), friction_variation=Sine(0.2, 1.0)),
+        drive=Drive(2.0, 3.0, 0.1, 0.2, 0.4, 0.5, 1.3), load=Load(2.0))
+    field = contact_field(system, ["load.normal"])
+    assert field.dimension == system.size == len(field.state_names)
+    t, x = rng.normal(size=30), rng.normal(size=(30, system.size))
+    f, J, _ = field.derivatives(t, x, field.values)
+    forces = system.contact_history(t, x)[..., 0]
+    assert 0.1 < np.mean(forces > 0.0) < 0.9
+    expected = np.array([system.rhs(*at) for at in zip(t, x, strict=True)])
+    assert np.abs(f - expected).max() < 1e-13 * np.abs(expected).max()
+    assert np.abs(field.rates(t, x, field.values) - f).max() < 1e-13 * np.abs(f).max()
+    expected = np.array([system.jacobian(*at) for at in zip(t, x, strict=True)])
+    assert np.abs(J - expected).max() < 1e-13 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("parameters", [
+    {"B": (2.0, with_force), "ground.speed": None},
+    {"a": (1.4, squared), "ground.speed": None},
+    ["friction.decay", "friction.smoothing_slope", "ground.speed"],
+    ["friction.decay", "friction.smoothing_slope", "ground.speed", "friction.factor",
+     "friction.excess"],
+])
+def test_arrays_are_those_of_the_system_itself(parameters):
+    """Interpolated or not, near the base values and far from them."""
+    field = contact_field(two_mass_system(2.0), parameters)
+    x = np.random.default_rng(2).normal(size=(20, 4))
+    for factor in (1.0, 1.02, 0.7, 3.0, 40.0, 0.05, 2.0):
+        values = field.values * factor
+        f = field.rates(np.zeros(20), x, values)
+        made = field.system(values)
+        expected = np.array([made.rhs(0.0, y) for y in x])
+        assert np.abs(f - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def test_only_what_is_affine_is_interpolated():
+    assert contact_field(two_mass_system(), ["ground.speed"])._family.varying == {
+        "ground_motion_parameters"}
+    assert contact_field(two_mass_system(), {"a": (1.4, squared)})._family.varying is None
+
+
+def test_values_out_of_range_are_refused_however_near_the_base():
+    field = contact_field(two_mass_system(0.01), {"B": (0.01, with_force)})
+    x = np.zeros((1, 4))
+    field.rates(np.zeros(1), x, np.array([0.0]))
+    with pytest.raises(InputError, match=r"force = .* must be zero or above"):
+        field.rates(np.zeros(1), x, np.array([-1e-6]))
+
+
+@pytest.mark.parametrize(("parameters", "message"), [
+    (["ground.sped"], r"no parameter 'ground.sped' \(did you mean 'ground.speed'"),
+    (["normal.force"], "not one number; give a pair"),
+    ({"B": (None, with_force)}, "its value None must be a number"),
+    ({"B": with_force}, "must be a number, None .* or a pair"),
+])
+def test_kind_errors_of_contact_parameters(parameters, message):
+    with pytest.raises(InputError, match=message):
+        contact_field(two_mass_system(), parameters)
+
+
+def test_forcing_periods():
+    drive = Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=4.0)
+    system = belt().with_(drive=drive)
+    assert contact_field(belt(), ["ground.speed"]).forcing_period(np.ones(1)) is None
+    field = contact_field(system, ["drive.angular_frequency"])
+    assert field.forcing_period(np.array([5.0])) == pytest.approx(2.0 * np.pi / 5.0)
+    both = system.with_(load=Load(forces=(PointLoad(signal=Harmonic(1.0, 6.0)),)))
+    assert contact_field(both, []).forcing_period(np.empty(0)) == pytest.approx(np.pi)
+    wavy = belt().with_(**{"ground.profile": Sine(1e-6, 6e-3)})
+    assert contact_field(wavy, ["ground.speed"]).forcing_period(np.array([3e-3])) == 2.0
+    odd = both.with_(**{"drive.angular_frequency": 4.0 * np.sqrt(2.0)})
+    with pytest.raises(AnalysisError, match="no common multiple"):
+        contact_field(odd, []).forcing_period(np.empty(0))
+    trace = wavy.with_(**{"ground.profile": Trace((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.5, 0.0))})
+    with pytest.raises(AnalysisError, match=r"ground\.profile does not repeat"):
+        contact_field(trace, []).forcing_period(np.empty(0))
+    rough = trace.with_(ground=replace(trace.ground, friction_variation=Sine(0.1, 2.0),
+                                       profile=replace(trace.ground.profile, periodic=True)))
+    assert contact_field(rough, []).forcing_period(np.empty(0)) == pytest.approx(6.0 / 12e-3)
