@@ -74,11 +74,12 @@ from .output.analysis_plots import (
     plot_spectrum,
 )
 from .output.dataset import to_xarray
-from .output.diagrams import plot_branches, plot_eigenvalues, plot_stability_map
+from .output.diagrams import plot_branches
 from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
+from .output.stability_plots import plot_eigenvalues, plot_stability_map
 from .output.store import read_case, write_case
 from .points import Patch
 from .rows import rows_from_dofs

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation import contact_field_kernels as kernels
-from fecontact.bifurcation.forcing import forcing_period
+from fecontact.bifurcation.forcing import common_period
 from fecontact.bifurcation.system_family import SystemFamily
 from fecontact.bifurcation.vector_field import Array, VectorField
 from fecontact.system import ContactSystem
@@ -34,6 +34,7 @@ class ContactField(VectorField):
                               for k in range(base.memory)))
         self._affine = [False] * len(self.parameters)
         self._calls = [0] * len(self.parameters)
+        self._moves: list[tuple[float, float] | None] = [None] * len(self.parameters)
         varying = family.varying
         self._constant_period = varying is not None and not self._moves_forcing(varying)
 
@@ -103,12 +104,23 @@ class ContactField(VectorField):
         """Small beside the value, and beside the widths of the laws where it moves the ground."""
         value = abs(float(values[index]))
         h = _STEP * (value if value > 0.0 else 1.0)
-        name = list(self.parameters)[index]
-        if name == "ground.speed":
-            return max(min(h, 0.005 * self._family.base.velocity_scale), 1e-8 * value)
-        if name == "gap":
-            return max(min(h, 0.002 * self._family.base.penetration_scale), 1e-8 * value)
-        return h
+        speed, gap = self._moved(values, index, h)
+        base = self._family.base
+        if speed > 0.0:
+            h = min(h, 0.005 * base.velocity_scale / speed)
+        if gap > 0.0:
+            h = min(h, 0.002 * base.penetration_scale / gap)
+        return max(h, 1e-8 * value)
+
+    def _moved(self, values: Array, index: int, h: float) -> tuple[float, float]:
+        """Rates of the ground's motion and of the gaps with a parameter; found once."""
+        known = self._moves[index]
+        if known is None:
+            here, there = self._family.arrays(values), self._family.beside(values, index, h)
+            speed, gap = (float(np.abs(getattr(there, name) - getattr(here, name)).max()) / h
+                          for name in ("ground_motion_parameters", "gap"))
+            known = self._moves[index] = (speed, gap)
+        return known
 
     def forcing_period(self, values: Array) -> float | None:
         """Common period [s] of drive, loads and ground; None where nothing depends on time.
@@ -118,11 +130,11 @@ class ContactField(VectorField):
         AnalysisError
             If what is given in time has no common period.
         """
-        return self._base_period if self._constant_period else forcing_period(self.system(values))
+        return self._base_period if self._constant_period else common_period(self.system(values))
 
     @cached_property
     def _base_period(self) -> float | None:
-        return forcing_period(self.system())
+        return common_period(self.system())
 
     def displacement_row(self, point: str | int, direction: str = "x") -> Array:
         """Row (d,) that gives the displacement of a point [m] from a state.

@@ -19,6 +19,10 @@ from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
 
+# Part of the first step below which corners are taken for corners of the branch itself, as contact
+# laws with kinks make them.
+_SHORT = 1e-3
+
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
 
@@ -61,6 +65,10 @@ def continuation(
     FecontactError
         If there is no solution near the start.
     """
+    low, high = settings.bounds
+    if not low <= u[-1] <= high:
+        raise InputError(f"The start lies at {u[-1]:.6g}, outside the bounds of the parameter, "
+                         f"{low:g} to {high:g}.")
     start = start_of(problem, u, settings, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
     here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
@@ -125,13 +133,13 @@ def _believable(
     problem: Problem, here: Solution, there: Solution, step: float, settings: Settings
 ) -> bool:
     """Whether a step neither turns too much nor passes over more than its tests can tell."""
+    if step < _SHORT * settings.step:
+        return True
     turn = float(problem.weights() * here.tangent @ there.tangent)
     if turn < np.cos(settings.largest_turn):
         return False
     jump = abs(int(there.values.get("unstable", 0)) - int(here.values.get("unstable", 0)))
-    if not settings.locate or step < 1e-3 * settings.step:
-        return True
-    return jump <= 2 * len(changed(here, there))
+    return not settings.locate or jump <= 2 * len(changed(here, there))
 
 
 def _next_step(

@@ -2,7 +2,7 @@
 
 Both are minimally augmented systems: beside f(x, p) = 0 the border g of
 
-    [[J - l I, b], [c, 0]] [v, g] = [0, 1]
+    [[J - l I, b], [c, 0]] [v, g] = [0, 1]      (states in units of their scales)
 
 is to vanish, which it does where l is an eigenvalue: l = 0 for a fold, l = i w for a Hopf point.
 Its derivatives follow from those of J along v, ``dg = -w (dJ) v``, w the left solution.
@@ -31,8 +31,8 @@ from fecontact.errors import AnalysisError
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-# Below this part of the largest eigenvalue l is taken for it in divisions by l.
-_NEAR_ZERO = 1e-7
+# Part of the first w^2 that takes its place in divisions by l where it is smaller.
+_NEAR_ZERO = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,20 +83,20 @@ class PlaneCurve(Problem):
         return x, f[0], J[0], P[0]
 
     def bordered(self, J: Array, shift: complex) -> tuple[Any, Any, Any]:
-        """Right and left vectors v and w (d,), and g."""
+        """Right and left vectors v and w (d,), and g; the borders are in the scales of states."""
         d = len(J)
         M = np.zeros((d + 1, d + 1), dtype=complex if isinstance(shift, complex) else float)
-        M[:d, :d] = J - shift * np.eye(d)
+        M[:d, :d] = scaled(J, self.scales) - shift * np.eye(d)
         M[:d, d], M[d, :d] = self._b, self._c
         unit = np.zeros(d + 1)
         unit[d] = 1.0
         right, left = np.linalg.solve(M, unit), np.linalg.solve(M.T, unit)
-        return right[:d], left[:d], right[d]
+        return right[:d] * self.scales, left[:d] / self.scales, right[d]
 
     def curvature(self, x: Array, u: Array, direction: Array) -> Array:
         """Derivative (d, d + 2) of [J, P] along a direction (d,)."""
         return bend(self.field, x, self.values(u), np.ascontiguousarray(direction), self.scales,
-                    self.active).first
+                    self.active, every=4)[0].first
 
     def renewed(self, u: Array, b: Array, c: Array) -> "PlaneCurve":
         """The same curve with other borders, and sizes that grow with the states."""
@@ -130,7 +130,7 @@ class FoldCurve(PlaneCurve):
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
         """The same curve with borders that belong to u."""
-        v, w = null_vectors(self.evaluated(u)[2])
+        v, w = null_vectors(scaled(self.evaluated(u)[2], self.scales))
         return self.renewed(u, w if w @ self._b > 0.0 else -w,
                             v if v @ self._c > 0.0 else -v), u, tangent
 
@@ -142,7 +142,7 @@ class FoldCurve(PlaneCurve):
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
         """Points of codimension two."""
         v, w = linearisation.made["v"], linearisation.made["w"]
-        v, w = v / np.linalg.norm(v), w / np.linalg.norm(w)
+        w = w / (np.linalg.norm(w * self.scales) * np.linalg.norm(v / self.scales))
         quadratic = linearisation.made["curvature"][:, : len(v)] @ v
         return {"cusp": float(w @ quadratic), "Bogdanov-Takens": float(w @ v),
                 "zero-Hopf": pair_test(_others(linearisation.jacobian, 0.0, 1))}
@@ -165,7 +165,7 @@ class HopfCurve(PlaneCurve):
         """The augmented equations about u."""
         x, f, J, P = self.evaluated(u)
         d = len(x)
-        least = (_NEAR_ZERO * np.abs(J).max()) ** 2
+        least = _NEAR_ZERO * self._sizes[d]
         square = u[d] if abs(u[d]) > least else (least if u[d] >= 0.0 else -least)
         root = complex(np.sqrt(complex(-square)))
         g: list[Any] = []
@@ -196,7 +196,8 @@ class HopfCurve(PlaneCurve):
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
         """The same curve with borders that belong to u."""
-        b, c = hopf_borders(self.evaluated(u)[2], float(u[self.field.dimension]))
+        J = scaled(self.evaluated(u)[2], self.scales)
+        b, c = hopf_borders(J, float(u[self.field.dimension]))
         return self.renewed(u, b, c), u, tangent
 
     def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
@@ -210,12 +211,12 @@ class HopfCurve(PlaneCurve):
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
         """Points of codimension two."""
         square = float(u[self.field.dimension])
-        J = linearisation.jacobian
-        scaled = J / np.abs(J).max()
-        sign = np.linalg.slogdet(scaled)[0]
+        J = scaled(linearisation.jacobian, self.scales)
+        J = J / np.abs(J).max()
+        sign = np.linalg.slogdet(J)[0]
         return {"Bogdanov-Takens": square, "Bautin": self._lyapunov(u, linearisation),
-                "double Hopf": pair_test(_others(J, square, 2)),
-                "zero-Hopf": float(sign * np.linalg.svd(scaled, compute_uv=False)[-1])}
+                "double Hopf": pair_test(_others(linearisation.jacobian, square, 2)),
+                "zero-Hopf": float(sign * np.linalg.svd(J, compute_uv=False)[-1])}
 
     def _lyapunov(self, u: Array, linearisation: _Augmented) -> float:
         """First Lyapunov coefficient, computed once; NaN beyond a Bogdanov-Takens point."""
@@ -242,6 +243,11 @@ class HopfCurve(PlaneCurve):
             return {"second_frequency_hz": abs(nearest.imag) / (2.0 * np.pi)} if nearest.imag \
                 else None
         return None if kind == "fold" else {}
+
+
+def scaled(J: Array, scales: Array) -> Array:
+    """Jacobian of the states in units of their scales."""
+    return np.asarray(J * scales / scales[:, None])
 
 
 def hopf_borders(J: Array, square: float) -> tuple[Array, Array]:

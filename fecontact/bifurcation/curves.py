@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
-from fecontact.bifurcation.curve_problems import FoldCurve, HopfCurve, PlaneCurve, hopf_borders
+from fecontact.bifurcation.curve_problems import (
+    FoldCurve,
+    HopfCurve,
+    PlaneCurve,
+    hopf_borders,
+    scaled,
+)
 from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
@@ -18,6 +24,8 @@ from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
+
+_GROWTH = 1e4
 
 
 def fold_curve(
@@ -55,10 +63,10 @@ def fold_curve(
     InputError
         If a parameter is unknown, or there is no fold near the point.
     """
-    begin, active, scales, limits, widths = _beginning(field, parameters, point, bounds, scales,
+    begin, active, sizes, limits, widths = _beginning(field, parameters, point, bounds, scales,
                                                        values)
-    v, w = null_vectors(begin.jacobian)
-    problem = FoldCurve(field, begin.values, active, np.concatenate([scales, widths]),
+    v, w = null_vectors(scaled(begin.jacobian, sizes))
+    problem = FoldCurve(field, begin.values, active, np.concatenate([sizes, widths]),
                         np.concatenate([limits, widths]), w, v)
     u = np.concatenate([begin.state, begin.values[list(active)]])
     return _followed(problem, u, parameters, bounds, settings, both, ())
@@ -83,15 +91,15 @@ def hopf_curve(
     InputError
         If a parameter is unknown, or there is no Hopf point near the point.
     """
-    begin, active, scales, limits, widths = _beginning(field, parameters, point, bounds, scales,
+    begin, active, sizes, limits, widths = _beginning(field, parameters, point, bounds, scales,
                                                        values)
     if not (begin.eigenvalues.imag > 0.0).any():
         raise InputError(f"There is no Hopf point near {parameters[0]} = "
                          f"{begin.values[active[0]]:.6g}: all eigenvalues are real.")
     square = critical_pair(begin.jacobian)[0].imag ** 2
-    b, c = hopf_borders(begin.jacobian, square)
-    problem = HopfCurve(field, begin.values, active, np.concatenate([scales, [square], widths]),
-                        np.concatenate([limits, [100.0 * square], widths]), b, c)
+    b, c = hopf_borders(scaled(begin.jacobian, sizes), square)
+    problem = HopfCurve(field, begin.values, active, np.concatenate([sizes, [square], widths]),
+                        np.concatenate([limits, [_GROWTH * square], widths]), b, c)
     u = np.concatenate([begin.state, [square], begin.values[list(active)]])
     return _followed(problem, u, parameters, bounds, settings, both, ("Bogdanov-Takens",))
 
@@ -117,7 +125,7 @@ def _beginning(
         begin = Equilibrium(field, given, np.ascontiguousarray(point.u[:-1]))
     if scales is None:
         sizes = np.maximum(default_scales(begin), np.abs(begin.state))
-        limits = 100.0 * sizes
+        limits = _GROWTH * sizes
     else:
         sizes = limits = np.array(scales, dtype=float)
     widths = []

@@ -45,13 +45,13 @@ class Equilibrium:
 
     @property
     def stable(self) -> bool:
-        """Whether all eigenvalues have negative real parts."""
-        return bool(self.eigenvalues[0].real < 0.0)
+        """Whether no eigenvalue has a positive real part."""
+        return self.unstable_directions == 0
 
     @property
     def unstable_directions(self) -> int:
-        """Number of eigenvalues with positive real parts."""
-        return int((self.eigenvalues.real > 0.0).sum())
+        """Number of eigenvalues with positive real parts; see :func:`unstable_count`."""
+        return int(unstable_count(self.eigenvalues))
 
     @cached_property
     def modes(self) -> "ComplexModes":
@@ -111,6 +111,17 @@ def sorted_eigenvalues(jacobian: Array) -> ComplexArray:
     """Eigenvalues (d,), the largest real part first, pairs with the positive frequency first."""
     found = np.linalg.eigvals(jacobian).astype(complex)
     return np.asarray(found[np.lexsort((-found.imag, -found.real))])
+
+
+def unstable_count(eigenvalues: ComplexArray) -> NDArray[np.int64]:
+    """Number (...) of eigenvalues (..., d) with positive real parts.
+
+    Real parts below 1e-10 of the eigenvalue, or 1e-13 of the largest one, count as zero: those of
+    undamped modes and of rigid ones are round-off.
+    """
+    size = np.abs(eigenvalues)
+    least = 1e-10 * size + 1e-13 * size.max(axis=-1, keepdims=True)
+    return np.asarray((eigenvalues.real > least).sum(axis=-1))
 
 
 def find_equilibrium(

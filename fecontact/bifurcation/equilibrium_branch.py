@@ -17,6 +17,8 @@ from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
 
+_GROWTH = 1e4
+
 
 def equilibrium_branch(
     field: VectorField,
@@ -36,7 +38,8 @@ def equilibrium_branch(
     positive real part) and 'stable'. Special points are
 
     - 'fold': with its null_vector and quadratic coefficient,
-    - 'Hopf': angular_frequency, frequency_hz, period, eigenvector, first_lyapunov and criticality
+    - 'Hopf': angular_frequency, frequency_hz, period, eigenvector, crossing_speed (rate of the real
+      part with the parameter), first_lyapunov and criticality
       ('supercritical', 'subcritical' or 'undecided', see
       :func:`fecontact.bifurcation.normal_forms.hopf`),
     - 'branch point': null_vector, and other_tangent for :func:`switched_branch`.
@@ -60,7 +63,7 @@ def equilibrium_branch(
     scales : sequence, optional
         Sizes (d,) of the states in the diagram, for arclengths; by default those of the field or
         the largest state at the start, growing with the
-        states up to a hundred times that.
+        states up to 1e4 times that.
     width : float, optional
         Width of the diagram in the parameter; by default that of the bounds, or the size of the
         parameter at the start.
@@ -120,6 +123,8 @@ def switched_branch(
     for side in (-1.0, 1.0) if both else (1.0,):
         # The first step leaves the branch point, where the two directions cannot be told apart.
         first = point.u + side * chosen.step * tangent
+        if not chosen.bounds[0] <= first[-1] <= chosen.bounds[1]:
+            continue
         branch = follow(problem, first, chosen, name=parameter, tangent=side * tangent,
                         attributes=_attributes(field, begin))
         ends.append(branch)
@@ -128,6 +133,9 @@ def switched_branch(
             points.append(replace(point, tangent=tangent))
         else:
             points = [*(points or [replace(point, tangent=tangent)]), *branch.points]
+    if not ends:
+        raise InputError(f"The other branch leaves the bounds of {parameter} at once, at "
+                         f"{point.parameter:.6g}; widen them.")
     return replace(ends[-1], points=tuple(points))
 
 
@@ -149,16 +157,27 @@ def _problem(
         span = chosen.bounds[1] - chosen.bounds[0]
         width = span if np.isfinite(span) else abs(float(begin.values[index])) or 1.0
     sizes = default_scales(begin) if scales is None else np.array(scales, dtype=float)
-    limits = 100.0 * sizes if scales is None else None
+    limits = _GROWTH * sizes if scales is None else None
     return EquilibriumProblem(field, begin.values, index, sizes, width, limits), chosen
 
 
 def default_scales(begin: Equilibrium) -> Array:
-    """Sizes (d,) of the states: those of the field, for contact systems the largest state."""
-    if not isinstance(begin.field, ContactField):
-        return begin.field.state_scales(begin.values)
-    largest = float(np.abs(begin.state).max())
-    return np.full(begin.field.dimension, largest or 1.0)
+    """Sizes (d,) of the states, for arclengths and differences.
+
+    Those of the field; for contact systems the largest displacement, and for velocities that
+    times the frequency of the least damped mode.
+    """
+    field = begin.field
+    if not isinstance(field, ContactField):
+        return field.state_scales(begin.values)
+    system = field.system(begin.values)
+    m = system.basis.modes
+    displacement = float(np.abs(begin.state[:m]).max()) or 1.0
+    modes = begin.modes
+    w = (float(np.abs(modes.eigenvalues[np.argmin(modes.damping_ratios)]))
+         if len(modes.eigenvalues) else 1.0)
+    return np.concatenate([np.full(m, displacement), np.full(m, w * displacement),
+                           system.memory_scales])
 
 
 def _attributes(field: VectorField, begin: Equilibrium) -> dict[str, Any]:

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.equilibria import sorted_eigenvalues
+from fecontact.bifurcation.directional import bend
+from fecontact.bifurcation.equilibria import sorted_eigenvalues, unstable_count
 from fecontact.bifurcation.normal_forms import (
     branching_tangents,
+    critical_pair,
     fold_coefficient,
     hopf,
     null_vectors,
@@ -25,6 +27,9 @@ ComplexArray = NDArray[np.complex128]
 # Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.
 _TRANSVERSAL = 1e-5
 _HUGE = 1e100
+# Rate along the branch, relative to the largest eigenvalue, below which a pair does not cross the
+# imaginary axis but lies on it, as those of undamped modes do.
+_CROSSING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +98,7 @@ class EquilibriumProblem(Problem):
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """State, stability and eigenvalues."""
         eigenvalues = linearisation.eigenvalues
-        unstable = int((eigenvalues.real > 0.0).sum())
+        unstable = int(unstable_count(eigenvalues))
         return {"state": u[:-1].copy(), "unstable": unstable, "stable": unstable == 0,
                 "eigenvalues": eigenvalues}
 
@@ -112,7 +117,7 @@ class EquilibriumProblem(Problem):
     ) -> Mapping[str, Any] | None:
         """Details of a fold, Hopf or branch point; None for what only looks like one."""
         if kind == "Hopf":
-            return self._hopf(u, linearisation)
+            return self._hopf(u, linearisation, tangent)
         x, values = np.ascontiguousarray(u[:-1]), self.values(u)
         v, w = null_vectors(linearisation.jacobian)
         if kind == "fold":
@@ -126,21 +131,36 @@ class EquilibriumProblem(Problem):
             return {"null_vector": v} | ({} if other is None else {"other_tangent": other})
         return {}
 
-    def _hopf(self, u: Array, linearisation: Any) -> Mapping[str, Any] | None:
-        """Details of a Hopf point; None for a pair of real eigenvalues of opposite sign."""
+    def _hopf(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any] | None:
+        """Details of a Hopf point; None for real eigenvalues, or a pair that does not cross."""
         if not crossing_is_complex(linearisation.eigenvalues):
             return None
         x = np.ascontiguousarray(u[:-1])
+        speed = self._crossing_speed(u, linearisation, tangent)
+        if abs(speed) <= _CROSSING * np.abs(linearisation.eigenvalues).max():
+            return None
         found = hopf(self.field, x, self.values(u), self.scales)
         return {
             "angular_frequency": found.angular_frequency,
             "frequency_hz": found.angular_frequency / (2.0 * np.pi),
             "period": 2.0 * np.pi / found.angular_frequency,
+            "crossing_speed": speed / float(tangent[-1]) if tangent[-1] else np.inf,
             "eigenvector": found.eigenvector,
             "first_lyapunov": found.first_lyapunov,
             "first_lyapunov_error": found.error,
             "criticality": found.criticality,
         }
+
+
+    def _crossing_speed(self, u: Array, linearisation: Any, tangent: Array) -> float:
+        """Rate of the critical pair's real part along the branch: Re p^H (dJ/ds) q."""
+        _, q, p = critical_pair(linearisation.jacobian)
+        values = self.values(u)
+        shift = np.zeros(len(values))
+        shift[self.index] = tangent[-1]
+        bent, _ = bend(self.field, np.ascontiguousarray(u[:-1]), values,
+                       np.ascontiguousarray(tangent[:-1]), self.scales, (), shift, every=4)
+        return float(np.vdot(p, bent.first @ q).real)
 
 
 def pair_test(eigenvalues: ComplexArray) -> float:

@@ -5,8 +5,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.errors import AnalysisError
+from fecontact.laws.fourier_series import FourierSeries
 from fecontact.laws.profile_base import Profile
-from fecontact.laws.profiles import FourierSeries, RandomRoughness, Sine
+from fecontact.laws.profiles import Sine
+from fecontact.laws.random_roughness import RandomRoughness
 from fecontact.laws.signals import Constant, Harmonic, Harmonics
 from fecontact.laws.trace import Trace
 from fecontact.system import ContactSystem
@@ -14,7 +16,7 @@ from fecontact.system import ContactSystem
 _REPEATING = (Harmonic, Harmonics)
 
 
-def forcing_period(system: ContactSystem) -> float | None:
+def common_period(system: ContactSystem) -> float | None:
     """Common period [s] of all that is given in time; None for an autonomous system.
 
     Raises

@@ -58,7 +58,15 @@ def located_between(
                             1e-12)
             if located is not None:
                 found.append(BranchPoint(located.u, located.tangent, located.values))
+    found = _without_turns(found, row, 1e-4 * float(row @ (there.u - here.u)))
     return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
+
+
+def _without_turns(found: list[BranchPoint], row: Array, near: float) -> list[BranchPoint]:
+    """Without folds that lie on a branch point, where a bent branch turns but does not end."""
+    forks = [point for point in found if point.kind == "branch point"]
+    return [point for point in found if point.kind != "fold"
+            or all(abs(float(row @ (point.u - fork.u))) > near for fork in forks)]
 
 
 def _test_value(name: str) -> Callable[[Solution], float]:

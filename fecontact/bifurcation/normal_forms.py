@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.directional import bend
+from fecontact.bifurcation.directional import Bend, bend
 from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import AnalysisError
 
@@ -26,7 +26,7 @@ class Hopf:
     first_lyapunov : float
         l1, Kuznetsov's (5.62): negative where stable orbits are born (supercritical).
     error : float
-        Bound of its error from the agreement of two difference formulas.
+        Difference of two formulas for the derivatives.
     """
 
     angular_frequency: float
@@ -91,19 +91,22 @@ def hopf(
     _, J, _ = field.derivatives(np.zeros(1), x[None], values)
     eigenvalue, q, p = critical_pair(J[0], near)
     w = eigenvalue.imag
-    one = np.eye(len(x))
     along, across = (bend(field, x, values, part, scales)
                      for part in (np.ascontiguousarray(q.real), np.ascontiguousarray(q.imag)))
+    fine, coarse = (_first_lyapunov(J[0], w, q, p, one, other)
+                    for one, other in zip(along, across, strict=True))
+    return Hopf(w, q, fine, abs(fine - coarse))
+
+
+def _first_lyapunov(
+    J: Array, w: float, q: ComplexArray, p: ComplexArray, along: Bend, across: Bend
+) -> float:
     B = along.first + 1j * across.first
     cubic = (along.second + across.second) @ q
-    mean = np.linalg.solve(J[0], (B @ q.conj()).real)
-    double = np.linalg.solve(2j * w * one - J[0], B @ q)
+    mean = np.linalg.solve(J, (B @ q.conj()).real)
+    double = np.linalg.solve(2j * w * np.eye(len(J)) - J, B @ q)
     total = np.vdot(p, cubic - 2.0 * B @ mean + B.conj() @ double)
-    size = float(np.linalg.norm(p))
-    error = size * (along.second_error + across.second_error
-                    + (along.first_error + across.first_error)
-                    * (2.0 * float(np.linalg.norm(mean)) + float(np.linalg.norm(double))))
-    return Hopf(w, q, float(total.real) / (2.0 * w), error / (2.0 * w))
+    return float(total.real) / (2.0 * w)
 
 
 def null_vectors(J: Array) -> tuple[Array, Array]:
@@ -116,7 +119,7 @@ def fold_coefficient(field: VectorField, x: Array, values: Array, scales: Array)
     """Quadratic coefficient a = w B(v, v) / 2 of a fold, v and w the null vectors, w v = 1."""
     _, J, _ = field.derivatives(np.zeros(1), x[None], values)
     v, w = null_vectors(J[0])
-    quadratic = bend(field, x, values, v, scales).first @ v
+    quadratic = bend(field, x, values, v, scales)[0].first @ v
     return 0.5 * float(w @ quadratic) / float(w @ v)
 
 
@@ -143,7 +146,7 @@ def branching_tangents(
         shift = np.zeros(len(values))
         shift[index] = direction[-1]
         bent = bend(field, x, values, np.ascontiguousarray(direction[:-1]), scales, (index,), shift)
-        return np.asarray(psi @ bent.first)
+        return np.asarray(psi @ bent[0].first)
 
     mixed, own = float(second(s) @ t), float(second(s) @ s)
     if abs(mixed) <= 1e-9 * abs(own):

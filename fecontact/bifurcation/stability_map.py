@@ -7,7 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.contact_field import ContactField
-from fecontact.bifurcation.equilibria import Equilibrium, find_equilibrium, newton
+from fecontact.bifurcation.equilibria import (
+    Equilibrium,
+    find_equilibrium,
+    newton,
+    unstable_count,
+)
 from fecontact.bifurcation.vector_field import VectorField
 from fecontact.console import progress_bar
 from fecontact.errors import AnalysisError, InputError
@@ -110,7 +115,7 @@ def stability_map(
     eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
     order = np.lexsort((-eigenvalues.imag, -eigenvalues.real), axis=-1)
     critical = np.take_along_axis(eigenvalues, order[..., :1], axis=-1)[..., 0]
-    unstable = (eigenvalues.real > 0.0).sum(axis=-1)
+    unstable = unstable_count(eigenvalues)
     lost = np.isnan(states[..., 0])
     critical[lost], unstable[lost] = np.nan, -1
     return StabilityMap((names[0], names[1]), axes[0], axes[1], states, critical, unstable)

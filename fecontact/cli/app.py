@@ -8,13 +8,14 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from fecontact.cli import about, runs, studies
+from fecontact.cli import about, branches, runs, studies
 
 COMMANDS: tuple[Callable[..., int | None], ...] = (
     studies.init,
     studies.mesh,
     studies.modes,
     studies.run,
+    branches.branch,
     runs.render,
     runs.plot,
     runs.export,

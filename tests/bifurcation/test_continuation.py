@@ -61,6 +61,15 @@ def test_closed_curve_ends_at_its_start():
     assert (np.diff(angle) > 0.0).all()
 
 
+@pytest.mark.parametrize("turn", [0.3, 0.6])
+def test_turns_between_points_are_limited(turn):
+    branch = follow(CIRCLE, np.array([1.0, 0.0]),
+                    Settings(step=1.0, largest_step=1.0, largest_turn=turn))
+    turns = [np.arccos(min(1.0, before.tangent @ after.tangent))
+             for before, after in zip(branch.points[:-1], branch.points[1:], strict=True)]
+    assert 0.5 * turn < max(turns) <= turn
+
+
 def test_both_directions_and_restart():
     settings = Settings(bounds=(-0.3, 0.2))
     branch = follow(CUBIC, np.array([0.0, 0.0]), settings, both=True)
@@ -126,12 +135,23 @@ def test_end_of_existence_keeps_the_branch():
     assert "what was computed until then is kept" in branch.status.value
 
 
-def test_sharp_corner_is_not_jumped():
+@pytest.mark.parametrize("step", [0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7])
+def test_sharp_corner_is_not_jumped(step):
     """A hyperbola's two arms come within 0.02: the steps must not jump from one to the other."""
     near = Plane(lambda x, p: x * x - p * p - 1e-4, lambda x, p: (2.0 * x, -2.0 * p))
-    branch = follow(near, np.array([1.0, -1.0]), Settings(bounds=(-2.0, 1.0), largest_step=0.2))
+    settings = Settings(bounds=(-2.0, 1.0), step=step, largest_step=step)
+    branch = follow(near, np.array([1.0, -1.0]), settings)
     assert (branch.column("x") > 0.0).all()
     assert branch.points[-1].u[0] == pytest.approx(np.sqrt(1.0001), rel=1e-12)
+
+
+def test_corners_of_the_branch_itself_are_passed():
+    """x = |p| / 2 turns by 0.93 rad, more than is believed of a step of ordinary size."""
+    bent = Plane(lambda x, p: x - 0.5 * abs(p), lambda x, p: (1.0, -0.5 * np.sign(p)))
+    branch = follow(bent, np.array([0.5, -1.0]), Settings(bounds=(-1.0, 1.0)))
+    assert branch.status is Status.BOUND
+    assert branch.column("x") == pytest.approx(0.5 * np.abs(branch.parameter), abs=1e-7)
+    assert branch.parameter[-1] == pytest.approx(1.0, rel=1e-12)
 
 
 def test_points_come_one_by_one():
@@ -146,6 +166,8 @@ def test_points_come_one_by_one():
 def test_no_solution_near_the_start():
     with pytest.raises(InputError, match="no solution near the start at the parameter 3"):
         follow(CIRCLE, np.array([0.1, 3.0]), Settings())
+    with pytest.raises(InputError, match=r"start lies at 1, outside the bounds .* 2 to 3"):
+        follow(CUBIC, np.array([0.1, 1.0]), Settings(bounds=(2.0, 3.0)))
 
 
 @pytest.mark.parametrize(("options", "message"), [

@@ -9,10 +9,9 @@ from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
 from fecontact.bifurcation.stability_map import stability_map
 from fecontact.errors import InputError
-from fecontact.output.diagrams import (
-    branches_figure,
+from fecontact.output.diagrams import branches_figure, plot_branches
+from fecontact.output.stability_plots import (
     eigenvalues_figure,
-    plot_branches,
     plot_eigenvalues,
     plot_stability_map,
     stability_map_figure,

@@ -148,6 +148,17 @@ def test_map_has_gaps_where_there_is_no_equilibrium():
     assert found.growth_rate[:2] == pytest.approx(-2.0 * found.states[:2, :, 0])
 
 
+def test_map_follows_the_equilibrium_along_both_parameters():
+    """sin(x - a - b) has many; the map stays with the one it began with."""
+    def waves(t, x, p, out):
+        out[0] = -np.sin(x[0] - p[0] - p[1])
+
+    field = VectorField.from_function(waves, {"a": 0.0, "b": 0.0}, 1)
+    a, b = np.linspace(0.0, 12.0, 25), np.linspace(0.0, 9.0, 19)
+    found = stability_map(field, {"a": a, "b": b})
+    assert found.states[..., 0] == pytest.approx(np.add.outer(a, b), abs=1e-9)
+
+
 def test_kind_errors():
     def nothing(t, x, p, out):
         out[0] = 1.0 + p[0] * x[0] * x[0]

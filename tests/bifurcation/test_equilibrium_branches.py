@@ -12,6 +12,7 @@ from systems_for_bifurcations import (
     two_mass_jacobian,
 )
 
+from fecontact import LuGreFriction
 from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.continuation import Settings
@@ -128,6 +129,7 @@ def test_first_lyapunov_coefficient():
         assert hopf.parameter == pytest.approx(0.0, abs=1e-13)
         assert hopf.details["first_lyapunov"] == pytest.approx(2.0 * c / 2.0, rel=1e-9)
         assert hopf.details["criticality"] == kind
+        assert hopf.details["crossing_speed"] == pytest.approx(1.0, rel=1e-9)
 
 
 def exact_hopf(v0, low, high):
@@ -150,6 +152,13 @@ def test_two_masses_over_the_normal_force():
     assert second.parameter == pytest.approx(7.09, abs=5e-3)
     # Equilibrium and orbit coexist below H1, so the unstable orbit is born there.
     assert first.details["criticality"] == "subcritical"
+    for point in branch.special:
+        h = 1e-5
+        growth = [np.min(np.abs(np.linalg.eigvals(two_mass_jacobian(B, 1.0))
+                                - (1j * point.details["angular_frequency"] + 1.0)))
+                  for B in (point.parameter - h, point.parameter + h)]
+        slope = (growth[0] - growth[1]) / (2.0 * h)
+        assert point.details["crossing_speed"] == pytest.approx(slope, rel=1e-6)
     assert branch.status is Status.BOUND
     assert len(branch) < 120
 
@@ -196,13 +205,54 @@ def test_mode_coupling_with_damping():
     assert branch.column("unstable")[[0, -1]].tolist() == [0, 2]
 
 
+def test_undamped_modes_are_neither_unstable_nor_crossing():
+    """Pairs on the imaginary axis are round-off away from it; only their meeting counts."""
+    field = contact_field(mode_coupling(), ["friction.friction_coefficient"])
+    branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(0.0, 1.0))
+    assert [round(point.parameter, 3) for point in branch.special] in ([], [0.75])
+    counts, mu = branch.column("unstable"), branch.parameter
+    assert (counts[mu < 0.749] == 0).all()
+    assert (counts[mu > 0.751] == 2).all()
+
+
 def test_neutral_saddles_are_not_reported():
+    """Two real eigenvalues of opposite sign, beside a pair whose damping changes."""
     def saddle(t, x, p, out):
         out[0] = (1.0 + p[0]) * x[0]
         out[1] = -x[1]
+        out[2] = (0.1 * p[0] - 0.3) * x[2] - x[3]
+        out[3] = (0.1 * p[0] - 0.3) * x[3] + x[2]
 
-    field = VectorField.from_function(saddle, {"a": -0.5}, 2)
+    field = VectorField.from_function(saddle, {"a": -0.5}, 4)
     assert equilibrium_branch(field, "a", bounds=(-0.9, 0.9)).special == ()
+
+
+def test_pairs_on_the_axis_do_not_cross_it():
+    """Three undamped oscillators whose coupling depends on the parameter: all real parts zero."""
+    def chain(t, x, p, out):
+        for i in range(3):
+            out[i] = x[3 + i]
+            out[3 + i] = -(i + 1.3) * x[i]
+            for j in range(3):
+                out[3 + i] -= p[0] * (0.2 + 0.1 * (i + 1) * (j + 1)) * x[j]
+
+    field = VectorField.from_function(chain, {"a": 0.1}, 6)
+    branch = equilibrium_branch(field, "a", bounds=(0.0, 2.0), settings=Settings(
+        step=0.005, largest_step=0.005))
+    assert len(branch) > 150
+    assert branch.special == ()
+    assert branch.column("stable").all()
+
+
+def test_pitchfork_passed_on_the_bent_branch_is_no_fold():
+    def pitchfork(t, x, p, out):
+        out[0] = p[0] * x[0] - x[0] * x[0] * x[0]
+
+    field = VectorField.from_function(pitchfork, {"a": 0.49}, 1)
+    branch = equilibrium_branch(field, "a", [-0.7], bounds=(-0.5, 0.5), direction=-1.0)
+    assert branch.points[-1].u == pytest.approx([np.sqrt(0.5), 0.5], rel=1e-9)
+    assert [point.kind for point in branch.special] == ["branch point"]
+    assert branch.special[0].u == pytest.approx([0.0, 0.0], abs=1e-7)
 
 
 def test_restart_at_any_point():
@@ -227,3 +277,22 @@ def test_parameter_leaves_its_range():
     assert "friction_coefficient = " in branch.message
     with pytest.raises(InputError, match="no parameter 'mu'"):
         equilibrium_branch(field, "mu")
+
+
+def test_friction_with_memory():
+    """LuGre's bristles: Hurwitz' condition of m l^3 + (b + m a) l^2 + (c + b a + F a g') l + c a,
+    a = sigma_0 V / g(V)."""
+    static, kinetic, v_s, sigma = 0.8, 0.55, 2e-3, 1e5
+    law = LuGreFriction(static, kinetic, v_s, 1.0, sigma)
+    field = contact_field(belt(speed=5e-3).with_(friction=law), ["ground.speed"])
+    branch = equilibrium_branch(field, "ground.speed", bounds=(1e-3, 40e-3))
+    hopf, = branch.special
+    m, b, c, F = 5.632, 0.768, 5610.0, 14.0
+
+    def hurwitz(V):
+        fall = (static - kinetic) * np.exp(-V / v_s)
+        a = sigma * V / (kinetic + fall)
+        return (b + m * a) * (c + b * a - F * a * fall / v_s) - m * c * a
+
+    assert hopf.parameter == pytest.approx(brentq(hurwitz, 8e-3, 25e-3, xtol=1e-16), rel=1e-10)
+    assert branch.column("unstable")[[0, -1]].tolist() == [2, 0]

@@ -198,6 +198,26 @@ def test_values_out_of_range_are_refused_however_near_the_base():
         field.rates(np.zeros(1), x, np.array([-1e-6]))
 
 
+def in_millimetres(system, V):
+    return system.with_(**{"ground.speed": 1e-3 * V})
+
+
+def test_steps_are_small_beside_the_smoothing_of_friction():
+    """Slip velocities within the width of the arctan, 1e-6 m/s, whatever the speed is called."""
+    system = belt(speed=8e-3)
+    x = np.zeros((21, 2))
+    x[:, 1] = np.sqrt(5.632) * (8e-3 + np.linspace(-3e-6, 3e-6, 21))
+    slip = x[:, 1] / np.sqrt(5.632) - 8e-3
+    size, slope = np.abs(slip), 1e6
+    mu = 0.25 * np.exp(-1000.0 * size) + 0.55
+    rise = (2.0 / np.pi) * (mu * slope / (1.0 + (slope * slip) ** 2)
+                            - 250.0 * np.exp(-1000.0 * size) * np.arctan(slope * size))
+    for name, given, scale in (("ground.speed", None, 1.0), ("V", (8.0, in_millimetres), 1e-3)):
+        field = contact_field(system, {name: given})
+        _, _, P = field.derivatives(np.zeros(21), x, field.values, (0,))
+        assert P[:, 1, 0] == pytest.approx(14.0 * rise * scale / np.sqrt(5.632), rel=1e-5)
+
+
 @pytest.mark.parametrize(("parameters", "message"), [
     (["ground.sped"], r"no parameter 'ground.sped' \(did you mean 'ground.speed'"),
     (["normal.force"], "not one number; give a pair"),

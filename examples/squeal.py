@@ -1,0 +1,60 @@
+"""Why a sliding part squeals: two modes meet, and friction couples them.
+
+A steel beam slides on a belt with constant friction, so nothing falls with slip velocity. On a
+rough, compliant contact its bouncing and its rocking mode have nearly the same frequency; friction
+couples them, and from some friction coefficient on they merge into one mode that grows. The
+equilibrium is followed over the friction coefficient, the Hopf point is located, and then the
+border of flutter is followed over friction coefficient and load.
+
+Usage: python examples/squeal.py [FOLDER]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import fecontact as fc
+
+FRICTION = "friction.friction_coefficient"
+
+
+def system(friction: float = 0.0, load: float = 14.0) -> fc.ContactSystem:
+    """The beam, held by a spring at its left end."""
+    body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)), thickness=0.01)
+    basis = body.modal_basis(12, contact_nodes=20, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
+    return fc.ContactSystem(
+        basis, normal=fc.CosineSurface(stiffness=6e6, roughness_height=5.2e-6, damping=6.0),
+        friction=fc.ConstantFriction(friction, smoothing_slope=1e6),
+        ground=fc.Ground(speed=0.05), load=fc.Load(normal=load),
+        drive=fc.Drive(stiffness_x=5610.0, damping_x=0.768))
+
+
+def main(folder: Path) -> tuple[fc.Branch, fc.Branch]:
+    """Pictures in the folder; gives the branch over friction and the border of flutter."""
+    field = fc.contact_field(system(), [FRICTION, "load.normal"])
+    branch = fc.equilibrium_branch(field, FRICTION, bounds=(0.0, 0.6))
+    fc.plot_eigenvalues(branch, folder / "squeal_modes.png", x_label="friction coefficient",
+                        range_hz=(300.0, 1200.0))
+    hopf = branch.of_kind("Hopf")[0]
+    print(f"flutter from a friction coefficient of {hopf.parameter:.4f} on, "
+          f"at {hopf.details['frequency_hz']:.1f} Hz, {hopf.details['criticality']}")
+    modes = fc.find_equilibrium(field, {FRICTION: 0.55}).modes
+    worst = int(np.argmin(modes.damping_ratios))
+    print(f"at 0.55 a mode of {modes.frequencies_hz[worst]:.1f} Hz grows, "
+          f"damping ratio {modes.damping_ratios[worst]:.4f}")
+
+    box = {FRICTION: (0.0, 0.6), "load.normal": (2.0, 30.0)}
+    border = fc.hopf_curve(field, (FRICTION, "load.normal"), hopf, bounds=box)
+    loads, frictions = border.column("load.normal"), border.column(FRICTION)
+    print(f"border: {len(border)} points, friction coefficient from {frictions.min():.3f} to "
+          f"{frictions.max():.3f}, load from {loads.min():.1f} to {loads.max():.1f} N")
+    found = fc.stability_map(field, {FRICTION: np.linspace(0.0, 0.6, 31),
+                                     "load.normal": np.linspace(2.0, 30.0, 29)})
+    fc.plot_stability_map(found, folder / "squeal_map.png", borders=[border],
+                          x_label="friction coefficient", y_label="load [N]")
+    return branch, border
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))

@@ -1,0 +1,24 @@
+"""The examples of docs/bifurcation.md run, and print what the text says."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+TEXT = (Path(__file__).parents[2] / "docs" / "bifurcation.md").read_text()
+
+
+def test_examples_run(capsys):
+    names = {}
+    for code in re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL):
+        exec(compile(code, "bifurcation.md", "exec"), names)
+    first, second = (line.split() for line in capsys.readouterr().out.splitlines())
+    assert [first[0], second[0]] == ["Hopf", "Hopf"]
+    printed = re.search(r"at B = ([\d.]+) and\n +([\d.]+)", TEXT)
+    assert [float(first[1]), float(second[1])] == pytest.approx(
+        [float(x) for x in printed.groups()], abs=5e-7)
+    assert first[-1] == "subcritical"
+    assert names["flow"].of_kind("Hopf")[0].parameter == pytest.approx(470.0 / 19.0, rel=1e-10)
+    end = names["short"].points[-1]
+    assert end.kind == "first mode displaced by 1"
+    assert end.values["state"][0] == pytest.approx(1.0, rel=1e-10)
