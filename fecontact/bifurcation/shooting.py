@@ -230,6 +230,7 @@ class Shot:
         K, d = len(problem.mesh) - 1, problem.field.dimension
         factors = elimination.factors_for(K, 1, d, problem.common)
         values = problem.parameters(self.u)
+        slope = 0.0 if problem.autonomous else self._period_slope(values)
         for j, run in enumerate(self.runs):
             factors.local[j, :, :d] = run.monodromy
             factors.local[j, :, d : 2 * d] = -np.eye(d)
@@ -237,8 +238,27 @@ class Shot:
             if problem.autonomous:
                 f = problem.field.rates(np.zeros(1), run.states[-1:].copy(), values)[0]
                 factors.local[j, :, -2] = (problem.mesh[j + 1] - problem.mesh[j]) * f
+            elif slope:
+                factors.local[j, :, -1] += slope * self._shifted(j, run, values)
         elimination.chain_intervals(factors)
         return factors
+
+    def _period_slope(self, values: Array) -> float:
+        """Rate dT/dp of the period of the forcing with the free parameter."""
+        problem, h = self.problem, 1e-4 * (abs(float(self.u[-1])) or 1.0)
+        above, below = values.copy(), values.copy()
+        above[problem.free] += h
+        below[problem.free] -= h
+        periods = [problem.field.forcing_period(each) or 0.0 for each in (above, below)]
+        return problem.periods * (periods[0] - periods[1]) / (2.0 * h)
+
+    def _shifted(self, j: int, run: Sensitivity, values: Array) -> Array:
+        """Derivative (d,) of the end of segment j with the period, as both its times move."""
+        problem, rates = self.problem, self.problem.field.rates
+        before, after = (rates(self._times[k : k + 1], state[None].copy(), values)[0]
+                         for k, state in ((j, run.states[0]), (j + 1, run.states[-1])))
+        moved = problem.mesh[j + 1] * after - problem.mesh[j] * (run.monodromy @ before)
+        return np.asarray(moved)
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""

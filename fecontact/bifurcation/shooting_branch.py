@@ -61,7 +61,7 @@ def orbits_by_shooting(
         np.append(sizes, width_of(width, chosen, given[free]))), segments, rtol)
     attributes = {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
                   "parameter_values": given, "scales": problem.scales, "segments": segments,
-                  "periods": periods}
+                  "periods": periods, "rtol": rtol}
     try:
         return follow(problem, u, chosen, name=parameter, direction=direction, both=both,
                       attributes=attributes)

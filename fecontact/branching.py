@@ -1,0 +1,158 @@
+"""All branches that the section ``[branch]`` of a study asks for."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+from fecontact.bifurcation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.contact_field import ContactField, contact_field
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
+from fecontact.bifurcation.observed import observed, shot
+from fecontact.console import waiting
+from fecontact.errors import FecontactError
+
+if TYPE_CHECKING:
+    from fecontact.study_branch import BranchSettings
+    from fecontact.system import ContactSystem
+
+_EQUILIBRIA = "steady sliding"
+
+
+@dataclass
+class Branches:
+    """Branches by name, in the order in which they were followed.
+
+    Attributes
+    ----------
+    field : ContactField
+        The system as a function of the parameter.
+    observe : (point, axis)
+        The displacement that is observed.
+    found : dict of name to Branch
+        With the range of the observed displacement; see
+        :func:`fecontact.bifurcation.observed.observed`.
+    notes : list of str
+        Sentences on branches that could not be followed.
+    interrupted : bool
+        Whether Ctrl-C ended it; what was computed until then is there.
+    """
+
+    field: ContactField
+    observe: tuple[str | int, Literal["x", "y"]]
+    found: dict[str, Branch] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    interrupted: bool = False
+
+
+def follow_branches(
+    system: "ContactSystem", wanted: "BranchSettings", initial: Any = "rest"
+) -> Branches:
+    """Follow steady sliding or an orbit over a parameter, and what begins at special points.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        What moves.
+    wanted : BranchSettings
+        What to follow.
+    initial : any
+        Start of the run to the first orbit; see :func:`fecontact.simulate`.
+
+    Raises
+    ------
+    FecontactError
+        If the first branch cannot be begun; others that cannot leave a note.
+    """
+    low, high = wanted.bounds
+    basis = system.basis
+    point = wanted.point
+    if point is None:
+        point = "B" if basis.T[0].any() else basis.contact_nodes // 2
+    # Found out after a long computation, a wrong name would be found out too late.
+    basis.point_index(point)
+    result = Branches(contact_field(system, {wanted.name: wanted.first}), (point, wanted.axis))
+    if wanted.kind == "equilibria":
+        with waiting("Looking for steady sliding"):
+            # The largest part of the range comes first; a start inside it goes both ways.
+            direction = 1.0 if wanted.first < high else -1.0
+        begun = {_EQUILIBRIA: equilibrium_branch(
+            result.field, wanted.name, settings=wanted.settings(), direction=direction,
+            both=low < wanted.first < high)}
+    else:
+        begun = {"orbits": _orbits(result.field, wanted, initial)}
+    for generation in range(wanted.generations + 1):
+        later: dict[str, Branch] = {}
+        for name, branch in begun.items():
+            result.found[name] = observed(result.field, branch, *result.observe)
+            if branch.status is Status.INTERRUPTED:
+                result.interrupted = True
+                return result
+        if generation == wanted.generations:
+            break
+        for name, branch in begun.items():
+            for kind in wanted.switch:
+                points = branch.of_kind(kind)
+                for number, point in enumerate(points):
+                    title = _title(name, kind, f" {number + 1}" if len(points) > 1 else "")
+                    try:
+                        new = _beyond(result.field, branch, point, wanted)
+                    except KeyboardInterrupt:
+                        result.interrupted = True
+                    except FecontactError as error:
+                        result.notes.append(f"The branch '{title}' from {wanted.name} = "
+                                            f"{point.parameter:.6g} was not followed: {error}")
+                        continue
+                    else:
+                        later[title] = new
+                        result.interrupted = new.status is Status.INTERRUPTED
+                    if result.interrupted:
+                        for each, found in later.items():
+                            result.found[each] = observed(result.field, found, *result.observe)
+                        return result
+        begun = later
+    return result
+
+
+def _orbits(field: ContactField, wanted: "BranchSettings", initial: Any) -> Branch:
+    """The orbit on which a run settles, over the parameter."""
+    from fecontact.bifurcation.orbits import orbits_from_motion
+    from fecontact.bifurcation.settled import settled_motion
+    from fecontact.bifurcation.shooting_branch import orbits_by_shooting
+
+    low, high = wanted.bounds
+    with waiting("Running to the first orbit"):
+        motion = settled_motion(field.system(), initial=initial, transient=wanted.transient,
+                                longest_period=wanted.longest_period)
+    common: dict[str, Any] = {
+        "periods": motion.periods, "settings": wanted.settings(),
+        "direction": 1.0 if wanted.first < high else -1.0, "both": low < wanted.first < high}
+    if wanted.method == "shooting":
+        return orbits_by_shooting(field, wanted.name, motion.times, motion.states,
+                                  segments=wanted.segments, **common)
+    return orbits_from_motion(field, wanted.name, motion.times, motion.states,
+                              intervals=wanted.intervals, **common)
+
+
+def _beyond(
+    field: ContactField, branch: Branch, point: BranchPoint, wanted: "BranchSettings"
+) -> Branch:
+    """The branch that begins at a special point."""
+    from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
+    from fecontact.bifurcation.shooting_switch import doubled_by_shooting
+
+    settings = wanted.settings()
+    if point.kind == "Hopf":
+        return orbits_from_hopf(field, branch, point, settings=settings,
+                                intervals=wanted.intervals)
+    if "period" not in point.values:
+        return switched_branch(field, branch.name, point, settings=settings)
+    if shot(branch):
+        return doubled_by_shooting(field, branch, point, settings)
+    return orbits_beyond(field, branch, point, settings=settings)
+
+
+def _title(name: str, kind: str, number: str) -> str:
+    if kind == "Hopf":
+        return f"orbits{number}"
+    if kind == "period doubling":
+        return f"{name}, doubled{number}"
+    return f"{name}, crossing{number}"
