@@ -113,7 +113,7 @@ def _remark(point: BranchPoint) -> str:
         return "stable"
     if "period" in point.values:
         return f"unstable, {unstable} multiplier{'s' if unstable > 1 else ''}"
-    return f"{unstable / 2:g} growing"
+    return f"unstable in {unstable} direction{'s' if unstable > 1 else ''}"
 
 
 def _label(show: str, point: str | int, axis: str) -> str:

@@ -205,4 +205,6 @@ def _value(item: Any) -> Any:
 def _plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode()
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        return [_plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value

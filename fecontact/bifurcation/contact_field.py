@@ -11,8 +11,10 @@ from fecontact.bifurcation import contact_field_kernels as kernels
 from fecontact.bifurcation.forcing import common_period
 from fecontact.bifurcation.system_family import SystemFamily
 from fecontact.bifurcation.vector_field import Array, VectorField
+from fecontact.errors import InputError, choices
 from fecontact.system import ContactSystem
 
+_DIRECTIONS = ("x", "y", "rotation")
 # Step of central differences in a parameter, relative to its value.
 _STEP = 2e-4
 # Arrays that decide on what is given in time.
@@ -140,12 +142,18 @@ class ContactField(VectorField):
         """Row (d,) that gives the displacement of a point [m] from a state.
 
         ``point`` is 'B', 'C', a named point or the number of a contact node, ``direction`` 'x',
-        'y' or 'rotation'.
+        'y' or 'rotation' (then in rad).
+
+        Raises
+        ------
+        InputError
+            For a point or a direction that does not exist.
         """
+        if direction not in _DIRECTIONS:
+            raise InputError(f"direction = {direction!r} must be one of {choices(_DIRECTIONS)}.")
         basis = self._family.base.basis
         row = np.zeros(self.dimension)
-        axis = ("x", "y", "rotation").index(direction)
-        row[: basis.modes] = basis.T[basis.point_index(point), axis]
+        row[: basis.modes] = basis.T[basis.point_index(point), _DIRECTIONS.index(direction)]
         return row
 
 

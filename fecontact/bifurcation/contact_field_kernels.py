@@ -7,9 +7,29 @@ is allocated per state.
 import numpy as np
 from numba import types
 
-from fecontact.compiled import block, borrowed, kernel, matrix, vector
+from fecontact.compiled import block, borrowed, helper, kernel, matrix, vector
 from fecontact.contact_kernels import SYSTEM, memory_of, node_forces, node_gradients, node_motion
 from fecontact.laws.contract import signal_at
+
+
+@helper
+def _body_rates(time, y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out with y' as it is without contact."""
+    m = s.Tx.shape[1]
+    drive_x = signal_at(s.drive[0])(time, s.drive_parameters[0])[0]
+    drive_y = signal_at(s.drive[1])(time, s.drive_parameters[1])[0]
+    for i in range(m):
+        out[i] = y[m + i]
+        total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
+                 + drive_y * s.drive_shapes[1, i])
+        for k in range(m):
+            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
+        out[m + i] = total
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(time, s.load_parameters[k])[0]
+        for i in range(m):
+            out[m + i] += value * s.load_shapes[k, i]
+    out[2 * m :] = 0.0
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix))
@@ -22,20 +42,7 @@ def batch_rates(t, x, s, f):  # type: ignore[no-untyped-def]
     for c in range(len(t)):
         y, out = x[c], f[c]
         travel, speed = signal_at(s.ground_motion)(t[c], s.ground_motion_parameters)
-        drive_x = signal_at(s.drive[0])(t[c], s.drive_parameters[0])[0]
-        drive_y = signal_at(s.drive[1])(t[c], s.drive_parameters[1])[0]
-        for i in range(m):
-            out[i] = y[m + i]
-            total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
-                     + drive_y * s.drive_shapes[1, i])
-            for k in range(m):
-                total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
-            out[m + i] = total
-        for k in range(len(s.load)):
-            value = signal_at(s.load[k])(t[c], s.load_parameters[k])[0]
-            for i in range(m):
-                out[m + i] += value * s.load_shapes[k, i]
-        out[2 * m :] = 0.0
+        _body_rates(t[c], y, s, out)
         for j in range(n):
             along, height, along_rate, height_rate = node_motion(j, y, s)
             F, R, _, _, _, _ = node_forces(j, along, height, along_rate, height_rate,
@@ -58,24 +65,13 @@ def batch_derivatives(t, x, s, f, J):  # type: ignore[no-untyped-def]
     for c in range(len(t)):
         y, out, A = x[c], f[c], J[c]
         travel, speed = signal_at(s.ground_motion)(t[c], s.ground_motion_parameters)
-        drive_x = signal_at(s.drive[0])(t[c], s.drive_parameters[0])[0]
-        drive_y = signal_at(s.drive[1])(t[c], s.drive_parameters[1])[0]
         A[:, :] = 0.0
+        _body_rates(t[c], y, s, out)
         for i in range(m):
-            out[i] = y[m + i]
             A[i, m + i] = 1.0
-            total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
-                     + drive_y * s.drive_shapes[1, i])
             for k in range(m):
-                total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
                 A[m + i, k] = -s.stiffness[i, k]
                 A[m + i, m + k] = -s.damping[i, k]
-            out[m + i] = total
-        for k in range(len(s.load)):
-            value = signal_at(s.load[k])(t[c], s.load_parameters[k])[0]
-            for i in range(m):
-                out[m + i] += value * s.load_shapes[k, i]
-        out[2 * m :] = 0.0
         for j in range(n):
             along, height, along_rate, height_rate = node_motion(j, y, s)
             F, R = node_gradients(j, along, height, along_rate, height_rate, memory_of(j, y, s),

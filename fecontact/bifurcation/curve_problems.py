@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.directional import bend
 from fecontact.bifurcation.equilibria import sorted_eigenvalues
 from fecontact.bifurcation.equilibrium_problem import pair_test
+from fecontact.bifurcation.linear import solution
 from fecontact.bifurcation.normal_forms import hopf, null_vectors
 from fecontact.bifurcation.problem import Problem
 from fecontact.bifurcation.vector_field import VectorField
@@ -45,11 +46,7 @@ class _Augmented:
     made: dict[str, Any]
 
     def solve(self, row: Array, rhs: Array) -> Array:
-        whole = np.vstack([self.matrix, row])
-        try:
-            return np.asarray(np.linalg.solve(whole, rhs))
-        except np.linalg.LinAlgError:
-            return np.asarray(np.linalg.lstsq(whole, rhs, rcond=None)[0])
+        return solution(np.vstack([self.matrix, row]), rhs)
 
 
 class PlaneCurve(Problem):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.contact_field import ContactField
+from fecontact.bifurcation.linear import solution
 from fecontact.bifurcation.vector_field import Array, VectorField
 from fecontact.errors import AnalysisError, InputError
 
@@ -186,9 +187,9 @@ def newton(
     for _ in range(_ITERATIONS):
         f, J, _ = field.derivatives(t, x[None], values)
         try:
-            step = np.linalg.solve(J[0], -f[0])
-        except np.linalg.LinAlgError:
-            step = np.linalg.lstsq(J[0], -f[0], rcond=None)[0]
+            step = solution(J[0], -f[0])
+        except AnalysisError:
+            return None
         size = float(np.linalg.norm(step))
         if not np.isfinite(size):
             return None
@@ -211,9 +212,9 @@ def newton(
 
 def _simplified(J: Array, f: Array) -> float:
     try:
-        return float(np.linalg.norm(np.linalg.solve(J, f)))
-    except np.linalg.LinAlgError:
-        return float(np.linalg.norm(np.linalg.lstsq(J, f, rcond=None)[0]))
+        return float(np.linalg.norm(solution(J, f)))
+    except AnalysisError:
+        return np.inf
 
 
 def steady_sliding(field: ContactField, values: Array) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.directional import bend
 from fecontact.bifurcation.equilibria import sorted_eigenvalues, unstable_count
+from fecontact.bifurcation.linear import solution
 from fecontact.bifurcation.normal_forms import (
     branching_tangents,
     critical_pair,
@@ -40,11 +41,7 @@ class _Bordered:
     matrix: Array
 
     def solve(self, row: Array, rhs: Array) -> Array:
-        whole = np.vstack([self.matrix, row])
-        try:
-            return np.asarray(np.linalg.solve(whole, rhs))
-        except np.linalg.LinAlgError:  # exactly on a branch point
-            return np.asarray(np.linalg.lstsq(whole, rhs, rcond=None)[0])
+        return solution(np.vstack([self.matrix, row]), rhs)
 
     @property
     def jacobian(self) -> Array:

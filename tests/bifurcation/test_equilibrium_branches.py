@@ -12,14 +12,22 @@ from systems_for_bifurcations import (
     two_mass_jacobian,
 )
 
-from fecontact import LuGreFriction
+from fecontact import (
+    ConstantFriction,
+    ContactSystem,
+    Ground,
+    LinearContact,
+    Load,
+    LuGreFriction,
+    ModalBasis,
+)
 from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.continuation import Settings
 from fecontact.bifurcation.equilibria import find_equilibrium
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from fecontact.bifurcation.vector_field import VectorField
-from fecontact.errors import InputError
+from fecontact.errors import AnalysisError, InputError
 
 
 def reactor(t, x, p, out):
@@ -265,6 +273,23 @@ def test_restart_at_any_point():
                                                               rel=1e-10)
     assert sorted(parameters(again, "fold")) == pytest.approx(sorted(parameters(branch, "fold")),
                                                               rel=1e-10)
+
+
+def test_body_that_is_lifted_off_has_no_equilibrium():
+    """Without load nothing presses the mass down: the branch ends, and none is found beyond."""
+    rows = np.zeros((1, 3, 2))
+    rows[0, 0, 0] = rows[0, 1, 1] = 1.0
+    basis = ModalBasis.from_matrices(np.eye(2), np.diag([1.0, 0.0]),
+                                     {"contact": rows, "C": rows[0]}, damping=0.1 * np.eye(2))
+    system = ContactSystem(basis, normal=LinearContact(4.0), ground=Ground(speed=1.0),
+                           friction=ConstantFriction(0.3, 1e3), load=Load(1.0))
+    field = contact_field(system, ["load.normal"])
+    branch = equilibrium_branch(field, "load.normal", bounds=(-1.0, 1.0), direction=-1.0)
+    assert branch.status is Status.STALLED
+    assert branch.parameter[-1] == pytest.approx(0.0, abs=1e-6)
+    assert "singular" in branch.message
+    with pytest.raises(AnalysisError, match=r"No equilibrium was found for load\.normal = -1"):
+        find_equilibrium(field, {"load.normal": -1.0}, start=branch.points[-1].u[:-1])
 
 
 def test_parameter_leaves_its_range():

@@ -229,6 +229,14 @@ def test_kind_errors_of_contact_parameters(parameters, message):
         contact_field(two_mass_system(), parameters)
 
 
+def test_rows_of_displacements():
+    field = contact_field(two_mass_system(), [])
+    T = field.system().basis.contact_T[:, 0]
+    assert field.displacement_row(1) == pytest.approx([*T[1], 0.0, 0.0])
+    with pytest.raises(InputError, match="must be one of 'rotation', 'x', 'y'"):
+        field.displacement_row(1, "z")
+
+
 def test_forcing_periods():
     drive = Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=4.0)
     system = belt().with_(drive=drive)

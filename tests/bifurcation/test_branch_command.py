@@ -1,0 +1,52 @@
+"""The command `fecontact branch`: what it writes and says."""
+
+import pytest
+
+from fecontact.bifurcation.branch import Branch
+from fecontact.cli import execute
+
+STUDY = """
+geometry = { shape = "block", contact_length = 0.08, element_size = 0.02 }
+body = { material = "steel", thickness = 0.1 }
+basis = { modes = 3, contact_nodes = 4, B = { at = "B", radius = 0.006 }, C = "top" }
+normal = { stiffness = 10e6, roughness_height = 10e-6, damping = 40.0 }
+friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
+ground = { speed = 12e-3 }
+drive = { stiffness_x = 5610.0, damping_x = 0.768 }
+load = { normal = 14.0 }
+"""
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "block.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def test_block_on_a_belt(study, capsys):
+    """Near the closed form of one mass, 8.3365 mm/s."""
+    assert execute(["branch", str(study), "ground.speed", "--from", "12e-3", "--to", "7e-3"]) == 0
+    said = capsys.readouterr().out
+    found = Branch.load("results/block-branch.h5")
+    hopf, = found.of_kind("Hopf")
+    assert hopf.parameter == pytest.approx(8.3365e-3, rel=1e-3)
+    assert f"{hopf.parameter:.7g}" in said
+    assert "unstable orbits" in said
+    assert "unstable in 2 directions" in said
+    assert (study.parent / "results" / "block-branch.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["ground.sped", "--from", "1", "--to", "2"], "did you mean 'ground.speed'"),
+    (["ground.speed", "--from", "1", "--to", "1"], "--from and --to are both 1"),
+    (["ground.speed", "--from", "0.01", "--to", "0.02", "--set", "drive.amplitude_x=1e-3",
+      "--set", "drive.angular_frequency=10.0"], "take the drive's amplitude"),
+])
+def test_errors_are_one_line(study, capsys, arguments, message):
+    assert execute(["branch", str(study), *arguments]) != 0
+    said = capsys.readouterr().err
+    assert message in said
+    assert "Traceback" not in said
+    assert not (study.parent / "results").exists()
