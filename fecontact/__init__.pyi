@@ -14,6 +14,9 @@ from .bifurcation.curves import fold_curve, hopf_curve
 from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
+from .bifurcation.orbit_output import amplitude, orbit_history
+from .bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
+from .bifurcation.shooting_branch import orbits_by_shooting
 from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
@@ -172,6 +175,7 @@ __all__ = [
     "Trajectory",
     "TwoSidedStop",
     "VectorField",
+    "amplitude",
     "amplitude_spectrum",
     "basins",
     "brute_force",
@@ -199,6 +203,11 @@ __all__ = [
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
+    "orbit_history",
+    "orbits_beyond",
+    "orbits_by_shooting",
+    "orbits_from_hopf",
+    "orbits_from_motion",
     "periodicity",
     "picture",
     "plot_branches",

@@ -64,6 +64,9 @@ class Collocation(Problem):
     precision : float
         Part of a step to which special points are located. Above 1e-6 their normal forms are
         left out.
+    second : int, optional
+        Index of another free parameter, which stands before the first one in u; two equations
+        are missing then.
     """
 
     field: VectorField
@@ -78,6 +81,7 @@ class Collocation(Problem):
     renewal: int = 1
     limits: Array | None = None
     precision: float = 1e-12
+    second: int | None = None
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -99,7 +103,12 @@ class Collocation(Problem):
     @property
     def common(self) -> int:
         """Number of unknowns that all intervals share."""
-        return 2 if self.autonomous else 1
+        return len(self.active) + self.autonomous
+
+    @property
+    def active(self) -> tuple[int, ...]:
+        """Indices of the parameters that are unknowns, in their order in u."""
+        return (self.free,) if self.second is None else (self.second, self.free)
 
     @cached_property
     def _forcing_period(self) -> float | None:
@@ -150,12 +159,16 @@ class Collocation(Problem):
     def parameters(self, u: Array) -> Array:
         """Parameter values (k,)."""
         values = self.values.copy()
-        values[self.free] = u[-1]
+        values[list(self.active)] = u[-len(self.active):]
         return values
 
     def linearise(self, u: Array) -> Linearised:
         """Residual and linearisation at u; what is not asked for is not computed."""
         return Linearised(self, u)
+
+    def evaluate(self, u: Array) -> Linearised:
+        """As :meth:`linearise`, for the residual alone."""
+        return Linearised(self, u, whole=False)
 
     def weights(self) -> Array:
         """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""

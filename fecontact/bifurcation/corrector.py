@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,11 +35,14 @@ def corrected(
 ) -> tuple[Array, Linearisation, int] | None:
     """Newton's method at right angles to a row, from a guess; None where it does not converge."""
     u, before, kept = guess, np.inf, None
+    steps: list[Array] = []
     scale = 1.0 + norm(problem, guess)
     for count in range(1, iterations + 1):
-        linearisation = problem.linearise(u)
+        linearisation = problem.linearise(u) if kept is None else problem.evaluate(u)
         rhs = np.append(-linearisation.residual, -(row @ (u - guess)))
         change = (kept or linearisation).solve(row, rhs)
+        if kept is not None:
+            change = _improved(problem, change, steps)
         size = norm(problem, change)
         if count > 2 and size > before and before <= _ROUNDING * scale:
             return u, linearisation, count
@@ -47,13 +51,25 @@ def corrected(
         u = u + change
         if kept is None and size <= tolerance * scale:
             return u, linearisation, count
-        # With a matrix that is kept the error falls by the same factor each time, not squared.
-        if kept is not None and size * size / before <= max(1e-2 * tolerance, 1e-13) * scale:
+        # With a matrix that is kept the error falls by about the same factor each time.
+        if kept is not None and size * size / before <= max(0.1 * tolerance, 1e-13) * scale:
             return u, problem.linearise(u), max(1, count - 2)
         if problem.keeps_matrix:
-            kept = (kept or linearisation) if kept is None or size < 0.2 * before else None
+            keeps = kept is None or size < 0.2 * before
+            kept = (kept or linearisation) if keeps else None
+            steps = [*steps, change] if keeps else []
         before = size
     return None
+
+
+def _improved(problem: Problem, change: Array, steps: list[Array]) -> Array:
+    """A step with the matrix of the first of ``steps``, corrected by what they taught (Broyden)."""
+    weights = problem.weights()
+    for step, following in pairwise(steps):
+        along = weights * step
+        change = change + following * float(along @ change / (along @ step))
+    along = weights * steps[-1]
+    return np.asarray(change / (1.0 - float(along @ change / (along @ steps[-1]))))
 
 
 def finished(

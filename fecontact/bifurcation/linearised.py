@@ -26,8 +26,8 @@ class Linearised:
     the phase condition where the period is unknown.
     """
 
-    def __init__(self, problem: "Collocation", u: Array) -> None:
-        self.problem, self.u = problem, u
+    def __init__(self, problem: "Collocation", u: Array, whole: bool = True) -> None:
+        self.problem, self.u, self._whole = problem, u, whole
         self._last: tuple[Array, float, Bordered] | None = None
 
     @cached_property
@@ -44,11 +44,11 @@ class Linearised:
         """Residual (N m d + 1,), without the last entry for forced systems."""
         problem = self.problem
         x, slopes = self._points
-        if "derivatives" in self.__dict__:
+        if self._whole:
             f = self.derivatives[0]
         else:
             f = problem.field.rates(problem.times * self.period, x, problem.parameters(self.u))
-        out = np.empty(problem.size + problem.common - 1)
+        out = np.empty(problem.size + problem.autonomous)
         fill_residual(slopes, f, problem.widths, self.period, out)
         if problem.autonomous:
             out[-1] = problem.phase_row @ self.u[: problem.size]
@@ -60,7 +60,7 @@ class Linearised:
         problem, T = self.problem, self.period
         x, _ = self._points
         values = problem.parameters(self.u)
-        f, J, P = problem.field.derivatives(problem.times * T, x, values, (problem.free,))
+        f, J, P = problem.field.derivatives(problem.times * T, x, values, problem.active)
         if not problem.autonomous:
             self._add_forcing(x, values, P)
         return f, J, P
@@ -68,19 +68,20 @@ class Linearised:
     def _add_forcing(self, x: Array, values: Array, P: Array) -> None:
         """Let P be the derivative of T f(T tau, x, p) / T where the parameter moves T."""
         problem, T = self.problem, self.period
-        h = _DIFFERENCE * max(abs(values[problem.free]), 1e-3)
-        sides = []
-        for sign in (1.0, -1.0):
-            beside = values.copy()
-            beside[problem.free] += sign * h
-            period = problem.field.forcing_period(beside)
-            assert period is not None
-            sides.append((beside, problem.periods * period))
-        if sides[0][1] == T == sides[1][1]:
-            return
-        up, down = (period * problem.field.rates(problem.times * period, x, beside)
-                    for beside, period in sides)
-        P[:, :, 0] = (up - down) / (2.0 * h * T)
+        for place, index in enumerate(problem.active):
+            h = _DIFFERENCE * max(abs(values[index]), 1e-3)
+            sides = []
+            for sign in (1.0, -1.0):
+                beside = values.copy()
+                beside[index] += sign * h
+                period = problem.field.forcing_period(beside)
+                assert period is not None
+                sides.append((beside, problem.periods * period))
+            if sides[0][1] == T == sides[1][1]:
+                continue
+            up, down = (period * problem.field.rates(problem.times * period, x, beside)
+                        for beside, period in sides)
+            P[:, :, place] = (up - down) / (2.0 * h * T)
 
     @cached_property
     def factors(self) -> elimination.Factors:
@@ -97,6 +98,11 @@ class Linearised:
     def _phase(self) -> "Border":
         row = np.concatenate([self.problem.phase_row, np.zeros(self.problem.common)])
         return Border(self.factors, row)
+
+    def with_rows(self, rows: list[Array]) -> Bordered:
+        """The matrix [[G_u], [row], [row], ...]."""
+        borders = [self._phase] if self.problem.autonomous else []
+        return Bordered(self.factors, [*borders, *(Border(self.factors, row) for row in rows)], 1.0)
 
     def bordered(self, row: Array, closing: float = 1.0) -> "Bordered":
         """The matrix [[G_u], [row]]; ``closing`` = -1 is for x(1) = -x(0)."""

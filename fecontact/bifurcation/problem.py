@@ -45,6 +45,10 @@ class Problem(Protocol):
         """
         ...
 
+    def evaluate(self, u: Array) -> Linearisation:
+        """The equations about u, of which only the residual will be asked for."""
+        return self.linearise(u)
+
     def weights(self) -> Array:
         """Weights w (N + 1,) of the inner product, positive."""
         ...

@@ -134,23 +134,29 @@ class _Corners:
         # All varying arrays side by side, so that one product interpolates them.
         self._flat = np.hstack([array.reshape(len(corners), -1) for array in stacked.values()]
                                or [np.empty((len(corners), 0))])
-        self._places: list[tuple[str, slice, tuple[int, ...]]] = []
+        self._limits = list(zip(low.tolist(), high.tolist(), strict=True))
+        self._places: list[tuple[int, slice, tuple[int, ...]]] = []
         start = 0
         for name, array in stacked.items():
             size = array[0].size
-            self._places.append((name, slice(start, start + size), array.shape[1:]))
+            number = first._fields.index(name)
+            self._places.append((number, slice(start, start + size), array.shape[1:]))
             start += size
 
     def hold(self, values: Array) -> bool:
-        return bool((values >= self.low).all() and (values <= self.high).all())
+        return all(low <= value <= high for (low, high), value in
+                   zip(self._limits, values.tolist(), strict=True))
 
     def at(self, values: Array) -> SystemArrays:
         weights = [1.0]
-        for x in ((values - self.low) / (self.high - self.low)).tolist():
+        for (low, high), value in zip(self._limits, values.tolist(), strict=True):
+            x = (value - low) / (high - low)
             weights = [w * (1.0 - x) for w in weights] + [w * x for w in weights]
         flat = np.array(weights) @ self._flat
-        return self._plain._replace(**{  # type: ignore[arg-type]
-            name: flat[place].reshape(shape) for name, place, shape in self._places})
+        arrays: list[Any] = list(self._plain)
+        for number, place, shape in self._places:
+            arrays[number] = flat[place].reshape(shape)
+        return SystemArrays(*arrays)
 
     def agrees(self, arrays: SystemArrays, values: Array) -> bool:
         mine = self.at(values)

@@ -70,6 +70,28 @@ def test_belt_with_steep_friction():
     assert branch.column("trivial_error").max() < 1e-4
 
 
+def test_driven_belt_closes_after_four_periods():
+    # Section 4.3 with constant normal force.
+    system = belt(speed=1e-3).with_(**{"drive.amplitude_x": 0.5e-3,
+                                       "drive.angular_frequency": 13.8})
+    field = contact_field(system, {"drive.amplitude_x": None})
+    period = 2.0 * np.pi / 13.8
+    run = simulate(system, 40.0 * period, initial=np.zeros(2), rtol=1e-8,
+                   outputs=np.linspace(0.0, 40.0 * period, 8001))
+    branch = orbits_by_shooting(field, "drive.amplitude_x", run.time, run.states, periods=4,
+                                bounds=(0.5e-3, 0.52e-3), settings=Settings(points=4))
+    first = branch.points[0]
+    assert first.values["period"] == pytest.approx(4.0 * period, rel=1e-12)
+    assert first.values["stable"]
+    # It is the motion of the run, and none of one or two periods.
+    start = first.u[:2]
+    distance = np.abs(run.states[:-1:200] - start).max(axis=1)
+    assert distance[36] < 1e-8
+    assert (distance[37:40] > 1e-4).all()
+    with pytest.raises(AnalysisError, match=r"No periodic orbit was found at drive\.amplitude_x"):
+        orbits_by_shooting(field, "drive.amplitude_x", run.time, run.states, periods=1)
+
+
 def test_kind_errors(two_masses):
     field, branch = two_masses
     problem, u, _ = restored(field, branch, branch.points[5])
