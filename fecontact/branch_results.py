@@ -80,21 +80,18 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
     return text.getvalue()
 
 
-def special_table(branches: Mapping[str, Branch]) -> Any:
-    """Ends and special points of branches: where, how many growing modes, which frequency."""
+def special_table(branch: Branch) -> Any:
+    """Ends and special points of a branch: where, which frequency, what changes there."""
     from fecontact.report import table
 
     rows = []
-    for name, branch in branches.items():
-        for index, point in enumerate(branch.points):
-            if point.kind is None and 0 < index < len(branch) - 1:
-                continue
-            period = _period(point)
-            kind = point.kind or ("start" if index == 0 else "end")
-            rows.append((name if index == 0 else "", kind, f"{point.parameter:.7g}",
-                         "" if period is None else f"{1.0 / period:.5g}", _remark(point)))
-    parameter = next(iter(branches.values())).name
-    return table("branch", "point", parameter, "frequency [Hz]", "", rows=rows, left=2)
+    for index, point in enumerate(branch.points):
+        if point.kind is None and 0 < index < len(branch) - 1:
+            continue
+        period = _period(point)
+        rows.append((point.kind or ("start" if index == 0 else "end"), f"{point.parameter:.7g}",
+                     "" if period is None else f"{1.0 / period:.5g}", _remark(point)))
+    return table("point", branch.name, "frequency [Hz]", "", rows=rows)
 
 
 def _period(point: BranchPoint) -> float | None:
@@ -112,7 +109,7 @@ def _remark(point: BranchPoint) -> str:
     if not unstable:
         return "stable"
     if "period" in point.values:
-        return f"unstable, {unstable} multiplier{'s' if unstable > 1 else ''}"
+        return f"{unstable} unstable multiplier{'s' if unstable > 1 else ''}"
     return f"unstable in {unstable} direction{'s' if unstable > 1 else ''}"
 
 

@@ -51,11 +51,11 @@ def branch(
             beneath = runs_beneath(system, wanted, described.simulation.initial)
         with waiting("Writing"):
             files = write_branches(result, wanted, folder, described.name, beneath)
-        show(special_table(result.found))
         for name, found in result.found.items():
-            say(f"{name}: {found.status.value}")
+            say(f"\n{name}: {found.status.value}")
             if found.message:
-                say(f"{name}: the last step failed: {found.message}")
+                say(f"The last step failed: {found.message}")
+            show(special_table(found))
         for note in result.notes:
             say(f"note: {note}")
         say_written(*map(Path, files))

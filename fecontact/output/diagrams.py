@@ -50,8 +50,9 @@ def plot_branches(
         A .png, .pdf or .svg file; it is replaced if it exists.
     y, x : str, int or callable
         What to draw: 'parameter', the name of a stored number, the number of a state counted from
-        0, or a function of a :class:`fecontact.bifurcation.branch.BranchPoint`. For y also the
-        name of a stored row of numbers, such as 'observed_section': each gives a curve.
+        0, or a function of a :class:`fecontact.bifurcation.branch.BranchPoint`. For y also
+        'observed_section' of :func:`fecontact.bifurcation.observed.observed`, one curve for each
+        period of the excitation.
     x_label, y_label : str, optional
         Labels of the axes, with units.
     names : sequence of str
@@ -128,7 +129,7 @@ def _values(branch: "Branch", quantity: Quantity, rows: bool = False) -> Array:
     if quantity == "parameter":
         return branch.parameter
     found = branch.column(quantity)
-    if rows and found.ndim == 2 and found.dtype.kind == "f":
+    if rows and quantity == "observed_section" and found.ndim == 2:
         return found
     if found.ndim != 1 or found.dtype.kind not in "fiub":
         plain = [name for name, value in branch.points[0].values.items()
