@@ -40,7 +40,7 @@ def write_branches(
         several, folder / f"{name}-branch.png", f"observed_{show}",
         y_label=_label(show, *result.observe), names=list(result.found), beneath=beneath,
         observe=result.observe))
-    if wanted.kind == "equilibria":
+    if wanted.kind != "orbits":
         files.append(plot_eigenvalues(several[0], folder / f"{name}-stability.png"))
     return files
 

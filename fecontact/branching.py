@@ -3,6 +3,9 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.contact_field import ContactField, contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
@@ -14,7 +17,11 @@ if TYPE_CHECKING:
     from fecontact.study_branch import BranchSettings
     from fecontact.system import ContactSystem
 
+Array = NDArray[np.float64]
+
 _EQUILIBRIA = "steady sliding"
+# Amplitudes of the first orbit that count as one in the length of a step.
+_SIZE = 10.0
 
 
 @dataclass
@@ -70,15 +77,13 @@ def follow_branches(
     # Found out after a long computation, a wrong name would be found out too late.
     basis.point_index(point)
     result = Branches(contact_field(system, {wanted.name: wanted.first}), (point, wanted.axis))
-    if wanted.kind == "equilibria":
-        with waiting("Looking for steady sliding"):
-            # The largest part of the range comes first; a start inside it goes both ways.
-            direction = 1.0 if wanted.first < high else -1.0
-        begun = {_EQUILIBRIA: equilibrium_branch(
-            result.field, wanted.name, settings=wanted.settings(), direction=direction,
-            both=low < wanted.first < high)}
-    else:
-        begun = {"orbits": _orbits(result.field, wanted, initial)}
+    begun: dict[str, Branch] = {}
+    if wanted.kind != "orbits":
+        begun[_EQUILIBRIA] = equilibrium_branch(
+            result.field, wanted.name, settings=wanted.settings(),
+            direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high)
+    if wanted.kind != "equilibria":
+        begun["orbits of the run"] = _orbits(result.field, wanted, initial)
     for generation in range(wanted.generations + 1):
         later: dict[str, Branch] = {}
         for name, branch in begun.items():
@@ -123,7 +128,9 @@ def _orbits(field: ContactField, wanted: "BranchSettings", initial: Any) -> Bran
         motion = settled_motion(field.system(), initial=initial, transient=wanted.transient,
                                 longest_period=wanted.longest_period)
     common: dict[str, Any] = {
-        "periods": motion.periods, "settings": wanted.settings(),
+        "period": motion.period, "periods": motion.periods, "settings": wanted.settings(),
+        # So that a step is one of the parameter rather than of the orbit, which may grow.
+        "scales": _SIZE * _amplitudes(motion.states),
         "direction": 1.0 if wanted.first < high else -1.0, "both": low < wanted.first < high}
     if wanted.method == "shooting":
         return orbits_by_shooting(field, wanted.name, motion.times, motion.states,
@@ -132,14 +139,23 @@ def _orbits(field: ContactField, wanted: "BranchSettings", initial: Any) -> Bran
                               intervals=wanted.intervals, **common)
 
 
+def _amplitudes(states: Array) -> Array:
+    """Half the range (d,) of each state, those of small ones not below 1e-3 of the largest."""
+    found = np.ptp(states, axis=0) / 2.0
+    return np.asarray(np.maximum(found, 1e-3 * found.max()))
+
+
 def _beyond(
     field: ContactField, branch: Branch, point: BranchPoint, wanted: "BranchSettings"
 ) -> Branch:
     """The branch that begins at a special point."""
     from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
-    from fecontact.bifurcation.shooting_switch import doubled_by_shooting
+    from fecontact.bifurcation.shooting_switch import doubled_by_shooting, hopf_orbits_by_shooting
 
     settings = wanted.settings()
+    if point.kind == "Hopf" and wanted.method == "shooting":
+        return hopf_orbits_by_shooting(field, branch, point, settings=settings,
+                                       segments=wanted.segments)
     if point.kind == "Hopf":
         return orbits_from_hopf(field, branch, point, settings=settings,
                                 intervals=wanted.intervals)

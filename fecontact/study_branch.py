@@ -24,9 +24,9 @@ class BranchSettings:
         Its least and largest value.
     start : float, optional
         Value at which the first branch begins; the first of the range by default.
-    kind : 'equilibria' or 'orbits'
-        What is followed first: steady sliding, or the periodic orbit on which a run from
-        ``start`` settles.
+    kind : 'equilibria', 'orbits' or 'both'
+        What is followed first: steady sliding, the periodic orbit on which a run at ``start``
+        settles, or both.
     switch : list of 'Hopf', 'period doubling', 'branch point'
         Special points at which the branches that begin there are followed too: the orbits born at
         Hopf points, those of twice the period, the other branch.
@@ -37,8 +37,8 @@ class BranchSettings:
     points : int
         Most points of a branch.
     method : 'collocation' or 'shooting'
-        For orbits from a run: collocation on an adaptive mesh, or the compiled integrator, for
-        steep friction, impacts and many modes.
+        For orbits: collocation on an adaptive mesh, or the compiled integrator, for steep
+        friction, impacts and many modes.
     intervals : int
         For collocation: mesh intervals of an orbit.
     segments : int
@@ -66,7 +66,7 @@ class BranchSettings:
     parameter: str | None = None
     range: tuple[float, float] | None = None
     start: float | None = None
-    kind: Literal["equilibria", "orbits"] = "equilibria"
+    kind: Literal["equilibria", "orbits", "both"] = "equilibria"
     switch: tuple[str, ...] = ()
     generations: int = 1
     step: float = 0.01

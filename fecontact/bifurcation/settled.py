@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 _SAMPLES = 1000
 _TRANSIENT_PERIODS, _LARGEST = 200, 16
+# Part of its size by which a motion may miss its start after a period.
+_MISFIT = 1e-2
 
 
 class SettledMotion(NamedTuple):
@@ -26,12 +28,15 @@ class SettledMotion(NamedTuple):
     ----------
     times, states : (k,) and (k, d) array
         [s]; y = [q, q', z].
+    period : float
+        Of the motion [s].
     periods : int
         Periods of the excitation in one of the motion; 1 where nothing excites it.
     """
 
     times: Array
     states: Array
+    period: float
     periods: int
 
 
@@ -72,7 +77,7 @@ def settled_motion(
             raise AnalysisError(f"The run comes to rest, or slides steadily, after {transient:g} "
                                 f"s; there is no periodic orbit to start from, so take another "
                                 f"start, or equilibria and their Hopf points.")
-        return SettledMotion(run.time, run.states, 1)
+        return SettledMotion(run.time, run.states, _period(run, longest_period), 1)
     first = _TRANSIENT_PERIODS if transient is None else max(1, round(transient / excitation))
     largest = _LARGEST if longest_period is None else max(1, round(longest_period / excitation))
     checks = largest + max(2 * largest, 8)
@@ -91,7 +96,8 @@ def settled_motion(
                             f"{first * excitation:.4g} s (it misses by {found.misfit:.1e} of its "
                             f"size); start at another value of the parameter, or run it longer.")
     count = found.periods * _SAMPLES + 1
-    return SettledMotion(fine.time[:count], fine.states[:count], found.periods)
+    return SettledMotion(fine.time[:count], fine.states[:count], found.periods * excitation,
+                         found.periods)
 
 
 def _run(
@@ -113,6 +119,31 @@ def _run(
     from fecontact.analysis.window import window
 
     return window(run, float(outputs[0]))
+
+
+def _period(run: Trajectory, longest: float) -> float:
+    """Time after which the modal displacement that moves most passes its middle as before [s].
+
+    Slip velocities hardly change during stick, so that states alone do not tell the time well.
+    """
+    t, states = run.time, run.states
+    size = np.ptp(states, axis=0)
+    fastest = int(np.argmax(np.ptp(run.modal_coordinates, axis=0)))
+    x = states[:, fastest] - (states[:, fastest].max() + states[:, fastest].min()) / 2.0
+    rising = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
+    part = -x[rising] / (x[rising + 1] - x[rising])
+    passed = t[rising] + part * (t[rising + 1] - t[rising])
+    there = states[rising] + part[:, None] * (states[rising + 1] - states[rising])
+    scale = np.where(size > 1e-9 * size.max(), size, size.max())
+    for back in range(2, len(passed) + 1):
+        period = float(passed[-1] - passed[-back])
+        if period > longest:
+            break
+        if (np.abs(there[-1] - there[-back]) <= _MISFIT * scale).all():
+            return period
+    raise AnalysisError(f"The motion does not repeat within {longest:g} s; run it longer until it "
+                        f"has settled, raise longest_period, or start at another value of the "
+                        f"parameter.")
 
 
 def _at_rest(run: Trajectory) -> bool:

@@ -65,7 +65,7 @@ def orbits_by_shooting(
     try:
         return follow(problem, u, chosen, name=parameter, direction=direction, both=both,
                       attributes=attributes)
-    except InputError as error:
+    except (AnalysisError, InputError) as error:
         raise AnalysisError(f"No periodic orbit was found at {parameter} = {given[free]:.6g} near "
                             f"the motion: Newton's method does not converge; run it longer until "
                             f"it has settled, or take more than {segments} segments.") from error

@@ -1,16 +1,20 @@
-"""Branches of orbits by shooting that begin on others: those of twice the period."""
+"""Branches of orbits by shooting that begin on others: at Hopf points and period doublings."""
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from fecontact.bifurcation import orbit_starts
 from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.bifurcation.contact_field import ContactField
+from fecontact.bifurcation.equilibria import Equilibrium
+from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
-from fecontact.bifurcation.orbit_options import settings_of
+from fecontact.bifurcation.interpolation import interpolate
+from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.shooting import Shooting, Shot
+from fecontact.bifurcation.shooting import Shooting, Shot, shooting_from
 from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
@@ -37,6 +41,46 @@ def restored_shooting(
                        np.asarray(known["scales"], dtype=float), int(known["periods"]),
                        float(known.get("rtol", 1e-9)))
     return problem, point.u
+
+
+def hopf_orbits_by_shooting(
+    field: ContactField, branch: Branch, point: BranchPoint, *, settings: Settings | None = None,
+    bounds: tuple[float, float] | None = None, segments: int = 4, rtol: float = 1e-9,
+    scales: ArrayLike | None = None, width: float | None = None,
+) -> Branch:
+    """The branch of orbits that is born at a Hopf point, by shooting.
+
+    For orbits that come to stick on steep friction; the arguments are those of
+    :func:`fecontact.bifurcation.orbits.orbits_from_hopf` and
+    :func:`fecontact.bifurcation.shooting_branch.orbits_by_shooting`, the branch that of the latter.
+
+    Raises
+    ------
+    InputError
+        If the point is no Hopf point, or there are no orbits near it.
+    """
+    if point.kind != "Hopf":
+        raise InputError(f"The point at {branch.name} = {point.parameter:.6g}, "
+                         f"{point.kind or 'a regular point'!r}, is no Hopf point.")
+    free = field.index(branch.name)
+    values = np.array(branch.attributes["parameter_values"], dtype=float)
+    values[free] = point.parameter
+    state = np.ascontiguousarray(point.u[:-1])
+    chosen = settings_of(settings, bounds)
+    sizes, _ = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
+    found, u, leaving = orbit_starts.from_hopf(
+        field, values, free, state, float(point.details["angular_frequency"]),
+        point.details["eigenvector"], 50, 4,
+        np.append(sizes, width_of(width, chosen, point.parameter)))
+    problem, start = shooting_from(found, u, segments, rtol)
+    shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
+    tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
+    attributes = {"state_names": list(field.state_names),
+                  "parameter_names": list(field.parameters), "parameter_values": values,
+                  "scales": problem.scales, "segments": segments, "periods": 1, "rtol": rtol}
+    return follow(problem, start, chosen, name=branch.name,
+                  tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
+                  attributes=attributes)
 
 
 def doubled_by_shooting(
