@@ -15,8 +15,8 @@ from fecontact.bifurcation.floquet import Floquet, floquet_of
 from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.problem import Problem
 from fecontact.errors import AnalysisError, InputError
+from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
-from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status
 
 Array = NDArray[np.float64]
@@ -202,16 +202,14 @@ class Shot:
     def _ends(self) -> Array:
         if "runs" in self.__dict__:
             return np.array([run.states[-1] for run in self.runs])
-        ends = []
-        for start, begin, end in zip(self.problem.starts(self.u), self._times[:-1],
-                                     self._times[1:], strict=True):
-            run = simulate(self._system, float(end), t_start=float(begin), initial=start,
-                           outputs=2, rtol=self.problem.rtol)
-            if run.status is not Status.FINISHED:
-                raise AnalysisError(f"The run of a segment did not reach its end: "
-                                    f"{run.status.value}")
-            ends.append(run.states[-1])
-        return np.array(ends)
+        found = ensemble(self._system, np.stack([self._times[:-1], self._times[1:]], axis=1),
+                         initial=self.problem.starts(self.u), rtol=self.problem.rtol)
+        if not found.finished.all():
+            status = found.status[int(np.argmin(found.finished))]
+            if status is Status.INTERRUPTED:
+                raise KeyboardInterrupt
+            raise AnalysisError(f"The run of a segment did not reach its end: {status.value}")
+        return found.states[:, -1]
 
     @cached_property
     def residual(self) -> Array:
