@@ -14,7 +14,8 @@ from .bifurcation.curves import fold_curve, hopf_curve
 from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
-from .bifurcation.orbit_output import amplitude, orbit_history
+from .bifurcation.orbit_curves import orbit_curve
+from .bifurcation.orbit_output import amplitude, orbit_history, quantity_range
 from .bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
 from .bifurcation.shooting_branch import orbits_by_shooting
 from .bifurcation.stability_map import stability_map
@@ -203,6 +204,7 @@ __all__ = [
     "memory_friction_law",
     "mode_convergence",
     "normal_law",
+    "orbit_curve",
     "orbit_history",
     "orbits_beyond",
     "orbits_by_shooting",
@@ -224,6 +226,7 @@ __all__ = [
     "plot_spectrum",
     "plot_stability_map",
     "power_spectral_density",
+    "quantity_range",
     "read_case",
     "read_matrix",
     "read_mesh",

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation import elimination
+from fecontact.bifurcation import bordered_kernels
+from fecontact.bifurcation.elimination import Factors
 
 Array = NDArray[np.float64]
 
@@ -11,20 +12,20 @@ Array = NDArray[np.float64]
 class Border:
     """A further row, reduced to x_0, x_N and the common unknowns."""
 
-    def __init__(self, factors: elimination.Factors, row: Array) -> None:
+    def __init__(self, factors: Factors, row: Array) -> None:
         N, _, _ = factors.local.shape
         d = factors.end.shape[0]
         self.local = np.empty((N, factors.local_pivots.shape[1]))
         self.chain = np.empty((N - 1, d))
         self.small = np.empty(factors.end.shape[1])
-        elimination.reduce_border(factors, row, self.local, self.chain, self.small)
+        bordered_kernels.reduce_border(factors, row, self.local, self.chain, self.small)
 
 
 class Bordered:
     """A bordered system, with x(1) = closing x(0)."""
 
     def __init__(
-        self, factors: elimination.Factors, borders: list[Border], closing: float
+        self, factors: Factors, borders: list[Border], closing: float
     ) -> None:
         self._factors, self._closing = factors, closing
         count, N, d = len(borders), len(factors.local), len(factors.end)
@@ -47,7 +48,7 @@ class Bordered:
         N, size, _ = self._factors.local.shape
         d = len(self._factors.end)
         out = np.empty(N * size + self._small.shape[1] - 2 * d)
-        elimination.solve(self._factors, rhs, self._local, self._chain, self._small,
+        bordered_kernels.solve(self._factors, rhs, self._local, self._chain, self._small,
                           self._closing, out)
         return out
 
@@ -57,7 +58,7 @@ class Bordered:
         d = len(self._factors.end)
         out = np.empty(N * size + len(solution) - d)
         out[N * size :] = solution[d:]
-        elimination.expand(self._factors, np.zeros((N, size)), np.zeros((N - 1, 2 * d)),
+        bordered_kernels.expand(self._factors, np.zeros((N, size)), np.zeros((N - 1, 2 * d)),
                            solution[:d], self._closing * solution[:d], solution[d:],
                            out[: N * size])
         return out

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.elimination import Factors
 from fecontact.bifurcation.multiplier_tests import multiplier_tests
-from fecontact.bifurcation.periodic_schur import eigenvalues_of_product, transitions
+from fecontact.bifurcation.periodic_schur import eigenvalues_of_product
+from fecontact.bifurcation.transitions import transitions
 from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]

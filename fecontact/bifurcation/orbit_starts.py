@@ -160,7 +160,7 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
     row[-1] = 1.0
     name = list(problem.field.parameters)[problem.free]
     where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
-    size = np.linalg.norm(np.ptp(problem.nodes(u), axis=0))
+    size = float(np.linalg.norm(np.ptp(problem.nodes(u), axis=0)))
     linearised = problem.linearise(u)
     norm = float(np.linalg.norm(linearised.residual))
     for _ in range(_CORRECTIONS):
@@ -180,13 +180,20 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
             break
         u, linearised, norm = u + factor * step, trial, found
         if factor == 1.0 and np.abs(step).max() < tolerance * (1.0 + np.abs(u).max()):
-            if np.linalg.norm(np.ptp(problem.nodes(u), axis=0)) < 1e-4 * size:
-                raise AnalysisError(f"No periodic orbit {where}: the iteration falls onto an "
-                                    f"equilibrium; start from a motion of larger amplitude.")
-            return u
+            if not _at_rest(problem, u, size):
+                return u
+            break
+    if _at_rest(problem, u, size):
+        raise AnalysisError(f"No periodic orbit was found {where}: the iteration ends without "
+                            f"any motion, as at an equilibrium; start from a motion of larger "
+                            f"amplitude.")
     raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does not converge "
                         f"(residual {norm:.3g}); start nearer to it, from a longer settled run, or "
                         f"take more than {problem.intervals} intervals.")
+
+
+def _at_rest(problem: Collocation, u: Array, size: float) -> bool:
+    return float(np.linalg.norm(np.ptp(problem.nodes(u), axis=0))) <= 1e-4 * size
 
 
 def doubled(

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation import orbit_starts
-from fecontact.bifurcation.branch import Branch, BranchPoint
+from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.continuation import Settings, continuation
 from fecontact.bifurcation.equilibria import Equilibrium
@@ -192,9 +192,14 @@ def _followed(
     # What is special is located once more below, on a mesh of its own.
     branch = follow(replace(problem, limits=limits, precision=1e-3), u, settings, name=name,
                     tangent=tangent, attributes=attributes, **options)
-    points = tuple(_sharpened(field, branch, index) if point.kind in _KINDS else point
-                   for index, point in enumerate(branch.points))
-    return replace(branch, points=points)
+    points = list(branch.points)
+    try:
+        for index, point in enumerate(branch.points):
+            if point.kind in _KINDS:
+                points[index] = _sharpened(field, branch, index)
+    except KeyboardInterrupt:
+        branch = replace(branch, status=Status.INTERRUPTED)
+    return replace(branch, points=tuple(points))
 
 
 def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
@@ -219,4 +224,6 @@ def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
                     return replace(found, tangent=tangent)
         except FecontactError:
             continue
-    return point
+    kind = "torus" if point.kind == "Neimark-Sacker" else str(point.kind)
+    details = problem.examine(kind, u, problem.linearise(u), tangent)
+    return point if details is None else replace(point, details={**point.details, **details})

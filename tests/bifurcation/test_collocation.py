@@ -38,6 +38,11 @@ def belt(t, x, p, out):
     out[1] = -x[0] - 2.0 / math.pi * math.atan(p[0] * v) / (1.0 + 3.0 * abs(v))
 
 
+def drift(t, x, p, out):
+    out[0] = 1.0 + p[0] * x[1] * x[1]
+    out[1] = -x[1]
+
+
 @pytest.fixture(scope="module")
 def landau():
     return VectorField.from_function(stuart_landau, {"r": 0.5, "w": 2.0}, 2)
@@ -203,5 +208,18 @@ def test_kind_errors(landau):
         orbits_from_motion(landau, "r", t, circle, degree=9)
     with pytest.raises(InputError, match=r"scales = .* must hold 2 numbers"):
         orbits_from_motion(landau, "r", t, circle, scales=[1.0])
-    with pytest.raises(AnalysisError, match=r"at r = -0\.5.*larger amplitude|not converge"):
+    with pytest.raises(AnalysisError, match=r"at r = -0\.5, from the period .*larger amplitude"):
         orbits_from_motion(landau, "r", t, circle, values=[-0.5, 2.0])
+    drifting = VectorField.from_function(drift, {"r": 0.5}, 2)
+    with pytest.raises(AnalysisError, match=r"at r = 0\.5, from the period 5 s: the "
+                                            r"iteration ends without any motion"):
+        orbits_from_motion(drifting, "r", t, circle, period=5.0, intervals=20)
+
+
+def test_no_convergence_is_told_with_what_to_try():
+    # Far too few intervals for friction that is steep.
+    field = VectorField.from_function(belt, {"slope": 1e5, "V": 0.2}, 2)
+    times, states = settled(field, 60.0, [1.0, 0.2], 12.0)
+    with pytest.raises(AnalysisError, match=r"at slope = 100000, from the period 11\.\d+ s: "
+                                            r"Newton's method does not converge .* 3 intervals"):
+        orbits_from_motion(field, "slope", times, states, intervals=3, degree=2)

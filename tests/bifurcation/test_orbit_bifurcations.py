@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from collocation_fields import lorenz_field, settled, two_masses_field
 
-from fecontact.bifurcation.branch import Status
+from fecontact.bifurcation.branch import Branch, Status
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
 from fecontact.bifurcation.orbits import (
     orbits_beyond,
@@ -142,6 +142,16 @@ def test_points_stay_where_they_are_when_the_mesh_doubles(masses, sliding, first
     for kind in ("fold", "period doubling"):
         assert finer.of_kind(kind)[0].parameter == pytest.approx(
             first.of_kind(kind)[0].parameter, abs=3e-9)
+
+
+def test_branches_go_on_from_their_files(masses, first, tmp_path):
+    loaded = Branch.load(first.save(tmp_path / "orbits.h5"))
+    assert [at.kind for at in loaded.points] == [at.kind for at in first.points]
+    assert (loaded.column("multipliers") == first.column("multipliers")).all()
+    doubled = [orbits_beyond(masses, branch, branch.of_kind("period doubling")[0],
+                             settings=Settings(points=2), bounds=(8.0, 9.6)).points[-1]
+               for branch in (first, loaded)]
+    assert (doubled[0].u == doubled[1].u).all()
 
 
 def moebius(t, x, p, out):
