@@ -18,7 +18,7 @@ import numpy as np
 
 import fecontact as fc
 from fecontact.bifurcation.contact_field import ContactField
-from fecontact.bifurcation.observed import observed
+from fecontact.bifurcation.observation import observe
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.settled import settled_motion
 from fecontact.bifurcation.shooting_switch import doubled_by_shooting
@@ -110,7 +110,7 @@ def main(folder: Path = Path("impact-orbits")) -> None:
             except AnalysisError as error:
                 print(f"No orbits from {w} rad/s: {error}")
         field = field_at(starts[0])
-        shown = [observed(field, branch, "B", "y") for branch in found]
+        shown = [observe(field, branch, "B", "y") for branch in found]
         for branch in shown:
             print(f"\n{described(branch)}: {branch.parameter.min():.4f} to "
                   f"{branch.parameter.max():.4f} rad/s, {len(branch)} points. "

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.contact_field import ContactField, contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
-from fecontact.bifurcation.observed import observed, shot
+from fecontact.bifurcation.observation import observe, shot
 from fecontact.console import waiting
 from fecontact.errors import FecontactError
 
@@ -36,7 +36,7 @@ class Branches:
         The displacement that is observed.
     found : dict of name to Branch
         With the range of the observed displacement; see
-        :func:`fecontact.bifurcation.observed.observed`.
+        :func:`fecontact.bifurcation.observation.observe`.
     notes : list of str
         Sentences on branches that could not be followed.
     interrupted : bool
@@ -87,7 +87,7 @@ def follow_branches(
     for generation in range(wanted.generations + 1):
         later: dict[str, Branch] = {}
         for name, branch in begun.items():
-            result.found[name] = observed(result.field, branch, *result.observe)
+            result.found[name] = observe(result.field, branch, *result.observe)
             if branch.status is Status.INTERRUPTED:
                 result.interrupted = True
                 return result
@@ -111,7 +111,7 @@ def follow_branches(
                         result.interrupted = new.status is Status.INTERRUPTED
                     if result.interrupted:
                         for each, found in later.items():
-                            result.found[each] = observed(result.field, found, *result.observe)
+                            result.found[each] = observe(result.field, found, *result.observe)
                         return result
         begun = later
     return result

@@ -67,7 +67,7 @@ def phase_inset(
     InputError
         If the point is no orbit.
     """
-    from fecontact.bifurcation.observed import motion_of
+    from fecontact.bifurcation.observation import motion_of
 
     states = motion_of(field, branch, point)[1]
     row = field.displacement_row(*observe)

@@ -51,7 +51,7 @@ def plot_branches(
     y, x : str, int or callable
         What to draw: 'parameter', the name of a stored number, the number of a state counted from
         0, or a function of a :class:`fecontact.bifurcation.branch.BranchPoint`. For y also
-        'observed_section' of :func:`fecontact.bifurcation.observed.observed`, one curve for each
+        'observed_section' of :func:`fecontact.bifurcation.observation.observe`, one curve for each
         period of the excitation.
     x_label, y_label : str, optional
         Labels of the axes, with units.

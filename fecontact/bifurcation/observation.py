@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 _SAMPLES = 1000
 
 
-def observed(
+def observe(
     field: ContactField, branch: Branch, point: str | int = "B", axis: Literal["x", "y"] = "x"
 ) -> Branch:
     """The branch with the range of a displacement at each of its points.
