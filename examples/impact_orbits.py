@@ -117,7 +117,7 @@ def main(folder: Path = Path("impact-orbits")) -> None:
                   f"{branch.status.value}")
             for point in branch.special:
                 print(f"  {point.kind} at {point.parameter:.5f} rad/s")
-        insets = []
+        insets: list[fc.Inset] = []
         for branch in shown:
             stable = [point for point in branch.points
                       if point.values["stable"] and point.kind is None]

@@ -1,7 +1,10 @@
 """All branches that the section ``[branch]`` of a study asks for."""
 
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +33,7 @@ class Branches:
 
     Attributes
     ----------
-    field : ContactField
+    contact_field : ContactField
         The system as a function of the parameter.
     observe : (point, axis)
         The displacement that is observed.
@@ -43,7 +46,7 @@ class Branches:
         Whether Ctrl-C ended it; what was computed until then is there.
     """
 
-    field: ContactField
+    contact_field: ContactField
     observe: tuple[str | int, Literal["x", "y"]]
     found: dict[str, Branch] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -69,52 +72,63 @@ def follow_branches(
     FecontactError
         If the first branch cannot be begun; others that cannot leave a note.
     """
-    low, high = wanted.bounds
-    basis = system.basis
-    point = wanted.point
-    if point is None:
-        point = "B" if basis.T[0].any() else basis.contact_nodes // 2
+    basis, shown = system.basis, wanted.point
+    if shown is None:
+        shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
     # Found out after a long computation, a wrong name would be found out too late.
-    basis.point_index(point)
-    result = Branches(contact_field(system, {wanted.name: wanted.first}), (point, wanted.axis))
-    begun: dict[str, Branch] = {}
-    if wanted.kind != "orbits":
-        begun[_EQUILIBRIA] = equilibrium_branch(
-            result.field, wanted.name, settings=wanted.settings(),
-            direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high)
-    if wanted.kind != "equilibria":
-        begun["orbits of the run"] = _orbits(result.field, wanted, initial)
-    for generation in range(wanted.generations + 1):
-        later: dict[str, Branch] = {}
-        for name, branch in begun.items():
-            result.found[name] = observe(result.field, branch, *result.observe)
-            if branch.status is Status.INTERRUPTED:
-                result.interrupted = True
-                return result
-        if generation == wanted.generations:
+    basis.point_index(shown)
+    result = Branches(contact_field(system, {wanted.name: wanted.first}), (shown, wanted.axis))
+    tasks = deque(_first_tasks(result.contact_field, wanted, initial))
+    while tasks:
+        task = tasks.popleft()
+        try:
+            branch = task.follow()
+        except KeyboardInterrupt:
+            if not result.found:
+                raise
+            result.interrupted = True
             break
-        for name, branch in begun.items():
-            for kind in wanted.switch:
-                points = branch.of_kind(kind)
-                for number, point in enumerate(points):
-                    title = _title(name, kind, f" {number + 1}" if len(points) > 1 else "")
-                    try:
-                        new = _beyond(result.field, branch, point, wanted)
-                    except KeyboardInterrupt:
-                        result.interrupted = True
-                    except FecontactError as error:
-                        result.notes.append(f"The branch '{title}' from {wanted.name} = "
-                                            f"{point.parameter:.6g} was not followed: {error}")
-                        continue
-                    else:
-                        later[title] = new
-                        result.interrupted = new.status is Status.INTERRUPTED
-                    if result.interrupted:
-                        for each, found in later.items():
-                            result.found[each] = observe(result.field, found, *result.observe)
-                        return result
-        begun = later
+        except FecontactError as error:
+            if not result.found:
+                raise
+            result.notes.append(f"The branch '{task.title}' was not followed: {error}")
+            continue
+        result.found[task.title] = observe(result.contact_field, branch, *result.observe)
+        if branch.status is Status.INTERRUPTED:
+            result.interrupted = True
+            break
+        if task.generation < wanted.generations:
+            tasks.extend(_tasks_beyond(result.contact_field, branch, task, wanted))
     return result
+
+
+class _Task(NamedTuple):
+    """A branch that is to be followed."""
+
+    title: str
+    generation: int
+    follow: Callable[[], Branch]
+
+
+def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[_Task]:
+    low, high = wanted.bounds
+    if wanted.kind != "orbits":
+        yield _Task(_EQUILIBRIA, 0, lambda: equilibrium_branch(
+            field, wanted.name, settings=wanted.settings(),
+            direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
+    if wanted.kind != "equilibria":
+        yield _Task("orbits of the run", 0, lambda: _orbits(field, wanted, initial))
+
+
+def _tasks_beyond(
+    field: ContactField, branch: Branch, task: _Task, wanted: "BranchSettings"
+) -> Iterator[_Task]:
+    for kind in wanted.switch:
+        points = branch.of_kind(kind)
+        for number, point in enumerate(points):
+            title = _title(task.title, kind, f" {number + 1}" if len(points) > 1 else "")
+            yield _Task(title, task.generation + 1,
+                        partial(_beyond, field, branch, point, wanted))
 
 
 def _orbits(field: ContactField, wanted: "BranchSettings", initial: Any) -> Branch:

@@ -15,9 +15,9 @@ from fecontact.integrate.simulate import simulate
 
 Array = NDArray[np.float64]
 
-# Outputs over one period of an orbit from shooting; an extreme between two of them is met to the
-# square of their spacing.
 _SAMPLES = 1000
+# For extremes, which are met to the square of the spacing.
+_FINE = 4000
 
 
 def observe(
@@ -64,7 +64,7 @@ def _range(
         mesh, nodes, _ = orbit_nodes(point, field.dimension)
         section = interpolate(mesh, nodes, phases) @ row
         return *quantity_range(point, row), {"observed_section": section} if excited else {}
-    time, states = motion_of(field, branch, point)
+    time, states = motion_of(field, branch, point, _FINE)
     motion = states @ row
     section = np.interp(phases, time / time[-1], motion)
     return (float(motion.min()), float(motion.max()),

@@ -81,7 +81,7 @@ def settled_motion(
     first = _TRANSIENT_PERIODS if transient is None else max(1, round(transient / excitation))
     largest = _LARGEST if longest_period is None else max(1, round(longest_period / excitation))
     checks = largest + max(2 * largest, 8)
-    instants = excitation * np.arange(first, first + checks + 1)
+    instants: Array = excitation * np.arange(first, first + checks + 1, dtype=float)
     run = _run(system, initial, float(instants[-1]), instants, rtol)
     fine = _run(system, run.states[-1], float(instants[-1] + excitation * largest),
                 float(instants[-1]) + excitation * np.linspace(0.0, largest,
@@ -147,5 +147,5 @@ def _period(run: Trajectory, longest: float) -> float:
 
 
 def _at_rest(run: Trajectory) -> bool:
-    size = np.ptp(run.modal_coordinates, axis=0).max()
+    size = float(np.ptp(run.modal_coordinates, axis=0).max())
     return bool(size <= 1e-7 * np.abs(run.modal_coordinates).max())
