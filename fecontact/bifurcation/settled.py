@@ -127,19 +127,21 @@ def _period(run: Trajectory, longest: float) -> float:
     Slip velocities hardly change during stick, so that states alone do not tell the time well.
     """
     t, states = run.time, run.states
-    size = np.ptp(states, axis=0)
+    # Displacements, velocities and internal variables, each by the largest of them.
+    size, m = np.ptp(states, axis=0), run.system.basis.modes
+    for group in (slice(0, m), slice(m, 2 * m), slice(2 * m, None)):
+        size[group] = size[group].max(initial=0.0) or 1.0
     fastest = int(np.argmax(np.ptp(run.modal_coordinates, axis=0)))
     x = states[:, fastest] - (states[:, fastest].max() + states[:, fastest].min()) / 2.0
     rising = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
     part = -x[rising] / (x[rising + 1] - x[rising])
     passed = t[rising] + part * (t[rising + 1] - t[rising])
     there = states[rising] + part[:, None] * (states[rising + 1] - states[rising])
-    scale = np.where(size > 1e-9 * size.max(), size, size.max())
     for back in range(2, len(passed) + 1):
         period = float(passed[-1] - passed[-back])
         if period > longest:
             break
-        if (np.abs(there[-1] - there[-back]) <= _MISFIT * scale).all():
+        if (np.abs(there[-1] - there[-back]) <= _MISFIT * size).all():
             return period
     raise AnalysisError(f"The motion does not repeat within {longest:g} s; run it longer until it "
                         f"has settled, raise longest_period, or start at another value of the "

@@ -108,13 +108,14 @@ def draw_insets(figure: "Figure", axis: "Axes", insets: Sequence[Inset]) -> None
                    linestyle="-" if inset.stable else (0, (4, 2.5)))
         small.set_title(inset.title, fontsize=9.0)
         small.tick_params(labelsize=7.5)
-        small.set_xlabel(f"x [{length_name}]" if number == 0 else "", fontsize=8.0)
-        small.set_ylabel(f"x' [{speed_name}]" if number == 0 else "", fontsize=8.0)
+        small.set_xlabel(f"displacement [{length_name}]" if number == 0 else "", fontsize=8.0,
+                         loc="left")
+        small.set_ylabel(f"velocity [{speed_name}]" if number == 0 else "", fontsize=8.0)
         small.margins(0.08)
         axis.plot(inset.parameter, inset.height, "o", markersize=4.0, color=_INK, zorder=6)
         figure.add_artist(ConnectionPatch(
             (0.5, 0.0), (inset.parameter, inset.height), small.transAxes, axis.transData,
-            color="#8a8a8a", linewidth=0.7, zorder=0))
+            color="#8a8a8a", linewidth=0.7, zorder=5))
 
 
 def draw_beneath(
