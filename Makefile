@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 SYSTEM := $(VENV)/.system-libraries
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check bench clean
+.PHONY: help setup demo test check bench validation clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
@@ -26,6 +26,9 @@ check: $(READY) ## ruff and mypy
 
 bench: $(READY) $(SYSTEM) ## run the benchmarks
 	@for file in benchmarks/[a-z]*.py; do echo "$$file"; $(BIN)/python "$$file" || exit 1; done
+
+validation: $(READY) $(SYSTEM) ## compute docs/validation.md and its pictures again
+	@$(BIN)/python docs/validation/build.py
 
 clean: ## remove .venv, demo-output and caches
 	rm -rf $(VENV) demo-output dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -91,10 +91,16 @@ from .output.plots import plot_contact_map, plot_energies, plot_history, plot_mo
 from .output.pvd import export_pvd
 from .output.stability_plots import plot_eigenvalues, plot_stability_map
 from .output.store import read_case, write_case
+from .output.sweep_plots import plot_sobol, plot_strobed, plot_sweep
 from .points import Patch
 from .rows import rows_from_dofs
 from .statics import static_equilibrium
 from .study import Study
+from .sweeps.executors import dask_executor
+from .sweeps.settings import Distribution, Range, Strobing, SweepSettings
+from .sweeps.statistics import SobolIndices, sobol_indices, statistics
+from .sweeps.sweep import sweep
+from .sweeps.table import SweepTable, read_table
 from .system import ContactSystem
 
 __version__: str
@@ -119,6 +125,7 @@ __all__ = [
     "Crown",
     "CubicFriction",
     "DahlFriction",
+    "Distribution",
     "Drive",
     "ElasticBody",
     "Energies",
@@ -167,6 +174,7 @@ __all__ = [
     "ProductFriction",
     "Pulse",
     "RandomRoughness",
+    "Range",
     "Rayleigh",
     "RestitutionContact",
     "RigidStart",
@@ -175,10 +183,14 @@ __all__ = [
     "SettledMotion",
     "Sine",
     "SmoothingCost",
+    "SobolIndices",
     "SpeedRamp",
     "Status",
+    "Strobing",
     "Study",
     "Sweep",
+    "SweepSettings",
+    "SweepTable",
     "Tabulated",
     "Trace",
     "Trajectory",
@@ -191,6 +203,7 @@ __all__ = [
     "check_law",
     "contact_field",
     "count_periods",
+    "dask_executor",
     "doubled_by_shooting",
     "ensemble",
     "equilibrium_branch",
@@ -237,14 +250,18 @@ __all__ = [
     "plot_phase",
     "plot_poincare",
     "plot_response",
+    "plot_sobol",
     "plot_spectrogram",
     "plot_spectrum",
     "plot_stability_map",
+    "plot_strobed",
+    "plot_sweep",
     "power_spectral_density",
     "quantity_range",
     "read_case",
     "read_matrix",
     "read_mesh",
+    "read_table",
     "read_uff",
     "render",
     "rows_from_dofs",
@@ -253,11 +270,14 @@ __all__ = [
     "settled_motion",
     "simulate",
     "smoothing_cost",
+    "sobol_indices",
     "spectrogram",
     "stability_map",
     "static_equilibrium",
+    "statistics",
     "strobe",
     "strobed_states",
+    "sweep",
     "switched_branch",
     "to_xarray",
     "window",

@@ -91,6 +91,7 @@ def grid_of(shape: Shape) -> Grid:
                 hole = Hole("pivot", (0.0, middle), shape.hinge_radius)
             else:
                 points["pivot"] = (0.0, middle)
+            reach = half_width if shape.contact_length is None else shape.contact_length / 2
 
             def part_of_pendulum(x: float, y: float) -> str | None:
                 if x > length - half_width:
@@ -98,11 +99,12 @@ def grid_of(shape: Shape) -> Grid:
                 return "arm" if abs(y - middle) < half_arm else None
 
             def side_of_pendulum(part: str, facing: str, x: float) -> str:
-                return "contact" if (part, facing) == ("bob", "bottom") else f"{part}_{facing}"
+                touches = (part, facing) == ("bob", "bottom") and abs(x - length) < reach
+                return "contact" if touches else f"{part}_{facing}"
 
             return Grid(
                 _lines(start, length + half_width, length - half_width, length, drive,
-                       *((0.0, half_arm) if hole else ())),
+                       length - reach, length + reach, *((0.0, half_arm) if hole else ())),
                 _lines(0.0, shape.bob_height, middle, middle - half_arm, middle + half_arm),
                 part_of_pendulum,
                 side_of_pendulum,

@@ -121,7 +121,8 @@ def _same_run(study: "Study", stored: str | None) -> bool:
         earlier = Study.from_toml(stored or "")
     except FecontactError:
         return False
-    return study == replace(earlier, output=study.output, render=study.render)
+    return study == replace(earlier, output=study.output, render=study.render,
+                            sweep=study.sweep)
 
 
 def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") -> Path:

@@ -105,7 +105,8 @@ class Pendulum:
     arm), ``bob_right``, ``arm_top``, ``arm_bottom``, ``arm_left``; points ``pivot`` (the hinge),
     ``B`` (on the mid-line, ``drive_distance`` from the hinge) and ``C`` (top of the bob, middle).
     With a ``hinge_radius`` the arm reaches half its height beyond the hinge, and ``pivot`` is the
-    boundary of a hole, to be held as a 'hinge'.
+    boundary of a hole, to be held as a 'hinge'. With a ``contact_length`` the rest of the bob's
+    bottom is ``bob_bottom``.
 
     The default is the aluminium pendulum of the impact oscillator: an arm of 0.30 m x 7.7 mm,
     which weighs 0.122 kg at a thickness of 19.6 mm and 2700 kg/m^3. The bob is a square whose
@@ -122,6 +123,9 @@ class Pendulum:
         Distance of B from the hinge [m]; None for ``arm_length``.
     hinge_radius : float
         Radius of the hole at the hinge, below half of ``arm_height``; zero for none [m].
+    contact_length : float or None
+        Length of the middle part of the bob's bottom that can touch the ground [m]; None for all
+        of it.
     element_size : float
         Longest side of a quadrilateral, and of the legs of a (right-angled) triangle [m].
     element : "quadrilateral" or "triangle"
@@ -130,7 +134,8 @@ class Pendulum:
     ------
     InputError
         For a value that is not a finite number above zero, a bob that is not higher than the
-        arm or reaches the hinge, a drive beyond the bob, or another element.
+        arm or reaches the hinge, a drive beyond the bob, a contact longer than it, or another
+        element.
     """
 
     arm_length: float = 0.3
@@ -139,6 +144,7 @@ class Pendulum:
     bob_height: float = 0.033
     drive_distance: float | None = None
     hinge_radius: float = 0.0
+    contact_length: float | None = None
     element_size: float = 0.004
     element: Element = "quadrilateral"
 
@@ -156,6 +162,10 @@ class Pendulum:
         if self.bob_width >= 2 * self.arm_length * (1 - SAME):
             raise InputError(f"Pendulum: bob_width = {self.bob_width!r} must be below twice "
                              f"arm_length = {self.arm_length!r}, or the bob reaches the hinge.")
+        if self.contact_length is not None:
+            require_positive("Pendulum", contact_length=self.contact_length)
+            _require_at_most("Pendulum", "contact_length", self.contact_length, "bob_width",
+                             self.bob_width)
         if self.drive_distance is not None:
             require_positive("Pendulum", drive_distance=self.drive_distance)
             _require_at_most("Pendulum", "drive_distance", self.drive_distance,

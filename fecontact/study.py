@@ -32,6 +32,7 @@ from fecontact.study_sections import (
     SimulationSettings,
 )
 from fecontact.study_system import contact_system
+from fecontact.sweeps.settings import SweepSettings, flat_axes
 from fecontact.system import ContactSystem
 from fecontact.tables import (
     PART_CLASSES,
@@ -52,6 +53,9 @@ _SECTIONS: Mapping[str, type] = {
 }
 _ATTRIBUTES = {name: name for name in _SECTIONS} | {"body": "body_settings",
                                                      "basis": "basis_settings"}
+# What a study has made once, and the sections that it depends on.
+_MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body_settings"),
+              "_basis": ("geometry", "body_settings", "basis_settings")}
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,8 @@ class Study:
         ``[output]``
     render : RenderSettings
         ``[render]``
+    sweep : SweepSettings or None
+        ``[sweep]``: many cases of this study; see :func:`fecontact.sweep`.
     path : Path or None
         The file; other files are named relative to it.
     """
@@ -104,6 +110,7 @@ class Study:
     branch: BranchSettings = field(default_factory=BranchSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     render: RenderSettings = field(default_factory=RenderSettings)
+    sweep: SweepSettings | None = None
     path: Path | None = field(default=None, compare=False)
 
     @classmethod
@@ -147,7 +154,7 @@ class Study:
         tables = {name: table if name == "geometry" else with_folder(table, folder)
                   for name, table in tables.items()}
         for name in tables:
-            if name not in (valid := ("gap", "geometry", "contact", *_SECTIONS)):
+            if name not in (valid := ("gap", "geometry", "contact", "sweep", *_SECTIONS)):
                 raise InputError(f"{title} has an unknown section or key '{name}'"
                                  f"{nearest(name, valid)}; there are: {choices(valid)}.")
         if "geometry" not in tables:
@@ -158,6 +165,8 @@ class Study:
             gap=_gap(tables.get("gap", 0.0), title),
             contact=convert(tables.get("contact", {}), Mapping[str, ContactLaws], title,
                             "contact"),
+            sweep=from_table(SweepSettings, flat_axes(tables["sweep"]), f"{title}: [sweep]")
+            if "sweep" in tables else None,
             path=path,
             **{_ATTRIBUTES[name]: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items()},
@@ -191,6 +200,8 @@ class Study:
         sections = {name: to_table(getattr(self, attribute), defaults=defaults)
                     for name, attribute in _ATTRIBUTES.items()}
         contact = {"contact": plain(self.contact)} if self.contact else {}
+        if self.sweep is not None:
+            sections["sweep"] = to_table(self.sweep, defaults=defaults)
         return {"gap": plain(self.gap),
                 "geometry": geometry_table(self.geometry, defaults=defaults),
                 **contact,
@@ -208,7 +219,9 @@ class Study:
     def with_(self, **changes: Any) -> "Study":
         """A copy with other values, by the dotted names of the file.
 
-        ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``
+        ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``; members of lists go by
+        number, ``load.forces.0.signal.amplitude``. Mesh, body and modal basis are kept where
+        nothing that they depend on changes.
 
         Raises
         ------
@@ -221,13 +234,22 @@ class Study:
             *sections, key = name.split(".")
             table: Any = tables
             for depth, section in enumerate(sections, 1):
-                table = table.setdefault(section, {})
-                if not isinstance(table, dict):
+                if isinstance(table, list):
+                    table = table[_number(section, table, name, _title(self.path))]
+                else:
+                    table = table.setdefault(section, {})
+                if not isinstance(table, dict | list):
                     raise InputError(f"{_title(self.path)}: {name} cannot be set, because "
                                      f"{'.'.join(sections[:depth])} = {shown(table)} is not a "
                                      f"table.")
-            table[key] = plain(value)
-        return self.from_tables(tables, self.path)
+            place = _number(key, table, name, _title(self.path)) if isinstance(table, list) else key
+            table[place] = plain(value)
+        study = self.from_tables(tables, self.path)
+        for made, needed in _MADE_FROM.items():
+            if made in vars(self) and all(getattr(study, section) == getattr(self, section)
+                                          for section in needed):
+                vars(study)[made] = vars(self)[made]
+        return study
 
     def mesh(self) -> Mesh:
         """The mesh, generated or read; the same object at every call, as in all of these."""
@@ -294,6 +316,13 @@ class Study:
         body = self.body()
         with located(f"{_title(self.path)}: [basis]:"):
             return self.basis_settings.basis(body)
+
+
+def _number(text: str, items: list[Any], name: str, title: str) -> int:
+    if not (text.isdigit() and int(text) < len(items)):
+        raise InputError(f"{title}: {name} cannot be set, because '{text}' is none of the "
+                         f"{len(items)} members, counted from 0.")
+    return int(text)
 
 
 def _title(path: Path | None) -> str:

@@ -6,6 +6,7 @@ import types
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
 from numbers import Integral, Real
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
@@ -54,7 +55,7 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
         chosen = law_class(cls, table.get("law"), where)
         parameters = {key: value for key, value in table.items() if key != "law"}
         return cast(T, from_table(chosen, parameters, where))
-    hints = get_type_hints(cls)
+    hints = _hints(cast(Any, cls))
     entries = {entry.name: entry for entry in fields(cls)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for key, value in table.items():
@@ -67,6 +68,11 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
                          f"{choices(missing)}.")
     with located(f"{where}:", cls.__name__):
         return cls(**values)
+
+
+@cache
+def _hints(cls: Any) -> dict[str, Any]:
+    return get_type_hints(cls)
 
 
 def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from fecontact import (
     basins,
     brute_force,
     lyapunov_exponents,
+    sensitivity,
     strobe,
 )
 from fecontact.errors import AnalysisError
@@ -33,19 +34,30 @@ def test_exponents_of_a_linear_oscillator():
     wanted = np.sort(np.linalg.eigvals(A).real)[::-1]
     # Pairs rotate, which blurs each exponent but not the sum of a pair.
     assert found.exponents[:2].sum() == pytest.approx(wanted[:2].sum(), abs=2.0)
-    assert found.exponents.sum() == pytest.approx(np.trace(A), rel=1e-4)
+    assert found.exponents.sum() == pytest.approx(np.trace(A), rel=1e-3)
     assert found.history.shape == (200, 4)
 
 
 @pytest.mark.parametrize(("w", "low", "high"), [
-    (64.32, -30.0, -1.0), (30.84, -30.0, -0.3), (23.63, 3.5, 9.0)])
+    (64.32, -7.3, -5.2), (30.84, -4.1, -3.0), (23.63, 4.5, 8.0)])
 def test_exponents_of_the_impact_oscillator(w, low, high):
-    """Periodic motions below zero; at 23.63 rad/s chaos, about +6 1/s."""
+    """By multipliers of the orbits -6.254 and -3.574 1/s; at 23.63 rad/s chaos, about +6 1/s."""
     period = 2.0 * np.pi / w
     found = lyapunov_exponents(impact_oscillator(2, w), 200 * period, transient=50 * period,
                                initial=np.zeros(4))
     assert low < found.exponents[0] < high
     assert found.uncertainty[0] < 2.0
+
+
+@pytest.mark.parametrize(("w", "periods", "wanted"), [(64.32, 1, -6.254192), (30.84, 2, -3.573516)])
+def test_multipliers_at_loose_tolerance(w, periods, wanted):
+    """At rtol = 1e-6 they are what they are at 1e-11, impacts and all."""
+    system, period = impact_oscillator(2, w), 2.0 * np.pi / w * periods
+    orbit = strobe(system, transient=300, keep=1, initial=np.zeros(4), rtol=1e-10).states[0, 0]
+    for rtol, relative in ((1e-6, 5e-4), (1e-9, 2e-6)):
+        found = sensitivity(system, period, initial=orbit, rtol=rtol).monodromy
+        largest = np.log(np.abs(np.linalg.eigvals(found)).max()) / period
+        assert largest == pytest.approx(wanted, rel=relative)
 
 
 def test_brute_force_meets_single_runs():

@@ -271,8 +271,17 @@ def test_ctrl_c_writes_what_was_computed(cli, study, tmp_path):
     while not (tmp_path / "results").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
     time.sleep(5.0)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    # Again, as people do: while a library is loaded the first may be lost.
+    for _ in range(3):
+        process.send_signal(signal.SIGINT)
+        try:
+            out, err = process.communicate(timeout=40)
+            break
+        except subprocess.TimeoutExpired:
+            continue
+    else:
+        process.kill()
+        out, err = process.communicate()
     assert process.returncode == 130, err
     assert "The run was interrupted" in out
     case = read_case(tmp_path / "results/tiny.vtkhdf")

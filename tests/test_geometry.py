@@ -25,6 +25,7 @@ SHAPES = [
     Beam(length=0.11, height=0.017, element_size=0.004),
     Block(),
     Block(contact_length=0.04, drive_height=0.0, element="triangle"),
+    Pendulum(contact_length=0.006),
     Block(width=0.1, height=0.3, contact_length=0.031, drive_height=0.3, element_size=0.02),
     Pendulum(),
     Pendulum(element="triangle", drive_distance=0.1),
@@ -95,6 +96,15 @@ def test_pendulum() -> None:
     assert place(mesh, "B") == [0.3, 0.02]
     assert place(mesh, "C") == [0.3, 0.04]
     assert place(generate(Pendulum(drive_distance=0.123)), "B") == [0.123, 0.0165]
+
+
+def test_contact_of_a_pendulum_on_part_of_its_bob() -> None:
+    mesh = generate(Pendulum(bob_width=0.032, contact_length=0.006))
+    contact = mesh.nodes[mesh.boundary("contact")]
+    assert lengths(mesh, mesh.boundary("contact")).sum() == pytest.approx(0.006, rel=1e-12)
+    assert contact[..., 0].mean() == pytest.approx(0.3, abs=1e-12)
+    assert (contact[..., 1] == 0.0).all()
+    assert lengths(mesh, mesh.boundary("bob_bottom")).sum() == pytest.approx(0.026, rel=1e-12)
 
 
 def test_default_pendulum_has_the_masses_of_the_impact_oscillator() -> None:
@@ -178,6 +188,9 @@ def test_too_many_elements_name_an_element_size_that_works() -> None:
         (Block, {"width": float("inf")}, "Block: width = inf"),
         (Block, {"contact_length": 0.0}, "Block: contact_length = 0.0"),
         (Block, {"contact_length": 0.13}, "contact_length = 0.13 must not be above width = 0.12"),
+        (Pendulum, {"contact_length": 0.0}, "Pendulum: contact_length = 0.0"),
+        (Pendulum, {"contact_length": 0.04},
+         "contact_length = 0.04 must not be above bob_width = 0.033"),
         (Block, {"drive_height": -0.1}, "Block: drive_height = -0.1 .* zero or above"),
         (Block, {"drive_height": 0.07}, "drive_height = 0.07 must not be above height = 0.06"),
         (Block, {"element": 3}, "Block: element = 3"),
@@ -280,7 +293,8 @@ def committed_shapes() -> dict:
     return module.SHAPES
 
 
-@pytest.mark.parametrize("name", ["beam.msh", "block.msh", "pendulum.msh"])
+@pytest.mark.parametrize("name", ["beam.msh", "block.msh", "pendulum.msh",
+                                  "impact_pendulum.msh"])
 def test_committed_meshes_are_those_of_the_generator(name: str) -> None:
     mesh, again = read_mesh(MESHES / name), generate(committed_shapes()[name])
     assert (MESHES / name).stat().st_size < 200_000

@@ -370,8 +370,8 @@ def test_own_law_with_memory_runs_is_kept_and_read(tmp_path):
     ("memory: ClassVar = 1", "memory: ClassVar = -1", "memory = -1 must be"),
     ("velocity_scale: ClassVar = 1e-5", "velocity_scale: ClassVar = 0.0", "velocity_scale = 0.0"),
     ("    velocity_scale: ClassVar = 1e-5\n", "", "velocity_scale = None must be a finite number"),
-    ("@fc.memory_friction_law\n", "", "needs kernel: ClassVar = a function"),
-    ("@fc.memory_friction_law", "@fc.normal_law", "needs kernel: ClassVar = a function"),
+    ("@fc.memory_friction_law\n", "", "kernel must be a class variable, a function"),
+    ("@fc.memory_friction_law", "@fc.normal_law", "kernel must be a class variable, a function"),
 ])
 def test_incomplete_own_laws_are_refused(old, new, message, tmp_path):
     assert old in MEMORY_LAW

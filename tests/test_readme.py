@@ -4,6 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fecontact.cli import execute
@@ -75,3 +76,16 @@ def test_links_of_the_pages_lead_somewhere():
         folder = DOCS.parent if page == "README.md" else DOCS
         for target in re.findall(r"\]\(([^)#:]+)\)", content):
             assert (folder / target).exists(), (page, target)
+
+
+def test_examples_of_the_page_on_runs():
+    names = {}
+    for code in re.findall(r"```python\n(.*?)```", PAGES["runs.md"], re.DOTALL):
+        exec(compile(code, "runs.md", "exec"), names)
+    assert names["run"].events.kind[0] == "touch-down"
+    assert names["first"].status.name == "EVENT"
+    assert names["found"].exponents[0] == pytest.approx(-6.254, abs=1.0)
+    multipliers = abs(np.linalg.eigvals(names["one"].monodromy))
+    assert np.log(multipliers.max()) / names["period"] == pytest.approx(-6.254, rel=1e-3)
+    assert names["up"].shape == names["down"].shape == (9, 4)
+    assert [one.kind for one in names["plane"].attractors] == ["periodic"]

@@ -198,5 +198,6 @@ class ContactMotion:
                                     (found.time, found.penetration, found.rate), strict=True):
                 part[found.interval[chosen]] = values[chosen]
         begins = np.concatenate([[touching[0] * 1], ~touching[:-1] & touching[1:]])
-        phase = (np.cumsum(begins) - 1)[1:][with_contact]
-        return phase, Ends(*(part[with_contact] for part in ends))
+        # A switch at an output time leaves nothing of its interval.
+        kept = with_contact & (ends.t1 > ends.t0)
+        return (np.cumsum(begins) - 1)[1:][kept], Ends(*(part[kept] for part in ends))

@@ -8,13 +8,14 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from fecontact.cli import about, branches, runs, studies
+from fecontact.cli import about, branches, runs, studies, sweeps
 
 COMMANDS: tuple[Callable[..., int | None], ...] = (
     studies.init,
     studies.mesh,
     studies.modes,
     studies.run,
+    sweeps.sweep,
     branches.branch,
     runs.render,
     runs.plot,

@@ -61,3 +61,15 @@ def energy_scale(control, progress, room):  # type: ignore[no-untyped-def]
         energy = max(energy, abs(progress.work[k]))
     progress.numbers[ENERGY] = energy
     return energy
+
+
+@helper
+def set_scale(control, progress, room):  # type: ignore[no-untyped-def]
+    """Fill ``room.right`` with the sizes of the state: what its errors count relative to."""
+    m = len(control.largest)
+    speed_scale = max(progress.numbers[SPEED_SCALE], control.speed_scale)
+    for i in range(m):
+        room.right[i] = max(progress.extremes[i], control.displacement_scale[i])
+        room.right[m + i] = speed_scale / control.largest[i]
+    for k in range(len(control.memory_scale)):
+        room.right[2 * m + k] = control.memory_scale[k]

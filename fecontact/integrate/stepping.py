@@ -21,8 +21,8 @@ from fecontact.integrate.run_arrays import (
     STEPS,
     TIME,
 )
-from fecontact.integrate.step_error import energy_scale, slip_error, state_error
-from fecontact.integrate.variation import VARIATION, propagate
+from fecontact.integrate.step_error import energy_scale, set_scale, slip_error, state_error
+from fecontact.integrate.variation import VARIATION, begin_anew, keep, propagate
 from fecontact.integrate.watching import KINKS, NODES, WATCH, begin, full, next_switch, note_events
 from fecontact.integrate.work import add_up, work_error, work_until
 from fecontact.laws.contract import signal_at
@@ -31,6 +31,8 @@ RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
 _POWER = -1.0 / rodas.ORDER
+# Derivatives of the motion may be in error by so many times the tolerance in a step.
+_LOOSER = 10.0
 
 
 @helper
@@ -202,6 +204,27 @@ def advance(  # type: ignore[no-untyped-def]
                 error = max(error, work_error(h, room.power) / (
                     control.rtol * energy_scale(control, progress, room)))
 
+        if error <= 1.0 and (watched or watch.counts[KINKS]) and not control.work:
+            rodas.dense_coefficients(room.stages, room.dense)
+        if error <= 1.0 and watch.counts[KINKS]:
+            part = next_switch(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
+                               room.after, room.dense, room.right)
+            # Nearer to an end it is at that end, as far as the time can tell.
+            near = max(1e-6 * h, 100.0 * smallest)
+            if part * h > near and (1.0 - part) * h > near:
+                counts[REJECTIONS] += 1
+                h *= part * (1.0 + 1e-9)
+                to_switch = True
+                continue
+        to_switch = False
+        columns = variation.columns
+        if error <= 1.0 and len(columns):
+            set_scale(control, progress, room)
+            error = max(error, propagate(
+                t, h, latest, G, s, above, below, width, shapes, control.slip_scale, control.depth,
+                control.memory_scale, progress.state, progress.gradients, room.reduced,
+                room.stages, room.right, variation) / (_LOOSER * control.rtol))
+
         factor = _LARGEST_FACTOR
         if error > 1e-6:
             factor = min(_LARGEST_FACTOR, max(_SMALLEST_FACTOR, _SAFETY * error**_POWER))
@@ -217,19 +240,6 @@ def advance(  # type: ignore[no-untyped-def]
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
 
-        if (watched or watch.counts[KINKS]) and not control.work:
-            rodas.dense_coefficients(room.stages, room.dense)
-        if watch.counts[KINKS]:
-            part = next_switch(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
-                               room.after, room.dense, room.right)
-            # Nearer to an end it is at that end, as far as the time can tell.
-            near = max(1e-6 * h, 100.0 * smallest)
-            if part * h > near and (1.0 - part) * h > near:
-                counts[REJECTIONS] += 1
-                h *= part * (1.0 + 1e-9)
-                to_switch = True
-                continue
-        to_switch = False
         ends = 2.0
         if watched:
             ends = note_events(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
@@ -238,18 +248,13 @@ def advance(  # type: ignore[no-untyped-def]
             begin(min(target, latest), room.after, s, control.depth, watch, room.scratch)
         reached = target if ends > 1.0 else t + ends * h
 
-        columns = variation.columns
         if len(columns):
-            propagate(t, h, latest, G, s, above, below, width, shapes, control.slip_scale,
-                      control.depth, control.memory_scale, progress.state, progress.gradients,
-                      room.reduced, room.stages, variation)
+            keep(variation)
         row = counts[OUTPUTS]
         if times[row] <= reached:
             if len(columns):
                 transitions[row] = columns
-                columns[:] = 0.0
-                for k in range(size):
-                    columns[k, k] = 1.0
+                begin_anew(variation)
             if not (control.work or watched):
                 rodas.dense_coefficients(room.stages, room.dense)
             while row < len(times) and times[row] <= reached:

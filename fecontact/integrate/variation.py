@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 _PART = 1e-4
 # Differences of larger parts of the usual size of a derivative are jumps.
 _JUMP = 3.0 * _PART
+# Columns that have fallen below this part of their largest size need no accuracy of their own.
+_FADED = 1e-3
 
 
 class Variation(NamedTuple):
@@ -39,11 +41,17 @@ class Variation(NamedTuple):
     ----------
     columns : (k, size) array
         dy/dy_0 column by column, then dy/dp if a parameter varies. Empty if none are wanted.
+    after : (k, size) array
+        They at the end of the step.
+    norms : (2, k) array
+        Largest size of each column since it began, and at the end of the step.
     stages : (8 k, size) array
         U_i of column c in row 8 c + i.
     """
 
     columns: Array
+    after: Array
+    norms: Array
     stages: Array
     vectors: Array
     nodes: Array
@@ -58,7 +66,7 @@ class Variation(NamedTuple):
 
 
 VARIATION = types.NamedTuple(
-    [matrix] * 5 + [vector] * 3 + [motion.GRADIENTS] * 4, Variation)
+    [matrix] * 7 + [vector] * 3 + [motion.GRADIENTS] * 4, Variation)
 
 
 def variation_for(columns: int, modes: int, nodes: int, states: int) -> Variation:
@@ -68,9 +76,10 @@ def variation_for(columns: int, modes: int, nodes: int, states: int) -> Variatio
                              np.zeros((nodes, states, 3 + states))) for _ in range(4)]
     start = np.zeros((columns, size))
     np.fill_diagonal(start, 1.0)
-    return Variation(start, np.zeros((rodas.STAGES * columns, size)), np.zeros((6, size)),
-                     np.zeros((3, 2 * nodes)), np.zeros((2, nodes)),
-                     np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes), *room)
+    return Variation(start, np.zeros((columns, size)), np.zeros((2, columns)),
+                     np.zeros((rodas.STAGES * columns, size)), np.zeros((7, size)),
+                     np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(motion.GIVEN),
+                     np.zeros(modes), np.zeros(modes), *room)
 
 
 @helper
@@ -195,13 +204,33 @@ def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # 
         out[k] = factor * (rate[k] - other[k])
 
 
-@kernel(types.void(f8, f8, f8, f8, SYSTEM, SYSTEM, SYSTEM, f8, matrix, vector, vector, vector,
-                   vector, motion.GRADIENTS, linear.REDUCED, matrix, VARIATION))
+@helper
+def _largest_error(scale, v):  # type: ignore[no-untyped-def]
+    largest = 0.0
+    for c in range(len(v.columns)):
+        before, after, error = 0.0, 0.0, 0.0
+        last = v.stages[rodas.STAGES * c + rodas.STAGES - 1]
+        for k in range(len(scale)):
+            before = max(before, abs(v.columns[c, k]) / scale[k])
+            after = max(after, abs(v.after[c, k]) / scale[k])
+            error = max(error, abs(last[k]) / scale[k])
+        size = max(before, after)
+        v.norms[1, c] = max(v.norms[0, c], size)
+        if error > 0.0:
+            largest = max(largest, error / max(size, _FADED * v.norms[1, c]))
+    return largest
+
+
+@kernel(types.f8(f8, f8, f8, f8, SYSTEM, SYSTEM, SYSTEM, f8, matrix, vector, vector, vector,
+                 vector, motion.GRADIENTS, linear.REDUCED, matrix, vector, VARIATION))
 def propagate(  # type: ignore[no-untyped-def]
     t, h, latest, G, held_s, held_above, held_below, width, held_shapes, held_slip, held_depth,
-    held_memory, held_state, held_gradients, held_reduced, held_stages, held_v,
+    held_memory, held_state, held_gradients, held_reduced, held_stages, held_scale, held_v,
 ):
     """Carry the columns over the step from t to t + h whose stages and factors are given.
+
+    Returns the largest error of a column in units of its size, or of a thousandth of the largest
+    it has been, with ``scale`` (size,) as the units of the state.
 
     ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
     with width = 0 no parameter varies.
@@ -211,7 +240,7 @@ def propagate(  # type: ignore[no-untyped-def]
     slip_scale, depth, memory_scale = (borrowed(held_slip), borrowed(held_depth),
                                        borrowed(held_memory))
     state, gradients = borrowed(held_state), borrowed(held_gradients)
-    reduced, stages = borrowed(held_reduced), borrowed(held_stages)
+    reduced, stages, scale = borrowed(held_reduced), borrowed(held_stages), borrowed(held_scale)
     count, size = v.columns.shape
     m = len(v.none)
     w = v.nodes
@@ -262,4 +291,21 @@ def propagate(  # type: ignore[no-untyped-def]
             linear.solve_stage(G, s, shapes, gradients, reduced, right, w, own[i])
             if i == rodas.STAGES - 1:
                 for k in range(size):
-                    v.columns[c, k] = X[k] + own[i, k]
+                    v.after[c, k] = X[k] + own[i, k]
+    return _largest_error(scale, v)
+
+
+@helper
+def keep(v):  # type: ignore[no-untyped-def]
+    """Take the columns at the end of the step for those of the next."""
+    v.columns[:] = v.after
+    v.norms[0] = v.norms[1]
+
+
+@helper
+def begin_anew(v):  # type: ignore[no-untyped-def]
+    """Let the columns be the unit matrix again."""
+    v.columns[:] = 0.0
+    v.norms[:] = 0.0
+    for k in range(v.columns.shape[1]):
+        v.columns[k, k] = 1.0

@@ -5,6 +5,7 @@ They are answered by sampling the compiled law, so they hold for every law, also
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import lru_cache
 
 import numpy as np
 from numba import types
@@ -82,9 +83,23 @@ def velocity_of_minimum(law: FrictionLaw, normal_force: float = 1.0) -> Array:
 
 def stick_velocity(law: FrictionLaw, nodes: int) -> Array:
     """Slip velocity (n,) of the largest maximum of R/F, else ten times the velocity scale."""
+    try:
+        hash(law)
+    except TypeError:
+        return _stick_velocity(law, nodes)
+    return _kept_stick_velocity(law, nodes)
+
+
+def _stick_velocity(law: FrictionLaw, nodes: int) -> Array:
     velocity = _largest(law, nodes, 1.0)[1]
     width = _per_node(law, nodes, lambda single, _: [10.0 * single.velocity_scale])[:, 0]
-    return np.where(np.isfinite(velocity), velocity, width)
+    found = np.where(np.isfinite(velocity), velocity, width)
+    found.setflags(write=False)
+    return found
+
+
+# Many short runs may share a law.
+_kept_stick_velocity = lru_cache(maxsize=64)(_stick_velocity)
 
 
 def _largest(law: FrictionLaw, nodes: int, F: float) -> tuple[Array, Array]:

@@ -33,7 +33,7 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
         "friction_law": FRICTION_FORM, "memory_friction_law": MEMORY_FORM}
     function = getattr(type(law), "kernel", None)
     if not isinstance(function, CompiledLaw) or function.form not in forms.values():
-        raise InputError(f"{name} needs kernel: ClassVar = a function "
+        raise InputError(f"{name}: kernel must be a class variable, a function "
                          f"{' or '.join(forms.values())} decorated with {' or '.join(forms)}.")
     if isinstance(law, FrictionLaw):
         count = law.memory

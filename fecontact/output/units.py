@@ -4,13 +4,15 @@ import math
 
 _UNITS = {
     "m": ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m")),
-    "m/s": ((1e-6, "µm/s"), (1e-3, "mm/s"), (1.0, "m/s")),
+    "m/s": ((1e-9, "nm/s"), (1e-6, "µm/s"), (1e-3, "mm/s"), (1.0, "m/s")),
     "rad": ((1e-6, "µrad"), (1e-3, "mrad"), (1.0, "rad")),
     "rad/s": ((1e-3, "mrad/s"), (1.0, "rad/s")),
     "s": ((1e-6, "µs"), (1e-3, "ms"), (1.0, "s")),
     "N": ((1e-3, "mN"), (1.0, "N"), (1e3, "kN")),
     "N/m": ((1.0, "N/m"), (1e3, "N/mm"), (1e6, "kN/mm")),
     "Pa": ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa")),
+    "W": ((1e-6, "µW"), (1e-3, "mW"), (1.0, "W"), (1e3, "kW")),
+    "Hz": ((1.0, "Hz"), (1e3, "kHz")),
     "J": ((1e-9, "nJ"), (1e-6, "µJ"), (1e-3, "mJ"), (1.0, "J"), (1e3, "kJ")),
 }
 
@@ -23,7 +25,7 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
     size : float
         Largest magnitude to show, in ``unit``; zero gives ``unit`` itself.
     unit : str
-        SI unit: m, m/s, rad, rad/s, s, N, N/m, Pa or J.
+        SI unit: m, m/s, rad, rad/s, s, Hz, N, N/m, Pa, W or J.
 
     Returns
     -------

@@ -1,0 +1,45 @@
+"""Writes docs/validation.md and its pictures: ``make validation``."""
+
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
+
+import eigenfrequencies
+import friction_cases
+import friction_section
+import impact_section
+import normal_contact
+
+from fecontact.console import write_text
+
+DOCS = Path(__file__).resolve().parents[1]
+HEAD = """# Validation
+
+What the package computes, beside closed forms, published numbers and the figures of W. Sextro,
+*Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes everything here
+again, in some minutes on two cores, and writes this page.
+
+"""
+
+
+def main() -> None:
+    """Compute all sections, then write the page."""
+    images = DOCS / "images" / "validation"
+    images.mkdir(parents=True, exist_ok=True)
+    parts = []
+    for name, make in (("eigenfrequencies", eigenfrequencies.section),
+                       ("impacts of one mass", normal_contact.section),
+                       ("friction of one mass", friction_cases.section),
+                       ("section 4.2", lambda: impact_section.section(images)),
+                       ("section 4.3", lambda: friction_section.section(images))):
+        begin = time.perf_counter()
+        print(f"{name} ...", end=" ", flush=True)
+        parts.append(make())
+        print(f"{time.perf_counter() - begin:.0f} s", flush=True)
+    write_text(DOCS / "validation.md", HEAD + "\n".join(parts))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""Section 4.3 of the source: the friction oscillator."""
+
+from pathlib import Path
+
+import friction_oscillator as friction
+import numpy as np
+from comparison import Comparison, comparisons, table
+from matplotlib import rc_context
+from pictures import save
+
+from fecontact import Trajectory, periodicity, simulate, window
+from fecontact.output.figures import STYLE
+
+FIGURES = {
+    "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop with one slip, which "
+                     "closes after four periods of the drive"),
+    "c: three modes": ("4.3-2 c", "vibration of higher frequency after each transition from slip "
+                       "to stick", "the same at B, where the elastic mode moves; the contact is "
+                       "stuck and shows nothing"),
+    "d: three modes, waves": ("4.3-2 d", "higher periodic, several different loops, close to the "
+                              "measurement", "slips of several lengths; the passing of a wave "
+                              "(2.5 s) and the drive (0.4553 s) have no common period"),
+}
+
+
+def section(images: Path) -> str:
+    """Text with tables; a picture into a folder."""
+    runs = {name: friction.settled(friction.CASES[name](), rtol=1e-7) for name in FIGURES}
+    shown = {name: window(run, run.time[-1] - 16 * friction.PERIOD) for name, run in runs.items()}
+    with rc_context(STYLE):
+        figure = friction.figure(shown)
+    save(figure, images / "friction-phase.png")
+    return TEXT.format(
+        figures=table(("figure", "the source shows", "shown here"), list(FIGURES.values())),
+        slips=slips_table(runs), numbers=comparisons(vibration(runs) + solvers()))
+
+
+def slips_table(runs: dict[str, Trajectory]) -> str:
+    """Periods and slips of the runs."""
+    rows = []
+    for name, run in runs.items():
+        lengths = 1e3 * np.array([slip.distance for slip in friction.slips(run)])
+        found = periodicity(run, start=float(run.time[0]), largest=8)
+        rows.append((name, found.periods or "none up to 8", f"{found.misfit:.0e}", len(lengths),
+                     friction.different(lengths), f"{lengths.min():.3f} to {lengths.max():.3f}"))
+    return table(("case", "repeats after periods", "misfit", "slips in 100 periods",
+                  "different lengths", "lengths [mm]"), rows)
+
+
+def vibration(runs: dict[str, Trajectory]) -> list[Comparison]:
+    """The vibration of B in stick, and the normal force of both kinds of model."""
+    peak = friction.ringing(runs["c: three modes"])
+    force = friction.prescribed().normal.force
+    return [Comparison("three modes: vibration of B in stick [Hz], and that of the modes with the "
+                       "contact held", friction.held_frequency(), peak.frequency_hz),
+            Comparison("normal force without a rigid y mode, by the static equilibrium [N]",
+                       friction.NORMAL_FORCE, float(force))]
+
+
+def solvers() -> list[Comparison]:
+    """Two modes by another integrator: the motion over four periods of its orbit."""
+    run = friction.settled(friction.oscillator(2), skip=80, periods=8, rtol=1e-8)
+    end = float(run.time[-1])
+    rows = []
+    for method in ("LSODA", "Radau"):
+        again = simulate(run.system, end + 4.0 * friction.PERIOD, initial=run, outputs=1601,
+                         method=method, rtol=1e-8)
+        orbit = window(run, end - 4.0 * friction.PERIOD)
+        rows.append(Comparison(f"two modes: largest x of the orbit by {method} [mm]",
+                               1e3 * orbit.displacement("B")[:, 0].max(),
+                               1e3 * again.displacement("B")[:, 0].max()))
+        rows.append(Comparison(f"two modes: smallest x of the orbit by {method} [mm]",
+                               1e3 * orbit.displacement("B")[:, 0].min(),
+                               1e3 * again.displacement("B")[:, 0].min()))
+    return rows
+
+
+TEXT = """## Section 4.3: friction oscillator
+
+A mass on a moving belt, pulled to and fro through a spring: `examples/friction_oscillator.py`. The
+source gives no third mode. Taken: 30 Hz, D = 0.01, with amplitudes of 0.5 at B and -0.5 at the
+contact relative to the rigid mode; with equal signs no vibration is seen. The contact is stuck
+during stick, so that the vibration shows at B alone.
+
+{figures}
+
+![Phase diagrams of the friction oscillator](images/validation/friction-phase.png)
+
+{slips}
+
+{numbers}
+"""

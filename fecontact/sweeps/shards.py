@@ -1,0 +1,153 @@
+"""The folder of a sweep: finished cases in shards, modal bases, a lock.
+
+A shard holds the rows of one batch and is named by the hash of their keys; it is written whole or
+not at all and never changed.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from uuid import uuid4
+
+from fecontact.basis import ModalBasis
+from fecontact.errors import InputError
+from fecontact.sweeps.batch import Row, case_file
+
+
+@dataclass(frozen=True)
+class Store:
+    """What a sweep keeps on disk.
+
+    Attributes
+    ----------
+    folder : Path
+        ``shards/``, ``bases/`` and ``cases/`` lie in it.
+    files : bool
+        Whether a finished case has a file of its own.
+    """
+
+    folder: Path
+    files: bool = False
+
+    @property
+    def cases(self) -> Path:
+        """Folder of the files of single cases."""
+        return self.folder / "cases"
+
+    def rows(self) -> dict[str, Row]:
+        """All rows that are stored, by the keys of their cases.
+
+        Raises
+        ------
+        InputError
+            If a shard cannot be read.
+        """
+        found: dict[str, Row] = {}
+        for path in sorted((self.folder / "shards").glob("*.json")):
+            try:
+                rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+                for row in rows:
+                    if not row.keys() >= Row.__required_keys__:
+                        raise KeyError("a row is not whole")
+                    self._take(row, found)
+            except (OSError, ValueError, KeyError, TypeError) as error:
+                raise InputError(f"{path} is damaged ({error}); remove it, and its cases are "
+                                 f"computed again.") from None
+        return found
+
+    def _take(self, row: Row, found: dict[str, Row]) -> None:
+        key = row["case"]
+        if self.files and not row["reason"] and not case_file(self.cases, key).is_file():
+            return
+        if key not in found or found[key]["reason"]:
+            found[key] = row
+
+    def add(self, rows: Sequence[Row]) -> Path:
+        """Store the rows of a batch; the shard.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        keys = "".join(row["case"] for row in rows)
+        name = hashlib.sha256(keys.encode()).hexdigest()[:24]
+        path = self.folder / "shards" / f"{name}.json"
+        body = ",\n".join(json.dumps(row, sort_keys=True) for row in rows)
+        write_whole(path, f'{{"rows": [\n{body}\n]}}\n')
+        return path
+
+    def basis_file(self, key: str) -> Path:
+        """The file of a modal basis."""
+        return self.folder / "bases" / f"{key}.h5"
+
+    def keep_basis(self, key: str, basis: ModalBasis) -> None:
+        """Store a modal basis, unless it is there."""
+        path = self.basis_file(key)
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            basis.save(path)
+
+    def tidy(self) -> None:
+        """Remove what a killed sweep has left half written."""
+        for name in ("", "shards", "bases", "cases"):
+            for part in (self.folder / name).glob("*.part*"):
+                part.unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other sweeps out of the folder; the system opens the lock when a process dies.
+
+        Raises
+        ------
+        InputError
+            If another sweep is at work there.
+        """
+        try:
+            import fcntl
+        except ImportError:  # Windows: content-named shards alone keep sweeps apart
+            yield
+            return
+        path = self.folder / ".lock"
+        try:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written "
+                             f"({(error.strerror or str(error)).lower()}).") from None
+        try:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(f"Another sweep is at work in {self.folder}; wait for it, or "
+                                 f"choose another folder.") from None
+            except OSError:  # file systems without locks
+                yield
+                return
+            yield
+        finally:
+            os.close(descriptor)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file whole or not at all, also when several processes do so at once.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    part = path.with_name(f"{path.name}.{uuid4().hex}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written "
+                         f"({(error.strerror or str(error)).lower()}).") from None
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
