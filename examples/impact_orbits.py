@@ -8,7 +8,8 @@ chaotic, or has more periods.
 
 From some 41 rad/s on, runs from rest all lead to one motion of one period. Its stability ends at a
 grazing: the tip touches the stop once more, and a multiplier jumps instead of passing through the
-unit circle. Such points are no folds and no doublings, and are found as jumps of the stability.
+unit circle. Such points are no folds and no doublings; between which
+frequencies they lie is printed.
 
 Usage: python examples/impact_orbits.py [FOLDER]      (prints and draws; a few minutes)
 """
@@ -72,9 +73,9 @@ def orbits(w: float, low: float, high: float, *, points: int = 60, step: float =
         settings=Settings(step=step, largest_step=0.05, points=points))
 
 
-def grazings(branch: fc.Branch) -> list[float]:
-    """Frequencies [rad/s] at which the number of unstable multipliers jumps without a cause."""
-    return [(one.parameter + other.parameter) / 2.0
+def jumps(branch: fc.Branch) -> list[tuple[float, float]]:
+    """Neighbouring frequencies [rad/s] between which the stability changes at no special point."""
+    return [(one.parameter, other.parameter)
             for one, other in pairwise(branch.points)
             if one.kind is None and other.kind is None
             and one.values["unstable"] != other.values["unstable"]]
@@ -124,8 +125,8 @@ def main(folder: Path = Path("impact-orbits")) -> None:
                   f"{branch.status.value}")
             for point in branch.special:
                 print(f"  {point.kind} at {point.parameter:.5f} rad/s")
-            for w in grazings(branch):
-                print(f"  grazing at {w:.5f} rad/s")
+            for ends in jumps(branch):
+                print(f"  stability jumps between {min(ends):.5f} and {max(ends):.5f} rad/s")
         insets: list[fc.Inset] = []
         for branch in shown:
             stable = [point for point in branch.points
