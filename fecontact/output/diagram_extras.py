@@ -82,7 +82,7 @@ def main_axis(figure: "Figure", insets: Sequence[Inset]) -> "Axes":
     """The axis of the diagram, with a row of small ones above it where there are insets."""
     if not insets:
         return figure.subplots()
-    grid = figure.add_gridspec(2, len(insets), height_ratios=(1.0, 2.4))
+    grid = figure.add_gridspec(2, max(3, len(insets)), height_ratios=(1.0, 2.4))
     return figure.add_subplot(grid[1, :])
 
 
