@@ -8,16 +8,20 @@ from .basis import ModalBasis
 from .basis_report import BasisReport
 from .bifurcation.basins import Attractor, Axis, Basins, basins
 from .bifurcation.branch import Branch
+from .bifurcation.branch_file import load_branches, save_branches
 from .bifurcation.brute_force import BruteForce, brute_force
 from .bifurcation.contact_field import contact_field
 from .bifurcation.curves import fold_curve, hopf_curve
 from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
+from .bifurcation.observation import motion_of, observe
 from .bifurcation.orbit_curves import orbit_curve
 from .bifurcation.orbit_output import amplitude, orbit_history, quantity_range
 from .bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
+from .bifurcation.settled import SettledMotion, settled_motion
 from .bifurcation.shooting_branch import orbits_by_shooting
+from .bifurcation.shooting_switch import doubled_by_shooting, hopf_orbits_by_shooting
 from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
@@ -78,7 +82,9 @@ from .output.analysis_plots import (
     plot_spectrogram,
     plot_spectrum,
 )
+from .output.basin_plots import plot_basins
 from .output.dataset import to_xarray
+from .output.diagram_extras import Inset, phase_inset
 from .output.diagrams import plot_branches
 from .output.export import export_csv, export_mat, export_netcdf
 from .output.movie import picture, render
@@ -144,6 +150,7 @@ __all__ = [
     "HyperbolicFriction",
     "Impacts",
     "InputError",
+    "Inset",
     "IwanFriction",
     "JenkinsFriction",
     "LinearContact",
@@ -174,6 +181,7 @@ __all__ = [
     "RigidStart",
     "RoughSurface",
     "Sensitivity",
+    "SettledMotion",
     "Sine",
     "SmoothingCost",
     "SobolIndices",
@@ -197,6 +205,7 @@ __all__ = [
     "contact_field",
     "count_periods",
     "dask_executor",
+    "doubled_by_shooting",
     "ensemble",
     "equilibrium_branch",
     "event",
@@ -214,10 +223,14 @@ __all__ = [
     "generate",
     "history",
     "hopf_curve",
+    "hopf_orbits_by_shooting",
+    "load_branches",
     "lyapunov_exponents",
     "memory_friction_law",
     "mode_convergence",
+    "motion_of",
     "normal_law",
+    "observe",
     "orbit_curve",
     "orbit_history",
     "orbits_beyond",
@@ -225,7 +238,9 @@ __all__ = [
     "orbits_from_hopf",
     "orbits_from_motion",
     "periodicity",
+    "phase_inset",
     "picture",
+    "plot_basins",
     "plot_branches",
     "plot_contact_map",
     "plot_eigenvalues",
@@ -251,7 +266,9 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
+    "save_branches",
     "sensitivity",
+    "settled_motion",
     "simulate",
     "smoothing_cost",
     "sobol_indices",

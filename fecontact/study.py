@@ -21,6 +21,7 @@ from fecontact.laws.ground import Ground
 from fecontact.laws.names import with_folder
 from fecontact.laws.normal import RoughSurface
 from fecontact.mesh import Mesh
+from fecontact.study_branch import BranchSettings
 from fecontact.study_geometry import Geometry, MeshFile, geometry_from_table, geometry_table
 from fecontact.study_sections import (
     BasisSettings,
@@ -47,7 +48,8 @@ Gap = float | tuple[float, ...] | Crown
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
-    "simulation": SimulationSettings, "output": OutputSettings, "render": RenderSettings,
+    "simulation": SimulationSettings, "branch": BranchSettings, "output": OutputSettings,
+    "render": RenderSettings,
 }
 _ATTRIBUTES = {name: name for name in _SECTIONS} | {"body": "body_settings",
                                                      "basis": "basis_settings"}
@@ -82,6 +84,8 @@ class Study:
         face that is an arc; stands above all sections.
     simulation : SimulationSettings
         ``[simulation]``
+    branch : BranchSettings
+        ``[branch]``
     output : OutputSettings
         ``[output]``
     render : RenderSettings
@@ -103,6 +107,7 @@ class Study:
     load: Load = field(default_factory=Load)
     gap: Gap = 0.0
     simulation: SimulationSettings = field(default_factory=SimulationSettings)
+    branch: BranchSettings = field(default_factory=BranchSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     render: RenderSettings = field(default_factory=RenderSettings)
     sweep: SweepSettings | None = None

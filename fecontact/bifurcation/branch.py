@@ -129,19 +129,22 @@ class Branch:
         from fecontact.output.hdf5 import new_file
 
         with new_file(path) as file:
-            group = file.create_group("branch")
-            group.attrs.update(parameter=self.name, status=self.status.name, message=self.message)
-            group.create_dataset("kind", data=[point.kind or "" for point in self.points])
-            for name in ("u", "tangent"):
-                _write(group, name, [getattr(point, name) for point in self.points])
-            for name in self.points[0].values if self.points else ():
-                _write(group, f"values/{name}", [point.values[name] for point in self.points])
-            for index, point in enumerate(self.points):
-                for name, value in point.details.items():
-                    group.create_dataset(f"details/{index}/{name}", data=value)
-            for name, value in self.attributes.items():
-                group.create_dataset(f"attributes/{name}", data=value)
+            self.write(file.create_group("branch"))
         return Path(path)
+
+    def write(self, group: Any) -> None:
+        """Write the branch into an empty HDF5 group; see :meth:`read`."""
+        group.attrs.update(parameter=self.name, status=self.status.name, message=self.message)
+        group.create_dataset("kind", data=[point.kind or "" for point in self.points])
+        for name in ("u", "tangent"):
+            _write(group, name, [getattr(point, name) for point in self.points])
+        for name in self.points[0].values if self.points else ():
+            _write(group, f"values/{name}", [point.values[name] for point in self.points])
+        for index, point in enumerate(self.points):
+            for name, value in point.details.items():
+                group.create_dataset(f"details/{index}/{name}", data=value)
+        for name, value in self.attributes.items():
+            group.create_dataset(f"attributes/{name}", data=value)
 
     @classmethod
     def load(cls, path: str | Path) -> "Branch":
@@ -155,25 +158,28 @@ class Branch:
         from fecontact.output.hdf5 import open_file
 
         with open_file(path, "branch") as file:
-            group = file["branch"]
-            try:
-                kinds = [kind.decode() for kind in group["kind"][()]]
-                count = len(kinds)
-                u, tangent = _read(group["u"], count), _read(group["tangent"], count)
-                stored = {name: _read(item, count) for name, item in group.get("values",
-                                                                               {}).items()}
-                details = {int(index): {name: _value(item) for name, item in part.items()}
-                           for index, part in group.get("details", {}).items()}
-                points = tuple(
-                    BranchPoint(u[k], tangent[k], {name: row[k] for name, row in stored.items()},
-                                kinds[k] or None, details.get(k, {})) for k in range(count))
-                attributes = {name: _value(item)
-                              for name, item in group.get("attributes", {}).items()}
-                return cls(str(group.attrs["parameter"]), points, Status[group.attrs["status"]],
-                           str(group.attrs["message"]), attributes)
-            except (KeyError, OSError) as error:
-                raise InputError(f"{path} is damaged or of another version of fecontact "
-                                 f"({error}).") from None
+            return cls.read(file["branch"], path)
+
+    @classmethod
+    def read(cls, group: Any, path: str | Path) -> "Branch":
+        """Read a branch from an HDF5 group that :meth:`write` filled, of the file ``path``."""
+        try:
+            kinds = [kind.decode() for kind in group["kind"][()]]
+            count = len(kinds)
+            u, tangent = _read(group["u"], count), _read(group["tangent"], count)
+            stored = {name: _read(item, count) for name, item in group.get("values", {}).items()}
+            details = {int(index): {name: _value(item) for name, item in part.items()}
+                       for index, part in group.get("details", {}).items()}
+            points = tuple(
+                BranchPoint(u[k], tangent[k], {name: row[k] for name, row in stored.items()},
+                            kinds[k] or None, details.get(k, {})) for k in range(count))
+            attributes = {name: _value(item)
+                          for name, item in group.get("attributes", {}).items()}
+            return cls(str(group.attrs["parameter"]), points, Status[group.attrs["status"]],
+                       str(group.attrs["message"]), attributes)
+        except (KeyError, OSError) as error:
+            raise InputError(f"{path} is damaged or of another version of fecontact "
+                             f"({error}).") from None
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:

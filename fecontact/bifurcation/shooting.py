@@ -15,8 +15,8 @@ from fecontact.bifurcation.floquet import Floquet, floquet_of
 from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.problem import Problem
 from fecontact.errors import AnalysisError, InputError
+from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
-from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status
 
 Array = NDArray[np.float64]
@@ -202,16 +202,14 @@ class Shot:
     def _ends(self) -> Array:
         if "runs" in self.__dict__:
             return np.array([run.states[-1] for run in self.runs])
-        ends = []
-        for start, begin, end in zip(self.problem.starts(self.u), self._times[:-1],
-                                     self._times[1:], strict=True):
-            run = simulate(self._system, float(end), t_start=float(begin), initial=start,
-                           outputs=2, rtol=self.problem.rtol)
-            if run.status is not Status.FINISHED:
-                raise AnalysisError(f"The run of a segment did not reach its end: "
-                                    f"{run.status.value}")
-            ends.append(run.states[-1])
-        return np.array(ends)
+        found = ensemble(self._system, np.stack([self._times[:-1], self._times[1:]], axis=1),
+                         initial=self.problem.starts(self.u), rtol=self.problem.rtol)
+        if not found.finished.all():
+            status = found.status[int(np.argmin(found.finished))]
+            if status is Status.INTERRUPTED:
+                raise KeyboardInterrupt
+            raise AnalysisError(f"The run of a segment did not reach its end: {status.value}")
+        return found.states[:, -1]
 
     @cached_property
     def residual(self) -> Array:
@@ -230,6 +228,7 @@ class Shot:
         K, d = len(problem.mesh) - 1, problem.field.dimension
         factors = elimination.factors_for(K, 1, d, problem.common)
         values = problem.parameters(self.u)
+        slope = 0.0 if problem.autonomous else self._period_slope(values)
         for j, run in enumerate(self.runs):
             factors.local[j, :, :d] = run.monodromy
             factors.local[j, :, d : 2 * d] = -np.eye(d)
@@ -237,8 +236,27 @@ class Shot:
             if problem.autonomous:
                 f = problem.field.rates(np.zeros(1), run.states[-1:].copy(), values)[0]
                 factors.local[j, :, -2] = (problem.mesh[j + 1] - problem.mesh[j]) * f
+            elif slope:
+                factors.local[j, :, -1] += slope * self._shifted(j, run, values)
         elimination.chain_intervals(factors)
         return factors
+
+    def _period_slope(self, values: Array) -> float:
+        """Rate dT/dp of the period of the forcing with the free parameter."""
+        problem, h = self.problem, 1e-4 * (abs(float(self.u[-1])) or 1.0)
+        above, below = values.copy(), values.copy()
+        above[problem.free] += h
+        below[problem.free] -= h
+        periods = [problem.field.forcing_period(each) or 0.0 for each in (above, below)]
+        return problem.periods * (periods[0] - periods[1]) / (2.0 * h)
+
+    def _shifted(self, j: int, run: Sensitivity, values: Array) -> Array:
+        """Derivative (d,) of the end of segment j with the period, as both its times move."""
+        problem, rates = self.problem, self.problem.field.rates
+        before, after = (rates(self._times[k : k + 1], state[None].copy(), values)[0]
+                         for k, state in ((j, run.states[0]), (j + 1, run.states[-1])))
+        moved = problem.mesh[j + 1] * after - problem.mesh[j] * (run.monodromy @ before)
+        return np.asarray(moved)
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""

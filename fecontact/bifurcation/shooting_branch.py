@@ -61,11 +61,11 @@ def orbits_by_shooting(
         np.append(sizes, width_of(width, chosen, given[free]))), segments, rtol)
     attributes = {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
                   "parameter_values": given, "scales": problem.scales, "segments": segments,
-                  "periods": periods}
+                  "periods": periods, "rtol": rtol}
     try:
         return follow(problem, u, chosen, name=parameter, direction=direction, both=both,
                       attributes=attributes)
-    except InputError as error:
+    except (AnalysisError, InputError) as error:
         raise AnalysisError(f"No periodic orbit was found at {parameter} = {given[free]:.6g} near "
                             f"the motion: Newton's method does not converge; run it longer until "
                             f"it has settled, or take more than {segments} segments.") from error

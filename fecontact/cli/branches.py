@@ -1,75 +1,83 @@
-"""The command ``branch``: steady sliding of a study over a parameter."""
+"""The command ``branch``: steady sliding and periodic orbits of a study over a parameter."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from fecontact.cli.options import Changes, Folder, StudyFile
-from fecontact.cli.printing import say, say_written, show
+from fecontact.cli.printing import complain, say, say_written, show
 from fecontact.errors import InputError
 
 if TYPE_CHECKING:
-    from fecontact.bifurcation.branch import Branch
+    from fecontact.study_branch import BranchSettings
 
 
 def branch(
     study: StudyFile,
-    parameter: Annotated[str, Parameter(help="Dotted name of a number, `ground.speed`.")],
+    parameter: Annotated[str | None, Parameter(
+        help="Dotted name of a number, `ground.speed`, in place of that of `[branch]`.")] = None,
     /,
     *,
-    start: Annotated[float, Parameter(name="--from", help="Value at which it begins.")],
-    end: Annotated[float, Parameter(name="--to", help="Value at which it ends.")],
+    start: Annotated[float | None, Parameter(
+        name="--from", help="Value at which it begins, in place of `[branch]`.")] = None,
+    end: Annotated[float | None, Parameter(
+        name="--to", help="Value at which it ends, in place of `[branch]`.")] = None,
     set_: Changes = None,
     output: Folder = None,
 ) -> int:
-    """Follow steady sliding over a parameter: where it loses stability, and in which mode.
+    """Follow steady sliding or periodic orbits over a parameter: folds, Hopf points, doublings.
 
-    Writes the branch (NAME-branch.h5) and a plot of frequencies and growth rates of all modes.
+    The section [branch] of the study says what; without it, steady sliding. Writes all branches
+    (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, frequencies and growth rates of the
+    modes in steady sliding. Ctrl-C stops it; what was computed until then is written.
     """
     from fecontact.console import INTERRUPTED, output_folder, waiting
     from fecontact.results import read_study
 
-    if start == end:
-        raise InputError(f"--from and --to are both {start:g}; give the two ends of a range.")
     described = read_study(study, set_)
-    from fecontact.bifurcation.contact_field import contact_field
-    from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-    from fecontact.output.stability_plots import plot_eigenvalues
+    wanted = _wanted(described.branch, parameter, start, end)
+    _ = wanted.name, wanted.bounds
+    from fecontact.branch_results import runs_beneath, special_table, write_branches
+    from fecontact.branching import follow_branches
 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
-            field = contact_field(described.system(), {parameter: start})
-        found = equilibrium_branch(field, parameter, bounds=(min(start, end), max(start, end)),
-                                   direction=end - start)
-        files = [found.save(folder / f"{described.name}-branch.h5")]
-        picture = folder / f"{described.name}-branch.png"
-        files.append(plot_eigenvalues(found, picture))
-        show(branch_table(found))
-        say(found.status.value)
-        if found.message:
-            say(f"The last step failed: {found.message}")
+            system = described.system()
+        result = follow_branches(system, wanted, described.simulation.initial)
+        beneath = None
+        if wanted.brute_force and not result.interrupted:
+            beneath = runs_beneath(system, wanted, described.simulation.initial)
+        with waiting("Writing"):
+            files = write_branches(result, wanted, folder, described.name, beneath)
+        for name, found in result.found.items():
+            say(f"\n{name}: {found.status.value}")
+            if found.message:
+                say(f"The last step failed: {found.message}")
+            show(special_table(found))
+        for note in result.notes:
+            say(f"note: {note}")
         say_written(*map(Path, files))
-    if found.status.name == "INTERRUPTED":
+    if result.interrupted:
         return INTERRUPTED
-    return 1 if found.status.name == "STALLED" else 0
+    stalled = [name for name, found in result.found.items() if found.status.name == "STALLED"]
+    if stalled:
+        return complain(f"{', '.join(stalled)}: the steps became too small to go on; what was "
+                        f"computed is written.", 1)
+    return 1 if result.notes else 0
 
 
-def branch_table(found: "Branch") -> Any:
-    """Ends and special points of a branch of equilibria: where, and what changes there."""
-    from fecontact.report import table
-
-    born = {"supercritical": "stable orbits", "subcritical": "unstable orbits",
-            "undecided": "orbits"}
-    rows = []
-    for index, point in enumerate(found.points):
-        if point.kind is None and 0 < index < len(found) - 1:
-            continue
-        hertz, unstable = point.details.get("frequency_hz"), point.values["unstable"]
-        rows.append((
-            point.kind or ("start" if index == 0 else "end"),
-            f"{point.parameter:.7g}",
-            "" if hertz is None else f"{hertz:.5g}",
-            born.get(point.details.get("criticality", ""), "") if point.kind else
-            (f"unstable in {unstable} directions" if unstable else "stable")))
-    return table("point", found.name, "frequency [Hz]", "", rows=rows)
+def _wanted(
+    given: "BranchSettings", parameter: str | None, start: float | None, end: float | None
+) -> "BranchSettings":
+    """The section with what the command line says in its place."""
+    changed = given if parameter is None else replace(given, parameter=parameter)
+    if (start is None) != (end is None):
+        raise InputError("--from and --to belong together; give both ends of the range, or none "
+                         "of them.")
+    if start is None or end is None:
+        return changed
+    if start == end:
+        raise InputError(f"--from and --to are both {start:g}; give the two ends of a range.")
+    return replace(changed, range=(min(start, end), max(start, end)), start=start)

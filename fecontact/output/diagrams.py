@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, choices
+from fecontact.output.diagram_extras import draw_beneath, draw_insets, main_axis
 from fecontact.output.figures import COLOURS, new_figure
 from fecontact.output.saving import save_figure
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fecontact.bifurcation.branch import Branch, BranchPoint
+    from fecontact.bifurcation.brute_force import BruteForce
+    from fecontact.output.diagram_extras import Inset
 
 Array = NDArray[np.float64]
 Quantity = str | int | Callable[["BranchPoint"], float]
@@ -34,7 +37,8 @@ _DASHES = (0, (4, 2.5))
 def plot_branches(
     branches: "Branch | Sequence[Branch]", path: str | Path, y: Quantity = 0, *,
     x: Quantity = "parameter", x_label: str | None = None, y_label: str | None = None,
-    names: Sequence[str] = (),
+    names: Sequence[str] = (), beneath: "BruteForce | None" = None,
+    observe: tuple[str | int, str] = ("B", "x"), insets: "Sequence[Inset]" = (),
 ) -> Path:
     """Plot branches: stable parts solid, unstable ones dashed, special points marked and labelled.
 
@@ -46,11 +50,22 @@ def plot_branches(
         A .png, .pdf or .svg file; it is replaced if it exists.
     y, x : str, int or callable
         What to draw: 'parameter', the name of a stored number, the number of a state counted from
-        0, or a function of a :class:`fecontact.bifurcation.branch.BranchPoint`.
+        0, or a function of a :class:`fecontact.bifurcation.branch.BranchPoint`. For y also
+        'observed_section' of :func:`fecontact.bifurcation.observation.observe`, one curve for each
+        period of the excitation.
     x_label, y_label : str, optional
         Labels of the axes, with units.
     names : sequence of str
         Names of the branches for the legend.
+    beneath : BruteForce, optional
+        Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
+        should be 'observed_section'.
+    observe : (point, axis)
+        The displacement of the runs that is drawn; see
+        :meth:`fecontact.bifurcation.brute_force.BruteForce.observed`.
+    insets : sequence of Inset
+        Phase planes of chosen points, drawn above the diagram; see
+        :func:`fecontact.output.diagram_extras.phase_inset`.
 
     Returns
     -------
@@ -65,25 +80,30 @@ def plot_branches(
     from fecontact.bifurcation.branch import Branch
 
     several = [branches] if isinstance(branches, Branch) else list(branches)
-    return save_figure(path, lambda: branches_figure(several, y, x, x_label, y_label, names))
+    return save_figure(path, lambda: branches_figure(several, y, x, x_label, y_label, names,
+                                                     beneath, observe, insets))
 
 
 def branches_figure(
     branches: "Sequence[Branch]", y: Quantity = 0, x: Quantity = "parameter",
     x_label: str | None = None, y_label: str | None = None, names: Sequence[str] = (),
+    beneath: "BruteForce | None" = None, observe: tuple[str | int, str] = ("B", "x"),
+    insets: "Sequence[Inset]" = (),
 ) -> "Figure":
     """See :func:`plot_branches`."""
-    figure = new_figure(8.0, 5.2)
-    axis = figure.subplots()
+    figure = new_figure(8.0, 7.2 if insets else 5.2)
+    axis = main_axis(figure, insets)
+    dots = draw_beneath(axis, beneath, observe)
     known: dict[str, list[tuple[float, float]]] = {}
     dashed = False
     for number, branch in enumerate(branches):
-        places, heights = _values(branch, x), _values(branch, y)
+        places, curves = _values(branch, x), _values(branch, y, rows=True)
         stable = _stable_pieces(branch)
         dashed |= not stable.all()
         colour = COLOURS[number % len(COLOURS)]
+        heights = curves if curves.ndim == 1 else curves[:, 0]
         for first, last in _runs(stable):
-            axis.plot(places[first : last + 1], heights[first : last + 1], color=colour,
+            axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
                       linewidth=1.8 if stable[first] else 1.2,
                       linestyle="-" if stable[first] else _DASHES)
         for index, point in enumerate(branch.points):
@@ -94,11 +114,14 @@ def branches_figure(
     axis.margins(x=0.02, y=0.06)
     axis.autoscale_view()
     _mark(axis, known)
-    _legend(axis, [COLOURS[k % len(COLOURS)] for k in range(len(branches))], names, known, dashed)
+    draw_insets(figure, axis, insets)
+    _legend(axis, [COLOURS[k % len(COLOURS)] for k in range(len(branches))], names, known, dashed,
+            dots)
     return figure
 
 
-def _values(branch: "Branch", quantity: Quantity) -> Array:
+def _values(branch: "Branch", quantity: Quantity, rows: bool = False) -> Array:
+    """Values (N,) of a quantity, or (N, s) of a row of them where these are allowed."""
     if callable(quantity):
         return np.array([quantity(point) for point in branch.points], dtype=float)
     if isinstance(quantity, int):
@@ -106,6 +129,8 @@ def _values(branch: "Branch", quantity: Quantity) -> Array:
     if quantity == "parameter":
         return branch.parameter
     found = branch.column(quantity)
+    if rows and quantity == "observed_section" and found.ndim == 2:
+        return found
     if found.ndim != 1 or found.dtype.kind not in "fiub":
         plain = [name for name, value in branch.points[0].values.items()
                  if np.ndim(value) == 0 and not isinstance(value, complex)]
@@ -162,7 +187,7 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
 
 def _legend(
     axis: "Axes", colours: Sequence[str], names: Sequence[str],
-    known: dict[str, list[tuple[float, float]]], dashed: bool,
+    known: dict[str, list[tuple[float, float]]], dashed: bool, dots: Sequence[Any],
 ) -> None:
     from matplotlib.lines import Line2D
 
@@ -177,6 +202,7 @@ def _legend(
         handles.append(Line2D([], [], color="#303030", marker=marker, markerfacecolor="white",
                               linestyle="none", markersize=7.0,
                               label=f"{kind} ({letters})" if letters else kind))
+    handles += dots
     if handles:
         axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
 

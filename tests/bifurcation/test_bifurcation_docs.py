@@ -3,12 +3,14 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 TEXT = (Path(__file__).parents[2] / "docs" / "bifurcation.md").read_text()
 
 
-def test_examples_run(capsys):
+def test_examples_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     names = {}
     for code in re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL):
         exec(compile(code, "bifurcation.md", "exec"), names)
@@ -22,3 +24,13 @@ def test_examples_run(capsys):
     end = names["short"].points[-1]
     assert end.kind == "first mode displaced by 1"
     assert end.values["state"][0] == pytest.approx(1.0, rel=1e-10)
+    # The orbit of the second part is that of the runs.
+    first = names["shown"].points[0]
+    values, _ = names["runs"].observed("B", "y")
+    assert first.parameter == pytest.approx(64.0, rel=1e-9)
+    assert first.values["observed_section"][0] == pytest.approx(values[0, -1], rel=1e-3)
+    near = min(names["orbits"].points, key=lambda at: abs(at.parameter - 64.32)).values
+    decay = np.log(np.abs(near["multipliers"]).max()) / near["period"]
+    assert names["pair"].mean() == pytest.approx(decay, rel=0.03)
+    assert len(names["found"].attractors) == 1
+    assert all((tmp_path / name).stat().st_size > 5000 for name in ("impacts.png", "basins.png"))

@@ -1,0 +1,186 @@
+"""The section [branch] of a study: what is followed, written and said."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from fecontact import InputError, simulate
+from fecontact import branching as module
+from fecontact.bifurcation.branch import Branch
+from fecontact.bifurcation.branch_file import load_branches, save_branches
+from fecontact.bifurcation.observation import motion_of
+from fecontact.branching import follow_branches
+from fecontact.cli import execute
+from fecontact.study import Study
+from fecontact.study_branch import BranchSettings
+
+# The friction oscillator of section 4.3 without excitation, as a block of 5.632 kg.
+STUDY = """
+[geometry]
+shape = "block"
+width = 0.12
+height = 0.06
+contact_length = 0.08
+drive_height = 0.01
+element_size = 0.02
+
+[body]
+material = "steel"
+thickness = 0.0996461
+
+[basis]
+modes = 3
+select = [0, 1]
+contact_nodes = 1
+B = "B"
+C = "top"
+
+[normal]
+stiffness = 10e6
+roughness_height = 10e-6
+damping = 40.0
+
+[friction]
+static_coefficient = 0.8
+kinetic_coefficient = 0.55
+decay = 1000.0
+smoothing_slope = 1e6
+
+[ground]
+speed = 12e-3
+
+[drive]
+stiffness_x = 5610.0
+damping_x = 0.768
+
+[load]
+normal = 14.0
+
+[branch]
+parameter = "ground.speed"
+range = [6e-3, 14e-3]
+start = 14e-3
+switch = ["Hopf"]
+show = "amplitude"
+"""
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "block.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def rows_of(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_sliding_and_the_orbits_of_its_hopf_point(study, capsys):
+    assert execute(["branch", str(study)]) == 0
+    said = capsys.readouterr().out
+    results = study.parent / "results"
+    found = load_branches(results / "block-branch.h5")
+    assert list(found) == ["steady sliding", "orbits"]
+    hopf, = found["steady sliding"].of_kind("Hopf")
+    assert hopf.parameter == pytest.approx(8.336533e-3, rel=1e-5)
+    assert f"{hopf.parameter:.7g}" in said
+    assert Branch.load(results / "block-branch.h5").name == "ground.speed"
+    for name in ("block-branch.png", "block-stability.png"):
+        assert (results / name).stat().st_size > 10_000
+    rows = rows_of(results / "block-branch.csv")
+    assert len(rows) == sum(len(branch) for branch in found.values())
+    orbits = [row for row in rows if row["branch"] == "orbits"]
+    assert float(orbits[-1]["parameter"]) == pytest.approx(14e-3, rel=1e-9)
+    assert {row["stable"] for row in orbits} == {"0"}
+    assert float(orbits[-1]["frequency_hz"]) == pytest.approx(5.0230, abs=2e-4)
+    amplitude = [float(row["amplitude"]) for row in orbits]
+    assert (np.diff(amplitude) > 0.0).all()
+
+
+def test_the_unstable_orbit_parts_sliding_from_stick_slip(study):
+    described = Study.read(study)
+    result = follow_branches(described.system(), described.branch)
+    branch = result.found["orbits"]
+    end = branch.points[-1]
+    states = motion_of(result.contact_field, branch, end)[1]
+    system = described.system().with_(**{"ground.speed": end.parameter})
+    rest = result.found["steady sliding"].points[0].values["state"]
+    sizes = []
+    for factor in (0.9, 1.1):
+        run = simulate(system, 4.0, initial=rest + factor * (states[0] - rest), outputs=4001)
+        x = run.displacement("B")[:, 0]
+        sizes.append([np.ptp(part) / 2.0 for part in (x[:400], x[-400:])])
+    (inside, inside_later), (outside, outside_later) = sizes
+    border = end.values["observed_amplitude"]
+    assert inside_later < inside < border < outside < outside_later
+
+
+def test_stick_slip_of_a_run(study):
+    """Period and range at 1 mm/s are known from an independent calculation."""
+    settings = ["branch.kind=orbits", "branch.range=[1e-3, 1.1e-3]", "branch.start=1e-3",
+                "branch.method=shooting", "branch.transient=10", "branch.longest_period=2",
+                "branch.segments=2", "branch.step=0.05", "branch.largest_step=0.5",
+                "branch.points=4"]
+    assert execute(["branch", str(study), *(f"--set={text}" for text in settings)]) == 0
+    first = rows_of(study.parent / "results" / "block-branch.csv")[0]
+    assert float(first["period"]) == pytest.approx(1.264348, abs=2e-5)
+    assert float(first["minimum"]) == pytest.approx(0.796592e-3, abs=1e-8)
+    assert float(first["maximum"]) == pytest.approx(1.953714e-3, abs=2e-8)
+    assert first["stable"] == "1"
+    assert not (study.parent / "results" / "block-stability.png").exists()
+
+
+def test_interruption_keeps_what_is_there(study, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "_beyond", interrupted)
+    assert execute(["branch", str(study)]) == 130
+    assert list(load_branches("results/block-branch.h5")) == ["steady sliding"]
+
+
+def test_branches_that_cannot_be_followed_are_named(study, monkeypatch, capsys):
+    def failing(*_):
+        raise InputError("nothing there.")
+
+    monkeypatch.setattr(module, "_beyond", failing)
+    assert execute(["branch", str(study)]) == 1
+    assert "note: The branch 'orbits' was not followed: nothing there." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--set", "branch.range=[2, 1]"], "[branch]: range = [2.0, 1.0] must be two values"),
+    (["--set", "branch.start=1.0"], "start = 1 must lie in the range, 0.006 to 0.014"),
+    (["--set", 'branch.switch=["hopf"]'], "switch = 'hopf' is not known"),
+    (["--set", "branch.point=D"], "'D'"),
+    (["--set", "branch.parameter=ground.sped"], "did you mean 'ground.speed'"),
+    (["--from", "1e-2"], "--from and --to belong together"),
+    (["--set", "branch.kind=orbits"], "give transient"),
+    (["--set", "drive.damping_x=300.0", "--set", "branch.kind=orbits", "--set",
+      "branch.transient=20.0", "--set",
+      "branch.longest_period=1.0"], "comes to rest"),
+    (["--set", "branch.brute_force=10"], "no single period of excitation"),
+])
+def test_errors_are_one_line(study, capsys, arguments, message):
+    assert execute(["branch", str(study), *arguments]) == 1
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+
+
+def test_settings_without_their_parts():
+    with pytest.raises(InputError, match="lacks the key 'range'"):
+        BranchSettings(parameter="ground.speed").bounds  # noqa: B018
+    with pytest.raises(InputError, match="lacks the key 'parameter'"):
+        BranchSettings().name  # noqa: B018
+    assert BranchSettings(range=(1.0, 2.0)).first == 1.0
+
+
+def test_no_branches_no_file(tmp_path):
+    with pytest.raises(InputError, match="no branches to write"):
+        save_branches(tmp_path / "none.h5", {})
+    assert not list(tmp_path.iterdir())

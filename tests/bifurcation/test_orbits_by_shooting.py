@@ -1,0 +1,133 @@
+"""What begins on branches by shooting, driven systems, and settled motions as starts."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from systems_for_bifurcations import belt, lorenz_field, two_mass_field
+
+from fecontact import simulate, strobe
+from fecontact.bifurcation.contact_field import contact_field
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.observation import motion_of, observe
+from fecontact.bifurcation.orbit_output import orbit_history
+from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
+from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.settled import settled_motion
+from fecontact.bifurcation.shooting_branch import orbits_by_shooting
+from fecontact.bifurcation.shooting_switch import (
+    doubled_by_shooting,
+    hopf_orbits_by_shooting,
+    restored_shooting,
+)
+from fecontact.errors import AnalysisError, InputError
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
+
+import impact_orbits
+
+FEW = Settings(step=5e-3, largest_step=0.05, points=60)
+
+
+@pytest.fixture(scope="module")
+def two_masses():
+    field = two_mass_field()
+    sliding = equilibrium_branch(field, "B", bounds=(0.3, 8.3))
+    orbits = orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], intervals=100,
+                              bounds=(0.3, 8.3))
+    return field, sliding, orbits
+
+
+def test_doubled_orbits_agree_with_collocation(two_masses):
+    field, _, orbits = two_masses
+    doubling, = orbits.of_kind("period doubling")
+    near = min((at for at in orbits.points if 8.0 < at.parameter < 8.09),
+               key=lambda at: abs(at.parameter - 8.07))
+    times, states = orbit_history(near, 4, 2000)
+    values = field.values_with(B=near.parameter)
+    shot = orbits_by_shooting(field, "B", times, states, values=values, bounds=(8.0, 8.11),
+                              period=near.values["period"], settings=FEW)
+    found, = shot.of_kind("period doubling")
+    assert found.parameter == pytest.approx(doubling.parameter, rel=1e-7)
+    twice = doubled_by_shooting(field, shot, found, settings=FEW, bounds=(8.05, 8.12))
+    wanted = orbits_beyond(field, orbits, doubling, settings=FEW, bounds=(8.05, 8.12))
+    for branch in (twice, wanted):
+        assert branch.points[-1].parameter == pytest.approx(8.12, rel=1e-12)
+    one, other = twice.points[-1].values, wanted.points[-1].values
+    assert one["period"] == pytest.approx(other["period"], rel=1e-7)
+    assert one["period"] == pytest.approx(2.0 * near.values["period"], rel=0.1)
+    assert one["stable"]
+    assert other["stable"]
+    low, high = (branch.points[-1].values for branch in (
+        observe(field, twice, 1), observe(field, wanted, 1)))
+    for name in ("observed_minimum", "observed_maximum"):
+        assert low[name] == pytest.approx(high[name], rel=1e-4)
+
+
+def test_orbits_of_a_hopf_point_agree_with_collocation(two_masses):
+    field, sliding, _ = two_masses
+    hopf = sliding.of_kind("Hopf")[0]
+    # The branch leaves to smaller B.
+    shot = hopf_orbits_by_shooting(field, sliding, hopf, settings=FEW, bounds=(1.1, 8.3),
+                                   segments=3)
+    assert shot.points[-1].parameter == pytest.approx(1.1, rel=1e-12)
+    assert not shot.points[-1].values["stable"]
+    beside = orbits_from_hopf(field, sliding, hopf, settings=FEW, bounds=(1.1, 8.3))
+    assert shot.points[-1].values["period"] == pytest.approx(
+        beside.points[-1].values["period"], rel=1e-7)
+
+
+def test_the_drives_frequency_moves_the_ends_of_the_segments():
+    """At the end of the range the orbit is the motion of a run that knows nothing of it."""
+    branch = impact_orbits.orbits(64.32, 64.3, 64.5, points=25, step=0.05)
+    field = impact_orbits.field_at(64.32)
+    end = observe(field, branch, "B", "y").points[-1]
+    assert end.parameter == pytest.approx(64.5, rel=1e-9)
+    run = strobe(impact_orbits.oscillator(64.5), transient=150, keep=2, initial=np.zeros(4),
+                 rtol=1e-9)
+    row = field.displacement_row("B", "y")
+    assert end.values["observed_section"] == pytest.approx(run.states[0, -1:] @ row, rel=1e-5)
+    assert np.abs(end.values["multipliers"])[:2] == pytest.approx([0.545, 0.545], abs=0.01)
+
+
+def test_settled_motions():
+    motion = settled_motion(belt(speed=1e-3), initial=np.zeros(2), transient=6.0,
+                            longest_period=2.0)
+    # Known from an independent calculation.
+    assert motion.period == pytest.approx(1.264348, abs=2e-5)
+    driven = settled_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
+                            longest_period=8 * 2.0 * np.pi / 30.9)
+    assert driven.periods == 2
+    assert driven.period == pytest.approx(4.0 * np.pi / 30.9, rel=1e-12)
+    assert np.abs(driven.states[-1] - driven.states[0]).max() < 1e-3 * np.ptp(driven.states)
+    with pytest.raises(AnalysisError, match=r"(does not repeat|has not settled) within 4 periods"):
+        settled_motion(impact_orbits.oscillator(23.63), initial=np.zeros(4), transient=10.0,
+                       longest_period=4 * 2.0 * np.pi / 23.63)
+    with pytest.raises(InputError, match="give transient"):
+        settled_motion(belt(speed=1e-3))
+
+
+def test_motions_of_both_kinds_are_those_of_runs(two_masses):
+    field, _, orbits = two_masses
+    point = next(at for at in orbits.points if at.values["stable"] and at.kind is None)
+    times, states = motion_of(field, orbits, point, 50)
+    values = field.values_with(B=point.parameter)
+    run = simulate(field.system(values), times[-1], initial=states[0], outputs=times, rtol=1e-9)
+    assert np.abs(run.states - states).max() < 1e-4 * np.abs(states).max()
+
+
+def test_kind_errors(two_masses):
+    field, sliding, orbits = two_masses
+    doubling, = orbits.of_kind("period doubling")
+    with pytest.raises(InputError, match="not one of periodic orbits by shooting"):
+        doubled_by_shooting(field, orbits, doubling)
+    with pytest.raises(InputError, match="is no period doubling"):
+        doubled_by_shooting(field, orbits, orbits.points[3])
+    with pytest.raises(InputError, match="is no Hopf point"):
+        hopf_orbits_by_shooting(field, sliding, sliding.points[0])
+    with pytest.raises(InputError, match="is no periodic orbit"):
+        motion_of(field, sliding, sliding.points[0])
+    with pytest.raises(InputError, match="not one of periodic orbits"):
+        restored_shooting(lorenz_field(), sliding, sliding.points[0])
+    assert contact_field(belt(), {}).dimension == 2
