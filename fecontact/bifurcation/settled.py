@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.periods import count_periods
-from fecontact.bifurcation.forcing import common_period
 from fecontact.errors import AnalysisError, InputError
+from fecontact.forcing import common_period
 from fecontact.integrate.initial import Initial
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status, Trajectory

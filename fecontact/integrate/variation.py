@@ -28,10 +28,6 @@ Array = NDArray[np.float64]
 
 # Columns that have fallen below this part of their largest size need no accuracy of their own.
 _FADED = 1e-3
-# The column of a parameter begins at zero. It needs no accuracy of its own as long as the state
-# changes by less than this part of its size where the parameter moves by the width of its
-# difference, a small part of its value.
-_FAINT = 2e-8
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5
@@ -133,11 +129,10 @@ def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # 
 
 
 @helper
-def _largest_error(scale, width, v):  # type: ignore[no-untyped-def]
+def _largest_error(scale, v):  # type: ignore[no-untyped-def]
     largest = 0.0
     for c in range(len(v.columns)):
         before, after, error = 0.0, 0.0, 0.0
-        least = _FAINT / width if width != 0.0 and c == len(v.columns) - 1 else 0.0
         last = v.stages[rodas.STAGES * c + rodas.STAGES - 1]
         for k in range(len(scale)):
             before = max(before, abs(v.columns[c, k]) / scale[k])
@@ -146,7 +141,7 @@ def _largest_error(scale, width, v):  # type: ignore[no-untyped-def]
         size = max(before, after)
         v.norms[1, c] = max(v.norms[0, c], size)
         if error > 0.0:
-            largest = max(largest, error / max(max(size, least), _FADED * v.norms[1, c]))
+            largest = max(largest, error / max(size, _FADED * v.norms[1, c]))
     return largest
 
 
@@ -222,7 +217,7 @@ def propagate(  # type: ignore[no-untyped-def]
             if i == rodas.STAGES - 1:
                 for k in range(size):
                     v.after[c, k] = X[k] + own[i, k]
-    return _largest_error(scale, width, v)
+    return _largest_error(scale, v)
 
 
 @helper
