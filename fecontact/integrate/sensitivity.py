@@ -12,13 +12,11 @@ from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, finish, start
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.simulate import output_times
+from fecontact.integrate.variation import PARAMETER_MOVE
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
-
-# Parameters are moved by this part of their value for differences of the right-hand side.
-_MOVE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +132,16 @@ def _moved(
         def system_at(at: float) -> ContactSystem:
             return system.with_(**{name: at})
     else:
+        if not (isinstance(parameter, tuple) and len(parameter) == 2 and callable(parameter[0])
+                and isinstance(parameter[1], Real)):
+            raise InputError(f"parameter = {parameter!r} must be the dotted name of a number, or a "
+                             f"function of a system and a value, and the value: (function, 0.5).")
         function, value = parameter
 
         def system_at(at: float) -> ContactSystem:
             return function(system, at)
 
-    move = _MOVE * (abs(value) or 1.0)
+    move = PARAMETER_MOVE * (abs(value) or 1.0)
     try:
         return system_at(value + move), system_at(value - move), 2.0 * move
     except InputError:

@@ -32,6 +32,8 @@ _PART = 1e-4
 _JUMP = 3.0 * _PART
 # Columns that have fallen below this part of their largest size need no accuracy of their own.
 _FADED = 1e-3
+# A parameter is moved up and down by this part of its value, or of one where it is zero.
+PARAMETER_MOVE = 1e-5
 
 
 class Variation(NamedTuple):
@@ -205,8 +207,9 @@ def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # 
 
 
 @helper
-def _largest_error(scale, v):  # type: ignore[no-untyped-def]
+def _largest_error(scale, width, v):  # type: ignore[no-untyped-def]
     largest = 0.0
+    size_of_state = v.columns.shape[1]
     for c in range(len(v.columns)):
         before, after, error = 0.0, 0.0, 0.0
         last = v.stages[rodas.STAGES * c + rodas.STAGES - 1]
@@ -216,6 +219,10 @@ def _largest_error(scale, v):  # type: ignore[no-untyped-def]
             error = max(error, abs(last[k]) / scale[k])
         size = max(before, after)
         v.norms[1, c] = max(v.norms[0, c], size)
+        if c == size_of_state:
+            # That of the parameter begins at zero, where no error is small against it: it counts
+            # as if the parameter's own value moved the state by its scale.
+            v.norms[1, c] = max(v.norms[1, c], PARAMETER_MOVE / width)
         if error > 0.0:
             largest = max(largest, error / max(size, _FADED * v.norms[1, c]))
     return largest
@@ -292,7 +299,7 @@ def propagate(  # type: ignore[no-untyped-def]
             if i == rodas.STAGES - 1:
                 for k in range(size):
                     v.after[c, k] = X[k] + own[i, k]
-    return _largest_error(scale, v)
+    return _largest_error(scale, width, v)
 
 
 @helper
