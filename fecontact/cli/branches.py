@@ -57,7 +57,7 @@ def branch(
 
 def branch_table(found: "Branch") -> Any:
     """Ends and special points of a branch of equilibria: where, and what changes there."""
-    from fecontact.report import table
+    from fecontact.report import count, table
 
     born = {"supercritical": "stable orbits", "subcritical": "unstable orbits",
             "undecided": "orbits"}
@@ -71,5 +71,5 @@ def branch_table(found: "Branch") -> Any:
             f"{point.parameter:.7g}",
             "" if hertz is None else f"{hertz:.5g}",
             born.get(point.details.get("criticality", ""), "") if point.kind else
-            (f"unstable in {unstable} directions" if unstable else "stable")))
+            (f"unstable in {count(unstable, 'direction')}" if unstable else "stable")))
     return table("point", found.name, "frequency [Hz]", "", rows=rows)
