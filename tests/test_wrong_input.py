@@ -14,7 +14,9 @@ from fecontact import (
     contact_field,
     equilibrium_branch,
     event,
+    plot_branches,
 )
+from fecontact.bifurcation.problem import Settings
 from fecontact.errors import AnalysisError
 from fecontact.output.redraw import Choice, point_of
 
@@ -48,6 +50,17 @@ def test_refused(make, names):
     ((Axis("B", "x"), [0.0, 1e-3]), "each by itself"),
     ((Axis("B", "y", "velocity"), [0.0, 1e-3]), "each by itself"),
 ])
+@pytest.mark.parametrize("bounds", [(1.0, 2.0, 3.0), "ab", 1.0, (2.0, 1.0)])
+def test_bounds_of_branches(bounds):
+    with pytest.raises(InputError, match=r"bounds = .* must be two values"):
+        Settings(bounds=bounds)
+
+
+def test_no_branch_to_draw(tmp_path):
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot_branches([], tmp_path / "none.png")
+
+
 def test_planes_of_basins_that_no_start_lies_on(first, names):
     with pytest.raises(InputError, match=names):
         basins(impact_oscillator(modes=2), first, (Axis("B", "y", "velocity"), [0.0, 0.02]),

@@ -154,7 +154,7 @@ def _problem(
     chosen = settings or Settings()
     if bounds is not None:
         chosen = replace(chosen, bounds=bounds)
-    for bound in chosen.bounds:
+    for bound in map(float, chosen.bounds):
         # A parameter may be what drives the system, as an amplitude that begins at zero.
         there = begin.values.copy()
         there[index] = bound
