@@ -23,11 +23,12 @@ from fecontact import (
     RoughSurface,
     Study,
     Trajectory,
+    lyapunov_exponents,
+    sensitivity,
     simulate,
 )
 from fecontact.analysis.impacts import Impacts, Rest, find_impacts, find_rests
-from fecontact.analysis.periods import Periodicity, drive_period, periodicity, strobed_states
-from fecontact.integrate.ensemble import ensemble
+from fecontact.analysis.periods import Periodicity, drive_period, periodicity
 
 STUDY = Path(__file__).with_suffix(".toml")
 REDUCED_MASS = 0.092  # kg
@@ -38,6 +39,7 @@ FREQUENCIES = {  # rad/s, and what the source reports
     23.63: "chaotic",
     9.845: "chatter, at rest once every period",
 }
+ORBIT = 1e-3  # of the motion's range; what repeats less exactly has no multipliers
 OUTPUT_STEP = 4e-5  # s; an impact lasts 3 ms or more
 LAW = RoughSurface(stiffness=0.3e6, roughness_height=5.2e-6, damping=6.0)
 DRIVE = Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3, angular_frequency=64.32)
@@ -124,30 +126,26 @@ def regime(run: Trajectory) -> Regime:
                   impacts.per_period(period, begin, float(run.time[-1])))
 
 
-def exponent(system: ContactSystem, run: Trajectory, periods: int = 64, pairs: int = 8,
-             distance: float = 1e-6) -> tuple[float, float]:
+def exponent(run: Trajectory, found: Regime, periods: int = 400) -> tuple[float, float]:
     """Largest Lyapunov exponent [1/s] of a settled motion, and its standard error.
 
-    By the growth of the distance between two motions, put back to ``distance`` of the motion's
-    size after each drive period (Benettin et al. 1980); the mean over some pairs that start from
-    different periods of the run. Distances of coordinates are measured relative to their range.
+    That of an orbit is ln |mu| / T from its largest multiplier mu, without a standard error (nan);
+    others are followed over some drive periods.
     """
-    period = drive_period(system)
-    scale = np.ptp(run.states, axis=0)
-    state = strobed_states(run, start=float(run.time[0])).states[-pairs:]
-    offset = distance * scale * np.random.default_rng(0).normal(size=state.shape)
-    growths = np.empty((periods, pairs))
-    for number in range(periods):
-        ends = ensemble(system, [0.0, period], initial=np.vstack([state, state + offset]),
-                        rtol=1e-9).states[:, 1]
-        state, apart = ends[:pairs], ends[pairs:] - ends[:pairs]
-        size = np.linalg.norm(apart / scale, axis=1)
-        growths[number] = np.log(size / np.linalg.norm(offset / scale, axis=1)) / period
-        offset = apart * (distance / size)[:, None]
-    # The first half turns the distances into the direction that grows most; the second is whole
-    # repetitions of motions that repeat after one, two or four periods.
-    means = growths[periods // 2:].mean(axis=0)
-    return float(means.mean()), float(means.std(ddof=1) / np.sqrt(pairs))
+    end, period = float(run.time[-1]), drive_period(run.system)
+    repeats = found.periodicity.periods
+    if repeats and found.periodicity.misfit < ORBIT:
+        orbit = sensitivity(run.system, end + repeats * period, t_start=end,
+                            initial=run.states[-1])
+        largest = np.abs(np.linalg.eigvals(orbit.monodromy)).max()
+        return float(np.log(largest) / (repeats * period)), float("nan")
+    growth = lyapunov_exponents(run.system, periods * period, initial=run.states[-1])
+    return float(growth.exponents[0]), float(growth.uncertainty[0])
+
+
+def in_words(growth: float, error: float) -> str:
+    """An exponent with its standard error, if it has one."""
+    return f"{growth:+.3f}" if np.isnan(error) else f"{growth:+.1f} ± {error:.1f}"
 
 
 def main() -> None:
@@ -159,11 +157,11 @@ def main() -> None:
             driven = system.with_(**{"drive.angular_frequency": frequency})
             run = settled(driven)
             found = regime(run)
-            growth, error = exponent(driven, run)
+            growth, error = exponent(run, found)
             counts = found.per_period
             print(f"| {frequency:g} | {reported} | {system.basis.modes} | {found.name} | "
                   f"{found.periodicity.misfit:.0e} | {counts.min()} to {counts.max()} | "
-                  f"{growth:+.1f} ± {error:.1f} |", flush=True)
+                  f"{in_words(growth, error)} |", flush=True)
 
 
 if __name__ == "__main__":

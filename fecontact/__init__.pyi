@@ -23,11 +23,12 @@ from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
 from .errors import FecontactError, InputError
+from .forcing import forcing_period
 from .formats.matrices import read_matrix
 from .formats.uff import read_uff
 from .gap import Crown
 from .geometry import Beam, Block, Pendulum, generate
-from .integrate.ensemble import Ensemble, ensemble, forcing_period, strobe
+from .integrate.ensemble import Ensemble, ensemble, strobe
 from .integrate.events import ContactEvents, Crossing, Event, Events, event
 from .integrate.initial import RigidStart
 from .integrate.sensitivity import Sensitivity, sensitivity

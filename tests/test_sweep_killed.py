@@ -55,8 +55,10 @@ def test_killed_at_random_times_it_goes_on_to_the_same_files(tmp_path, undisturb
     rng = random.Random(7)
     for how in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
         before = len(list(shards.glob("*.json")))
-        process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True,
-                                   start_new_session=True)
+        # Shells make what runs in the background deaf to Ctrl-C.
+        process = subprocess.Popen(
+            command, stderr=subprocess.PIPE, text=True, start_new_session=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
         wait_for(lambda count=before: len(list(shards.glob("*.json"))) > count)
         time.sleep(rng.uniform(0.0, 0.25))
         workers = children_of(process.pid)

@@ -13,13 +13,17 @@ def mass_above(mass: float = 1.0, spring: float = 0.0, **parts: object) -> Conta
 
 
 def mass_in_plane(mass: float = 1.0, stiffness: np.ndarray | None = None,
-                  **parts: object) -> ContactSystem:
-    """A mass that moves along the ground and up and down; stiffness (2, 2) to the frame [N/m]."""
+                  damping: np.ndarray | None = None, **parts: object) -> ContactSystem:
+    """A mass that moves along the ground and up and down.
+
+    ``stiffness`` [N/m] and ``damping`` [Ns/m] (2, 2) are those of what holds it to the frame.
+    """
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
     basis = ModalBasis.from_matrices(
         mass * np.eye(2), np.zeros((2, 2)) if stiffness is None else stiffness,
-        {"contact": rows[None], "B": rows, "C": rows})
+        {"contact": rows[None], "B": rows, "C": rows},
+        damping=np.zeros((2, 2)) if damping is None else damping)
     return ContactSystem(basis, **parts)
 
 

@@ -124,9 +124,6 @@ def strobed_states(
     return Strobe(times, points, period)
 
 
-strobe = strobed_states
-
-
 def count_periods(
     points: ArrayLike, scale: ArrayLike, *, largest: int = 16, tolerance: float = 2e-3
 ) -> Periodicity:

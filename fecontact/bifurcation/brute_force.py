@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.errors import InputError, choices
-from fecontact.integrate.ensemble import forcing_period, strobe
+from fecontact.forcing import forcing_period
+from fecontact.integrate.ensemble import strobe
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]

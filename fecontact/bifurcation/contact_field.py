@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation import contact_field_kernels as kernels
-from fecontact.bifurcation.forcing import common_period
 from fecontact.bifurcation.system_family import SystemFamily
 from fecontact.bifurcation.vector_field import Array, VectorField
 from fecontact.errors import InputError, choices
+from fecontact.forcing import common_period
 from fecontact.system import ContactSystem
 
 _DIRECTIONS = ("x", "y", "rotation")

@@ -7,10 +7,10 @@ from numbers import Integral, Real
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import AnalysisError, InputError
+from fecontact.errors import AnalysisError, FecontactError, InputError
+from fecontact.forcing import forcing_period
 from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, finish, start
-from fecontact.integrate.ensemble import forcing_period
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.system import ContactSystem
 
@@ -104,7 +104,7 @@ def lyapunov_exponents(
     if interval is None:
         try:
             interval = min(forcing_period(system), duration)
-        except InputError:
+        except FecontactError:
             interval = duration / 1000.0
     state, time = initial_state(system, initial, 0.0), 0.0
     if transient > 0.0:

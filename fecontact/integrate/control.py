@@ -188,7 +188,7 @@ def start(
         system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), times, control,
         progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
         np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)),
-        Vary(above.arrays, below.arrays, width, variation_for(columns, m, n, states),
+        Vary(above.arrays, below.arrays, width, variation_for(columns, m, n, states, width),
              np.zeros((len(times) if vary else 0, columns, len(state)))),
         watch_for(system, events, bool(vary)))
 

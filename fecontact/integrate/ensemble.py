@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.errors import InputError
+from fecontact.forcing import forcing_period
 from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, start
 from fecontact.integrate.events import Events, Watched, as_watched
@@ -201,24 +202,6 @@ def strobe(
                      **settings)
     return Ensemble(found.times[:, first:], found.states[:, first:], found.status, found.steps,
                     found.events)
-
-
-def forcing_period(system: ContactSystem) -> float:
-    """Period of what excites a system: of the motion at B and the loads [s].
-
-    Raises
-    ------
-    InputError
-        If nothing excites it periodically, or several things with different periods.
-    """
-    sources = [motion for motion in system.drive.motions if motion.largest > 0.0]
-    sources += [force.signal for force in system.load.forces]
-    frequencies = {source.frequency_hz for source in sources if source.frequency_hz}
-    if len(frequencies) != 1 or (system.ground.shortest_wavelength is not None
-                                 and system.ground.largest_speed(0.0, 1.0) > 0.0):
-        raise InputError("The system has no single period of excitation (one frequency of drive "
-                         "and loads, level or resting ground); give period.")
-    return 1.0 / float(frequencies.pop())
 
 
 def _members(

@@ -12,7 +12,7 @@ from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, finish, start
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.simulate import output_times
-from fecontact.integrate.variation import PARAMETER_MOVE
+from fecontact.integrate.variation import MOVE
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -141,7 +141,7 @@ def _moved(
         def system_at(at: float) -> ContactSystem:
             return function(system, at)
 
-    move = PARAMETER_MOVE * (abs(value) or 1.0)
+    move = MOVE * (abs(value) or 1.0)
     try:
         return system_at(value + move), system_at(value - move), 2.0 * move
     except InputError:

@@ -21,19 +21,16 @@ from numpy.typing import NDArray
 
 from fecontact.compiled import borrowed, f8, helper, kernel, matrix, vector
 from fecontact.contact_kernels import SYSTEM
-from fecontact.integrate import linear, motion, rodas
-from fecontact.laws.contract import ground_at, signal_at
+from fecontact.integrate import curvature, linear, motion, rodas
+from fecontact.laws.contract import signal_at
 
 Array = NDArray[np.float64]
 
-# Differences are taken over this part of the scales of the laws.
-_PART = 1e-4
-# Differences of larger parts of the usual size of a derivative are jumps.
-_JUMP = 3.0 * _PART
 # Columns that have fallen below this part of their largest size need no accuracy of their own.
 _FADED = 1e-3
-# A parameter is moved up and down by this part of its value, or of one where it is zero.
-PARAMETER_MOVE = 1e-5
+
+# Parameters are moved by this part of their value for differences of the right-hand side.
+MOVE = 1e-5
 
 
 class Variation(NamedTuple):
@@ -47,6 +44,9 @@ class Variation(NamedTuple):
         They at the end of the step.
     norms : (2, k) array
         Largest size of each column since it began, and at the end of the step.
+    least : (k,) array
+        What these are at least: what makes the column of a parameter, which begins at zero,
+        worth attention.
     stages : (8 k, size) array
         U_i of column c in row 8 c + i.
     """
@@ -54,6 +54,7 @@ class Variation(NamedTuple):
     columns: Array
     after: Array
     norms: Array
+    least: Array
     stages: Array
     vectors: Array
     nodes: Array
@@ -68,17 +69,26 @@ class Variation(NamedTuple):
 
 
 VARIATION = types.NamedTuple(
-    [matrix] * 7 + [vector] * 3 + [motion.GRADIENTS] * 4, Variation)
+    [matrix] * 3 + [vector] + [matrix] * 4 + [vector] * 3 + [motion.GRADIENTS] * 4, Variation)
 
 
-def variation_for(columns: int, modes: int, nodes: int, states: int) -> Variation:
-    """Room for so many columns; the first ``size`` of them are the unit matrix."""
+def variation_for(
+    columns: int, modes: int, nodes: int, states: int, width: float = 0.0
+) -> Variation:
+    """Room for so many columns; the first ``size`` of them are the unit matrix.
+
+    ``width`` is that of the parameter whose column comes last: 2e-5 of its value.
+    """
     size = 2 * modes + nodes * states
     room = [motion.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
                              np.zeros((nodes, states, 3 + states))) for _ in range(4)]
     start = np.zeros((columns, size))
     np.fill_diagonal(start, 1.0)
-    return Variation(start, np.zeros((columns, size)), np.zeros((2, columns)),
+    least = np.zeros(columns)
+    if width:
+        # A tenth of the state's own sizes, if the parameter changed by all of its value.
+        least[-1] = 0.1 * MOVE * 2.0 / (width * _FADED)
+    return Variation(start, np.zeros((columns, size)), np.tile(least, (2, 1)), least,
                      np.zeros((rodas.STAGES * columns, size)), np.zeros((7, size)),
                      np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(motion.GIVEN),
                      np.zeros(modes), np.zeros(modes), *room)
@@ -108,94 +118,6 @@ def _push(g, s, shapes, x, w, sign, rate):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _reach(u, shapes, slip_scale, depth, memory_scale, w):  # type: ignore[no-untyped-def]
-    """Multiple e of the stage u that is small against the scales of all laws."""
-    m, rows = shapes.shape
-    n = rows // 2
-    motion.project(shapes, u, w[0], w[1])
-    largest = 1.0
-    for j in range(n):
-        largest = max(largest, abs(w[1, j]) / slip_scale[j])
-        largest = max(largest, abs(w[0, n + j]) / depth[j])
-    for k in range(len(memory_scale)):
-        largest = max(largest, abs(u[2 * m + k]) / memory_scale[k])
-    return _PART / largest
-
-
-@helper
-def _difference(ahead, here, behind, factor, forward, usual):  # type: ignore[no-untyped-def]
-    """Difference quotient, that of one side where a kink or a jump lies within reach.
-
-    A difference that is not small against the ``usual`` size has met a jump. Of two sides that
-    differ without one, that of the step itself counts.
-    """
-    a, b = ahead - here, here - behind
-    jump_ahead, jump_behind = abs(a) > _JUMP * usual, abs(b) > _JUMP * usual
-    if jump_ahead or jump_behind:
-        if jump_ahead and jump_behind:
-            return factor * (a if abs(a) < abs(b) else b)
-        return factor * (b if jump_ahead else a)
-    if abs(a - b) <= 0.5 * max(abs(a), abs(b)):
-        return 0.5 * factor * (a + b)
-    return factor * (a if forward else b)
-
-
-@helper
-def _learn(here, usual):  # type: ignore[no-untyped-def]
-    """Let the usual sizes be the largest seen."""
-    n, states, width = here.rates.shape
-    for j in range(n):
-        for row in range(3):
-            for k in range(4):
-                usual.partial[j, row, k] = max(usual.partial[j, row, k],
-                                               abs(here.partial[j, row, k]))
-        for k in range(width):
-            usual.force[j, k] = max(usual.force[j, k], abs(here.force[j, k]))
-            for row in range(states):
-                usual.rates[j, row, k] = max(usual.rates[j, row, k], abs(here.rates[j, row, k]))
-
-
-@helper
-def _set_sinking(t, y, s, shapes, v, out):  # type: ignore[no-untyped-def]
-    """Fill out (2, n): slope of the ground under each node, and rate of its penetration."""
-    n = len(s.abscissa)
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    motion.project(shapes, y, v.nodes[0], v.nodes[1])
-    for j in range(n):
-        xi = s.abscissa[j] + v.nodes[0, j] - travel
-        slope = ground_at(s.profile)(xi, s.profile_parameters)[1]
-        out[0, j] = slope
-        out[1, j] = slope * (v.nodes[1, j] - speed) - v.nodes[1, n + j]
-
-
-@helper
-def _differences(ahead, here, behind, usual, factor, u, travelled, sinking, shapes, w):  # type: ignore[no-untyped-def]
-    """Put the difference quotients of gradients along the stage u into those ahead.
-
-    A stage that moves a node as the step does shows with its forward side what is within the
-    step.
-    """
-    n, states, width = ahead.rates.shape
-    motion.project(shapes, u, w[0], w[1])
-    for j in range(n):
-        sunk = sinking[0, j] * (w[0, j] - travelled) - w[0, n + j]
-        forward = sunk * sinking[1, j] >= 0.0
-        for row in range(3):
-            for k in range(4):
-                ahead.partial[j, row, k] = _difference(
-                    ahead.partial[j, row, k], here.partial[j, row, k], behind.partial[j, row, k],
-                    factor, forward, usual.partial[j, row, k])
-        for k in range(width):
-            ahead.force[j, k] = _difference(ahead.force[j, k], here.force[j, k],
-                                            behind.force[j, k], factor, forward,
-                                            usual.force[j, k])
-            for row in range(states):
-                ahead.rates[j, row, k] = _difference(
-                    ahead.rates[j, row, k], here.rates[j, row, k], behind.rates[j, row, k], factor,
-                    forward, usual.rates[j, row, k])
-
-
-@helper
 def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # type: ignore[no-untyped-def]
     """Fill out = factor (f of the system above less f of that below)."""
     motion.set_given(t, above, v.given, v.pull)
@@ -207,9 +129,8 @@ def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # 
 
 
 @helper
-def _largest_error(scale, width, v):  # type: ignore[no-untyped-def]
+def _largest_error(scale, v):  # type: ignore[no-untyped-def]
     largest = 0.0
-    size_of_state = v.columns.shape[1]
     for c in range(len(v.columns)):
         before, after, error = 0.0, 0.0, 0.0
         last = v.stages[rodas.STAGES * c + rodas.STAGES - 1]
@@ -219,10 +140,6 @@ def _largest_error(scale, width, v):  # type: ignore[no-untyped-def]
             error = max(error, abs(last[k]) / scale[k])
         size = max(before, after)
         v.norms[1, c] = max(v.norms[0, c], size)
-        if c == size_of_state:
-            # That of the parameter begins at zero, where no error is small against it: it counts
-            # as if the parameter's own value moved the state by its scale.
-            v.norms[1, c] = max(v.norms[1, c], PARAMETER_MOVE / width)
         if error > 0.0:
             largest = max(largest, error / max(size, _FADED * v.norms[1, c]))
     return largest
@@ -254,15 +171,15 @@ def propagate(  # type: ignore[no-untyped-def]
     Y, right, X, forced, rate, other = (v.vectors[0], v.vectors[1], v.vectors[2], v.vectors[3],
                                         v.vectors[4], v.vectors[5])
     ahead, behind = v.ahead, v.behind
-    _set_sinking(t, state, s, shapes, v, v.sinking)
+    curvature.set_sinking(t, state, s, shapes, v, v.sinking)
     for i in range(rodas.STAGES):
         now = t if i == 0 else min(t + rodas.NODES[i] * h, latest)
         rodas.combined(rodas.A[i], 1.0, state, stages, Y)
         motion.set_given(now, s, v.given, v.pull)
         motion.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.inside, rate)
-        _learn(v.inside, v.usual)
+        curvature.learn(v.inside, v.usual)
         advance = rodas.TIME[i] * h
-        reach = _reach(stages[i], shapes, slip_scale, depth, memory_scale, w)
+        reach = curvature.reach(stages[i], shapes, slip_scale, depth, memory_scale, w)
         if width != 0.0:
             _rates_between(now, Y, above, below, shapes, v, 1.0 / width, rate, other, forced)
         for side in range(2):
@@ -280,7 +197,7 @@ def propagate(  # type: ignore[no-untyped-def]
                 motion.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, ahead, rate)
             else:
                 motion.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, behind, rate)
-        _differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
+        curvature.differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
                      signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1] * advance,
                      v.sinking, shapes, w)
         for c in range(count):
@@ -299,7 +216,7 @@ def propagate(  # type: ignore[no-untyped-def]
             if i == rodas.STAGES - 1:
                 for k in range(size):
                     v.after[c, k] = X[k] + own[i, k]
-    return _largest_error(scale, width, v)
+    return _largest_error(scale, v)
 
 
 @helper
@@ -313,6 +230,6 @@ def keep(v):  # type: ignore[no-untyped-def]
 def begin_anew(v):  # type: ignore[no-untyped-def]
     """Let the columns be the unit matrix again."""
     v.columns[:] = 0.0
-    v.norms[:] = 0.0
+    v.norms[0], v.norms[1] = v.least, v.least
     for k in range(v.columns.shape[1]):
         v.columns[k, k] = 1.0

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.periods import count_periods
 from fecontact.errors import FecontactError
-from fecontact.integrate.ensemble import ensemble, forcing_period
+from fecontact.forcing import forcing_period
+from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.initial import initial_state
 from fecontact.integrate.trajectory import Status
 from fecontact.study import Study

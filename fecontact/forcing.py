@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.errors import AnalysisError
+from fecontact.errors import AnalysisError, InputError
 from fecontact.laws.fourier_series import FourierSeries
 from fecontact.laws.profile_base import Profile
 from fecontact.laws.profiles import Sine
@@ -51,6 +51,22 @@ def common_period(system: ContactSystem) -> float | None:
         if shape is not None and not shape.flat and ground.speed != 0.0:
             periods.append(_repeat_length(name, shape) / abs(ground.speed))
     return _common(periods)
+
+
+def forcing_period(system: ContactSystem) -> float:
+    """Period of what excites a system, that of :func:`common_period` [s].
+
+    Raises
+    ------
+    InputError
+        If nothing depends on time.
+    AnalysisError
+        As :func:`common_period`.
+    """
+    period = common_period(system)
+    if period is None:
+        raise InputError("Nothing excites the system in time, so it has no period; give period.")
+    return period
 
 
 def _repeat_length(name: str, shape: Profile) -> float:
