@@ -43,13 +43,6 @@ def test_refused(make, names):
         make()
 
 
-@pytest.mark.parametrize(("first", "names"), [
-    (None, "first = None"),
-    ((Axis("B", "y"), []), "list of finite values"),
-    ((Axis("B", "y"), [np.nan, 0.0]), "list of finite values"),
-    ((Axis("B", "x"), [0.0, 1e-3]), "each by itself"),
-    ((Axis("B", "y", "velocity"), [0.0, 1e-3]), "each by itself"),
-])
 @pytest.mark.parametrize("bounds", [(1.0, 2.0, 3.0), "ab", 1.0, (2.0, 1.0)])
 def test_bounds_of_branches(bounds):
     with pytest.raises(InputError, match=r"bounds = .* must be two values"):
@@ -61,6 +54,13 @@ def test_no_branch_to_draw(tmp_path):
         plot_branches([], tmp_path / "none.png")
 
 
+@pytest.mark.parametrize(("first", "names"), [
+    (None, "first = None"),
+    ((Axis("B", "y"), []), "list of finite values"),
+    ((Axis("B", "y"), [np.nan, 0.0]), "list of finite values"),
+    ((Axis("B", "x"), [0.0, 1e-3]), "each by itself"),
+    ((Axis("B", "y", "velocity"), [0.0, 1e-3]), "each by itself"),
+])
 def test_planes_of_basins_that_no_start_lies_on(first, names):
     with pytest.raises(InputError, match=names):
         basins(impact_oscillator(modes=2), first, (Axis("B", "y", "velocity"), [0.0, 0.02]),
