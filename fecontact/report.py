@@ -47,10 +47,12 @@ def run_table(trajectory: "Trajectory") -> Any:
 
     size, place = largest_displacement(trajectory)
     time, statistics = trajectory.time, trajectory.statistics
+    seconds = statistics.get("seconds", 0.0)
     shares = contact_shares(trajectory)
     rows = [
         ("time", f"{quantity(float(time[0]), 's')} ... {quantity(float(time[-1]), 's')}"),
-        ("steps", f"{statistics.get('steps', 0)} in {statistics.get('seconds', 0.0):.1f} s"),
+        (("steps", f"{statistics['steps']} in {seconds:.1f} s") if "steps" in statistics else
+         ("computed", f"in {seconds:.1f} s")),
         ("energy imbalance", f"{trajectory.energies.imbalance:.1e}"),
         *(() if trajectory.events is None else (("events", _events(trajectory.events)),)),
         ("largest displacement", f"{quantity(size, 'm')} at {place}"),

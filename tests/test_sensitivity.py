@@ -117,6 +117,30 @@ def test_derivatives_to_parameters(name):
         1e-4 * np.abs(wanted / scale).max())
 
 
+@pytest.mark.parametrize(("name", "value"), [
+    ("drive.angular_frequency", 64.32), ("drive.amplitude_y", 0.47e-3), ("drive.damping_y", 0.0),
+])
+def test_derivatives_that_begin_slowly(name, value):
+    """The push of the parameter is zero at the start and grows with time."""
+    system = impact_oscillator(modes=2).with_(**{"drive.angular_frequency": 64.32, name: value})
+    start = np.array([-6.95891022e-06, 7.11400198e-07, -7.91871183e-03, 3.15884285e-03])
+    t_end = 2.0 * np.pi / 64.32
+    found = sensitivity(system, t_end, initial=start, parameter=name)
+    step = 1e-4 * (value or 0.02)
+    ends = [simulate(system.with_(**{name: value + move}), t_end, initial=start, outputs=2,
+                     rtol=1e-12).states[-1] for move in (0.0, step, 2.0 * step)]
+    wanted = (-1.5 * ends[0] + 2.0 * ends[1] - 0.5 * ends[2]) / step
+    scale = np.array([1e-6, 1e-6, 1e-3, 1e-3])
+    assert np.abs((found.parameter_derivative - wanted) / scale).max() < (
+        1e-3 * np.abs(wanted / scale).max())
+
+
+@pytest.mark.parametrize("parameter", [3, (0.5,), ("ground.speed", 0.5), (Drive, "a")])
+def test_a_parameter_that_is_none_is_named(parameter):
+    with pytest.raises(InputError, match=r"parameter = .* must be the dotted name"):
+        sensitivity(friction_oscillator(2, **SMOOTH), 0.1, parameter=parameter)
+
+
 def test_a_parameter_may_be_a_function():
     system = friction_oscillator(2, **SMOOTH)
 

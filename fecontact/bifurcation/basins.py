@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.errors import InputError
+from fecontact.errors import InputError, choices
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing
 from fecontact.system import ContactSystem
@@ -27,11 +27,22 @@ class Axis:
         Along the ground, away from it, counter-clockwise.
     of : 'displacement' or 'velocity'
         Which of them [m], [rad], [m/s], [rad/s].
+
+    Raises
+    ------
+    InputError
+        For other names.
     """
 
     point: str | int
     axis: Literal["x", "y", "phi"]
     of: Literal["displacement", "velocity"] = "displacement"
+
+    def __post_init__(self) -> None:
+        for name, names in (("axis", ("x", "y", "phi")), ("of", ("displacement", "velocity"))):
+            value = getattr(self, name)
+            if value not in names:
+                raise InputError(f"Axis: {name} = {value!r} must be one of {choices(names)}.")
 
     def row(self, system: ContactSystem) -> Array:
         """The quantity as a row (size,) that acts on states."""
@@ -118,18 +129,23 @@ def basins(
     Raises
     ------
     InputError
-        For values out of range, and as :func:`fecontact.ensemble`.
+        For values out of range, for two quantities that no state has independently, and as
+        :func:`fecontact.ensemble`.
     """
     if keep < 4:
         raise InputError(f"keep = {keep!r} must be at least 4.")
     if not 0.0 < tolerance < 1.0:
         raise InputError(f"tolerance = {tolerance!r} must be between 0 and 1.")
-    a, b = (np.atleast_1d(np.array(values, dtype=float)) for _, values in (first, second))
+    a, b = (_values(name, given) for name, given in (("first", first), ("second", second)))
     start = np.zeros(system.size) if base is None else np.array(base, dtype=float)
     if start.shape != (system.size,):
         raise InputError(f"base must have {system.size} values [q, q', z], not shape "
                          f"{start.shape}.")
     rows = np.array([axis.row(system) for axis, _ in (first, second)])
+    lengths = np.linalg.norm(rows, axis=1)
+    if not lengths.all() or np.linalg.matrix_rank(rows / lengths[:, None], tol=1e-9) < 2:
+        raise InputError(f"first = {first[0]} and second = {second[0]} cannot be chosen each by "
+                         f"itself with the modes of this body; take other points or axes.")
     wanted = np.stack(np.meshgrid(a, b, indexing="ij"), axis=-1).reshape(-1, 2)
     states = start + (wanted - rows @ start) @ np.linalg.pinv(rows).T
     settings: dict[str, Any] = {"initial": states, "rtol": rtol, "workers": workers,
@@ -151,6 +167,19 @@ def basins(
             sets.append(None if not fine else ends[-1:] if len(late) == 0 else late)
     labels, attractors = _told_apart(sets, still, _scale(system, states, sets), tolerance)
     return Basins(a, b, labels.reshape(len(a), len(b)), attractors)
+
+
+def _values(name: str, given: Any) -> Array:
+    try:
+        axis, values = given
+        found = np.atleast_1d(np.array(values, dtype=float))
+    except (TypeError, ValueError):
+        axis, found = None, np.empty(0)
+    if not (isinstance(axis, Axis) and found.ndim == 1 and len(found)
+            and np.isfinite(found).all()):
+        raise InputError(f"{name} = {given!r} must be an Axis and a list of finite values: "
+                         f"(Axis('B', 'y'), [0.0, 1e-4]).")
+    return found
 
 
 def _scale(system: ContactSystem, starts: Array, sets: list[Array | None]) -> Array:

@@ -103,7 +103,10 @@ def brute_force(
     InputError
         For values that do not ascend, or as :func:`fecontact.strobe`.
     """
-    points = np.array(values, dtype=float)
+    try:
+        points = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        points = np.empty(0)
     if points.ndim != 1 or not len(points) or not np.isfinite(points).all() or (
             (np.diff(points) <= 0.0).any()):
         raise InputError("values must be finite numbers in ascending order.")

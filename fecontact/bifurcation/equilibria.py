@@ -234,4 +234,5 @@ def require_autonomous(field: VectorField, values: Array) -> None:
     if period is not None:
         raise AnalysisError(f"The system is driven with the period {period:.6g} s and has no "
                             f"equilibrium; take the drive's amplitude and the ground's waviness "
-                            f"away, or look for periodic orbits.")
+                            f"away (drive.amplitude_x = 0, ground.amplitude = 0), or look for "
+                            f"periodic orbits.")

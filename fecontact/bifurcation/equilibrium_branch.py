@@ -1,5 +1,6 @@
 """Branches of equilibria over one parameter, their folds, Hopf and branch points."""
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -73,7 +74,7 @@ def equilibrium_branch(
     InputError
         If the parameter is unknown.
     AnalysisError
-        If no equilibrium is found at the start.
+        If no equilibrium is found at the start, or the rates depend on time there or at a bound.
     """
     index = field.index(parameter)
     begin = _start(field, start)
@@ -153,6 +154,13 @@ def _problem(
     chosen = settings or Settings()
     if bounds is not None:
         chosen = replace(chosen, bounds=bounds)
+    for bound in map(float, chosen.bounds):
+        # A parameter may be what drives the system, as an amplitude that begins at zero.
+        there = begin.values.copy()
+        there[index] = bound
+        with suppress(InputError):
+            if np.isfinite(bound):
+                require_autonomous(field, there)
     if width is None:
         span = chosen.bounds[1] - chosen.bounds[0]
         width = span if np.isfinite(span) else abs(float(begin.values[index])) or 1.0

@@ -130,7 +130,11 @@ class Settings:
         if not self.smallest_step <= self.step <= self.largest_step:
             raise InputError(f"Settings: step = {self.step:g} must lie between smallest_step = "
                              f"{self.smallest_step:g} and largest_step = {self.largest_step:g}.")
-        low, high = self.bounds
-        if not low < high:
+        try:
+            low, high = self.bounds
+            fine = low < high
+        except (TypeError, ValueError):
+            fine = False
+        if not fine:
             raise InputError(f"Settings: bounds = {self.bounds!r} must be two values of the "
                              f"parameter, the smaller one first.")

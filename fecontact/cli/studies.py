@@ -119,6 +119,6 @@ def run(
             say(f"note: {note}")
         say_written(*files)
     ended = trajectory.status.name
-    if ended not in ("FINISHED", "INTERRUPTED"):
+    if ended not in ("FINISHED", "EVENT", "INTERRUPTED"):
         return complain("the run did not reach its end; what was computed is written.", 1)
     return INTERRUPTED if ended == "INTERRUPTED" else 0

@@ -23,7 +23,14 @@ def event(function: Callable[..., Any]) -> CompiledLaw:
     """Compile ``g(t, y, p) -> value`` whose changes of sign are events.
 
     ``y`` = [q, q', z] is the state, ``p`` the parameters of the :class:`Event`.
+
+    Raises
+    ------
+    InputError
+        For what is no function; when it is used, for one of another form.
     """
+    if not callable(function):
+        raise InputError(f"event needs a function g(t, y, p), not {function!r}.")
     return compile_law(EVENT, "g(t, y, p) -> value", function)
 
 
@@ -49,6 +56,9 @@ class ContactEvents:
     stop: str | Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        if self.stop is None or isinstance(self.stop, bool | int | float):
+            raise InputError(f"ContactEvents: stop = {self.stop!r} must be one or several of "
+                             f"{choices(CONTACT_EVENTS)}, or () for none.")
         given = (self.stop,) if isinstance(self.stop, str) else tuple(self.stop)
         for name in given:
             if name not in CONTACT_EVENTS:
@@ -75,7 +85,8 @@ class Event:
     Raises
     ------
     InputError
-        For another direction.
+        For another direction, a function that is not compiled, and parameters that are no
+        finite numbers.
     """
 
     kernel: CompiledLaw
@@ -85,10 +96,20 @@ class Event:
 
     def __post_init__(self) -> None:
         _require_direction("Event", self.direction)
+        if not isinstance(self.kernel, CompiledLaw):
+            raise InputError(f"Event: kernel = {self.kernel!r} must be a compiled function; put "
+                             f"@fecontact.event before its definition.")
+        try:
+            usable = np.isfinite(np.atleast_1d(np.array(self.parameters, dtype=float))).all()
+        except (TypeError, ValueError):
+            usable = False
+        if not usable:
+            raise InputError(f"Event: parameters = {self.parameters!r} must be a list of finite "
+                             f"numbers.")
 
     def row(self, system: ContactSystem) -> Array:
         """Parameters of the function for a system."""
-        return np.array(self.parameters, dtype=float)
+        return np.atleast_1d(np.array(self.parameters, dtype=float))
 
 
 @event

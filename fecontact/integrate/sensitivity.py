@@ -18,6 +18,7 @@ from fecontact.system import ContactSystem
 Array = NDArray[np.float64]
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
+
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
     """A motion at K times, and how it changes with its start and a parameter.
@@ -131,6 +132,10 @@ def _moved(
         def system_at(at: float) -> ContactSystem:
             return system.with_(**{name: at})
     else:
+        if not (isinstance(parameter, tuple) and len(parameter) == 2 and callable(parameter[0])
+                and isinstance(parameter[1], Real)):
+            raise InputError(f"parameter = {parameter!r} must be the dotted name of a number, or a "
+                             f"function of a system and a value, and the value: (function, 0.5).")
         function, value = parameter
 
         def system_at(at: float) -> ContactSystem:

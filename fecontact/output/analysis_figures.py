@@ -14,6 +14,7 @@ from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.figures import COLOURS, new_figure
 from fecontact.output.units import suitable_unit
+from fecontact.report import count
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -127,7 +128,7 @@ def poincare_figure(
     plane.set_xlabel(f"displacement {axis} [{symbol}]")
     plane.set_ylabel(f"velocity {axis} [{rate_symbol}]")
     plane.legend(loc="best")
-    plane.set_title(f"{point_name(point)}, {len(found.time)} points")
+    plane.set_title(f"{point_name(point)}, {count(len(found.time), 'point')}")
     return figure
 
 

@@ -80,6 +80,8 @@ def plot_branches(
     from fecontact.bifurcation.branch import Branch
 
     several = [branches] if isinstance(branches, Branch) else list(branches)
+    if not several:
+        raise InputError("branches = [] holds nothing to draw; give at least one Branch.")
     return save_figure(path, lambda: branches_figure(several, y, x, x_label, y_label, names,
                                                      beneath, observe, insets))
 

@@ -10,7 +10,7 @@ import numpy as np
 from fecontact.analysis.quantities import Point, usual_axis
 from fecontact.analysis.receptance import Place, frequency_response
 from fecontact.analysis.window import window
-from fecontact.errors import AnalysisError, InputError, choices, nearest
+from fecontact.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output import analysis_plots, plots
 
@@ -34,6 +34,10 @@ class Choice:
     points: tuple[Point, ...] = ()
     axis: str | None = None
     highest_hz: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.highest_hz is not None:
+            require_positive("plot", highest=self.highest_hz)
 
     @property
     def point(self) -> Point:
@@ -132,7 +136,10 @@ def point_of(text: str) -> Point:
     if not comma:
         return text
     try:
-        return float(first), float(second)
+        place = float(first), float(second)
+        if np.isfinite(place).all():
+            return place
+        raise ValueError
     except ValueError:
         raise InputError(f"The point {text} must be a name, the number of a contact node, or a "
                          f"place x,y in m.") from None
