@@ -132,7 +132,7 @@ class Settings:
                              f"{self.smallest_step:g} and largest_step = {self.largest_step:g}.")
         try:
             low, high = self.bounds
-            fine = low < high
+            fine = float(low) < float(high)
         except (TypeError, ValueError):
             fine = False
         if not fine:
