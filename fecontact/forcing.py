@@ -65,8 +65,8 @@ def forcing_period(system: ContactSystem) -> float:
     """
     period = common_period(system)
     if period is None:
-        raise InputError("Nothing excites the system in time, so it has no period; give period, or a "
-                         "drive that repeats.")
+        raise InputError("Nothing excites the system in time, so it has no period; give period, or "
+                         "a drive that repeats.")
     return period
 
 
