@@ -110,8 +110,7 @@ def _go_on(progress, room):  # type: ignore[no-untyped-def]
         nogil=True)
 def advance(  # type: ignore[no-untyped-def]
     held_system, held_shapes, held_times, held_control, held_progress, held_room, most, held_out,
-    held_work, above, below, width, variation, transitions,
-    held_watch,
+    held_work, held_above, held_below, width, held_variation, held_transitions, held_watch,
 ):
     """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
 
@@ -126,6 +125,8 @@ def advance(  # type: ignore[no-untyped-def]
     s, shapes, times = borrowed(held_system), borrowed(held_shapes), borrowed(held_times)
     control, progress, room = borrowed(held_control), borrowed(held_progress), borrowed(held_room)
     out, work, watch = borrowed(held_out), borrowed(held_work), borrowed(held_watch)
+    above, below, variation = borrowed(held_above), borrowed(held_below), borrowed(held_variation)
+    transitions, columns = borrowed(held_transitions), variation.columns
     watched = watch.counts[NODES] != 0 or len(watch.own) > 0
     numbers, counts = progress.numbers, progress.counts
     size = len(progress.state)
@@ -217,7 +218,6 @@ def advance(  # type: ignore[no-untyped-def]
                 to_switch = True
                 continue
         to_switch = False
-        columns = variation.columns
         if error <= 1.0 and len(columns):
             set_scale(control, progress, room)
             error = max(error, propagate(
