@@ -49,6 +49,15 @@ def test_exponents_of_the_impact_oscillator(w, low, high):
     assert found.uncertainty[0] < 2.0
 
 
+def test_growth_is_that_of_the_derivative_of_the_motion():
+    """Over one interval: the length of the derivative times the first direction."""
+    system = impact_oscillator(2)
+    found = lyapunov_exponents(system, 0.05, interval=0.05, initial=np.zeros(4))
+    first = np.linalg.qr(np.random.default_rng(0).normal(size=(4, 1)))[0]
+    carried = sensitivity(system, 0.05, initial=np.zeros(4), rtol=1e-6).monodromy @ first
+    assert found.exponents[0] == pytest.approx(np.log(np.linalg.norm(carried)) / 0.05, rel=1e-9)
+
+
 @pytest.mark.parametrize(("w", "periods", "wanted"), [(64.32, 1, -6.254192), (30.84, 2, -3.573516)])
 def test_multipliers_at_loose_tolerance(w, periods, wanted):
     """At rtol = 1e-6 they are what they are at 1e-11, impacts and all."""
@@ -69,6 +78,11 @@ def test_brute_force_meets_single_runs():
     alone = strobe(system.with_(**{"drive.angular_frequency": 60.0}), transient=60, keep=4,
                    initial=np.zeros(4), rtol=1e-5)
     assert (found.up[0] == alone.states[0]).all()
+    # The way down begins at the last value.
+    last = strobe(system.with_(**{"drive.angular_frequency": 65.0}), transient=60, keep=4,
+                  initial=np.zeros(4), rtol=1e-5)
+    assert (found.down[-1] == last.states[0]).all()
+    assert (found.up[-1] != last.states[0]).any()
     y, _ = found.observed("B", "y")
     assert y[0] == pytest.approx(found.up[0, :, :2] @ system.basis.T[0, 1])
     # Period one at all of these values: up and down meet.
