@@ -22,9 +22,9 @@ FRICTION = "friction.friction_coefficient"
 def system(friction: float = 0.0, load: float = 14.0) -> fc.ContactSystem:
     """The beam, held by a spring at its left end."""
     body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)), thickness=0.01)
-    basis = body.modal_basis(12, contact_nodes=20, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
+    basis = body.modal_basis(20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
     return fc.ContactSystem(
-        basis, normal=fc.CosineSurface(stiffness=6e6, roughness_height=5.2e-6, damping=6.0),
+        basis, normal=fc.RoughSurface(stiffness=10e6, roughness_height=10e-6, damping=40.0),
         friction=fc.ConstantFriction(friction, smoothing_slope=1e6),
         ground=fc.Ground(speed=0.05), load=fc.Load(normal=load),
         drive=fc.Drive(stiffness_x=5610.0, damping_x=0.768))

@@ -85,7 +85,7 @@ def test_mode_coupling_flutter():
 
 
 def beam(mu=0.55):
-    """A free steel beam on a belt, on a contact so compliant that it is not pressed in fully."""
+    """A free steel beam on a belt, with the contact of section 4's friction oscillator."""
     x, y = np.meshgrid(np.linspace(0.0, 0.2, 40), np.linspace(0.0, 0.02, 5))
     number = np.arange(x.size).reshape(5, 40)
     cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
@@ -95,7 +95,7 @@ def beam(mu=0.55):
     body = ElasticBody(mesh, Material.named("steel"), 0.01)
     basis = body.modal_basis(20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
     return ContactSystem(
-        basis, normal=RoughSurface(6e6, 5.2e-6, 6.0), friction=ConstantFriction(mu, 1e6),
+        basis, normal=RoughSurface(10e6, 10e-6, 40.0), friction=ConstantFriction(mu, 1e6),
         ground=Ground(speed=0.01), load=Load(14.0),
         drive=Drive(stiffness_x=5610.0, damping_x=0.768, motion_x=Constant(-9.5 / 5610.0)))
 
@@ -108,7 +108,7 @@ def test_flutter_of_a_beam_on_a_belt():
     found = find_equilibrium(field)
     modes = found.modes
     k = int(np.argmin(modes.damping_ratios))
-    assert modes.growing() == pytest.approx([668.6], abs=0.1)
+    assert modes.growing() == pytest.approx([645.6], abs=0.1)
     growth = modes.eigenvalues[k]
     shape, m = modes.shapes[:, k], system.basis.modes
     size = 1e-9 / np.abs(system.basis.contact_T[:, 1] @ shape[:m]).max()

@@ -16,7 +16,8 @@ import fecontact as fc
 def test_border_of_flutter(tmp_path, capsys):
     branch, border = squeal.main(tmp_path)
     hopf, = branch.of_kind("Hopf")
-    assert 600.0 < hopf.details["frequency_hz"] < 750.0
+    assert hopf.parameter == pytest.approx(0.3108, abs=1e-4)
+    assert hopf.details["frequency_hz"] == pytest.approx(646.0, abs=0.1)
     for name in ("squeal_modes.png", "squeal_map.png"):
         assert (tmp_path / name).stat().st_size > 10_000
     assert "flutter from a friction coefficient of" in capsys.readouterr().out
@@ -29,5 +30,4 @@ def test_border_of_flutter(tmp_path, capsys):
         assert found.modes.frequencies_hz[worst] == pytest.approx(point.values["frequency_hz"],
                                                                   rel=1e-7)
     loads = border.column("load.normal")
-    assert loads.min() == pytest.approx(2.0, rel=1e-9)
-    assert border.column(squeal.FRICTION).max() == pytest.approx(0.6, rel=1e-9)
+    assert (loads.min(), loads.max()) == pytest.approx((2.0, 30.0), rel=1e-9)
