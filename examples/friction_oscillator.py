@@ -61,7 +61,7 @@ def prescribed(modes: int = 1) -> fc.ContactSystem:
     resting = oscillator(2)
     state = np.concatenate([fc.static_equilibrium(resting), np.zeros(2)])
     force = resting.contact_history(np.zeros(1), state[None])[0, 0, 0]
-    return oscillator(modes, normal=fc.PrescribedForce(float(force)))
+    return oscillator(modes, normal=fc.PrescribedForce(float(force)), load=fc.Load())
 
 
 def spectrum_of_waves(seed: int = 2) -> fc.Ground:

@@ -20,7 +20,7 @@ from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.soundness import require_sound
 from fecontact.parameters import parameters_of, with_parameters
-from fecontact.system_arrays import system_arrays
+from fecontact.system_arrays import require_motion, system_arrays
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,8 @@ class ContactSystem:
     ------
     InputError
         For a part of another kind, laws for groups that the basis lacks, parameters or gaps of
-        another number than there are contact nodes, and laws that :func:`require_sound` refuses.
+        another number than there are contact nodes, laws that :func:`require_sound` refuses, and
+        drives and loads at places that no mode moves in their direction.
     """
 
     basis: ModalBasis
@@ -88,6 +89,7 @@ class ContactSystem:
             for _, share, one in part:
                 one.table(share)
                 require_sound(one)
+        require_motion(self)
         _ = self.arrays
 
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fecontact.compiled import CompiledLaw
 from fecontact.contact_kernels import SystemArrays
+from fecontact.errors import InputError
 
 if TYPE_CHECKING:
     from fecontact.system import ContactSystem
@@ -64,6 +65,26 @@ def system_arrays(system: "ContactSystem") -> SystemArrays:
         friction_scale=0 if scale is None else scale.address,
         ground_motion=ground.motion_kernel.address,
     )
+
+
+def require_motion(system: "ContactSystem") -> None:
+    """InputError for a drive or load that could do no work, as no mode moves its point that way."""
+    basis, drive = system.basis, system.drive
+    acting: list[tuple[str, str | int, str]] = [
+        (f"Drive: {name} = {value!r}", "B", axis)
+        for axis, name, value in (("x", "stiffness_x", drive.stiffness_x),
+                                  ("x", "damping_x", drive.damping_x),
+                                  ("y", "stiffness_y", drive.stiffness_y),
+                                  ("y", "damping_y", drive.damping_y)) if value]
+    if system.load.normal:
+        acting.append((f"Load: normal = {system.load.normal!r}", "C", "y"))
+    acting += [(f"Load: a force at {force.point!r} in direction {force.direction!r}", force.point,
+                force.direction) for force in system.load.forces]
+    for what, point, direction in acting:
+        if not basis.T[basis.point_index(point), _DIRECTIONS.index(direction)].any():
+            turn = "turns" if direction == "moment" else f"moves along {direction}"
+            raise InputError(f"{what} has no effect, as {point!r} {turn} in no mode of the basis; "
+                             f"leave it out, or give the basis rows for that point.")
 
 
 def _law_table(

@@ -168,3 +168,17 @@ def test_events_survive_a_checkpoint(tmp_path):
     assert rest.events.kind == whole.events.kind
     assert (rest.events.states == whole.events.states).all()
     assert (rest.states == whole.states).all()
+
+
+def test_kinds_and_functions_that_are_no_events_are_named():
+    run = simulate(drop(), 1.0, initial=np.zeros(2), events=ContactEvents())
+    with pytest.raises(InputError, match=r"kind = 'touchdown' must be one of 'lift-off', "):
+        run.events.only("touchdown")
+    assert len(run.events.only("event 0")) == 0
+
+    @event
+    def root(t, y, p):
+        return np.sqrt(0.5 - t)
+
+    with pytest.raises(InputError, match=r"'event 0' is not a finite number before t = "):
+        simulate(drop(), 1.0, initial=np.zeros(2), events=Event(root))

@@ -20,7 +20,7 @@ from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.normal_forms import critical_pair, null_vectors
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
+from fecontact.bifurcation.vector_field import VectorField, require_field
 from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
@@ -110,6 +110,7 @@ def _beginning(
     values: ArrayLike | None,
 ) -> tuple[Equilibrium, tuple[int, int], Array, Array, list[float]]:
     """Start, indices of the parameters, sizes of the states, their limits, widths."""
+    require_field(field)
     active = (field.index(parameters[0]), field.index(parameters[1]))
     if active[0] == active[1]:
         raise InputError(f"A curve needs two different parameters, not {parameters[0]!r} twice.")

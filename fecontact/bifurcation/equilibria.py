@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.linear import solution
-from fecontact.bifurcation.vector_field import Array, VectorField
+from fecontact.bifurcation.vector_field import Array, VectorField, require_field
 from fecontact.errors import AnalysisError, InputError
 
 ComplexArray = NDArray[np.complex128]
@@ -154,6 +154,7 @@ def find_equilibrium(
     InputError
         If a parameter is unknown or out of range.
     """
+    require_field(field)
     values = field.values_with(**dict(parameters or {}))
     require_autonomous(field, values)
     if start is None:

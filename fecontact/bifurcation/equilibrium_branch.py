@@ -13,7 +13,7 @@ from fecontact.bifurcation.equilibria import Equilibrium, find_equilibrium, requ
 from fecontact.bifurcation.equilibrium_problem import EquilibriumProblem
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
+from fecontact.bifurcation.vector_field import VectorField, require_field
 from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
@@ -76,6 +76,7 @@ def equilibrium_branch(
     AnalysisError
         If no equilibrium is found at the start, or the rates depend on time there or at a bound.
     """
+    require_field(field)
     index = field.index(parameter)
     begin = _start(field, start)
     problem, chosen = _problem(field, begin, index, settings, bounds, scales, width)

@@ -15,7 +15,7 @@ from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.interpolation import equidistributed
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
-from fecontact.bifurcation.vector_field import VectorField
+from fecontact.bifurcation.vector_field import VectorField, require_field
 from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
@@ -119,6 +119,7 @@ def orbits_from_motion(
     AnalysisError
         If Newton's method finds no orbit near them.
     """
+    require_field(field)
     free = field.index(parameter)
     given = field.values if values is None else np.array(values, dtype=float)
     chosen = settings_of(settings, bounds)

@@ -13,7 +13,7 @@ from fecontact.bifurcation.equilibria import (
     newton,
     unstable_count,
 )
-from fecontact.bifurcation.vector_field import VectorField
+from fecontact.bifurcation.vector_field import VectorField, require_field
 from fecontact.console import progress_bar
 from fecontact.errors import AnalysisError, InputError
 
@@ -83,6 +83,7 @@ def stability_map(
     AnalysisError
         If there is no equilibrium at the first values.
     """
+    require_field(field)
     if len(grid) != 2:
         raise InputError(f"A stability map is over two parameters, not {len(grid)}; give the "
                          f"values of two by name.")

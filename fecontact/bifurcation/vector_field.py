@@ -126,3 +126,11 @@ class VectorField(ABC):
 
         return function_field(function, parameters, states, jacobian, differentiation, scales,
                               period)
+
+
+def require_field(given: object) -> None:
+    """InputError for what is no vector field, such as a contact system itself."""
+    if not isinstance(given, VectorField):
+        raise InputError(f"A vector field is needed, not a {type(given).__name__}; make one with "
+                         f"contact_field(system, names of parameters), or with "
+                         f"VectorField.from_function.")

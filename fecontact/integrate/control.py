@@ -111,6 +111,10 @@ class Run:
         if found:
             self.found.append((self.watch.found[:found].copy(), self.watch.states[:found].copy()))
             self.watch.counts[FOUND] = 0
+        if not np.isfinite(self.watch.own_values).all():
+            number = int(np.argmin(np.isfinite(self.watch.own_values)))
+            raise InputError(f"'event {number}' is not a finite number before t = {self.time:.6g} "
+                             f"s; its function g(t, y, p) must be finite for every state.")
         return int(status)
 
 

@@ -215,7 +215,11 @@ class Events:
         return len(self.time)
 
     def only(self, kind: str | None = None, node: int | None = None) -> "Events":
-        """Those of one kind, of one node, or both."""
+        """Those of one kind, of one node, or both; InputError for what is no kind of event."""
+        own = isinstance(kind, str) and kind.startswith("event ") and kind[6:].isdigit()
+        if kind is not None and kind not in CONTACT_EVENTS and not own:
+            raise InputError(f"kind = {kind!r} must be one of {choices(CONTACT_EVENTS)}, or "
+                             f"'event k' for the k-th of one's own.")
         keep = np.ones(len(self), dtype=bool)
         if kind is not None:
             keep &= np.array([one == kind for one in self.kind], dtype=bool)

@@ -29,6 +29,9 @@ from fecontact import (
     RoughSurface,
     Sine,
     Trace,
+    equilibrium_branch,
+    find_equilibrium,
+    stability_map,
 )
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.vector_field import VectorField
@@ -243,7 +246,7 @@ def test_forcing_periods():
     assert contact_field(belt(), ["ground.speed"]).forcing_period(np.ones(1)) is None
     field = contact_field(system, ["drive.angular_frequency"])
     assert field.forcing_period(np.array([5.0])) == pytest.approx(2.0 * np.pi / 5.0)
-    both = system.with_(load=Load(forces=(PointLoad(signal=Harmonic(1.0, 6.0)),)))
+    both = system.with_(load=Load(forces=(PointLoad("B", "x", signal=Harmonic(1.0, 6.0)),)))
     assert contact_field(both, []).forcing_period(np.empty(0)) == pytest.approx(np.pi)
     wavy = belt().with_(**{"ground.profile": Sine(1e-6, 6e-3)})
     assert contact_field(wavy, ["ground.speed"]).forcing_period(np.array([3e-3])) == 2.0
@@ -256,3 +259,12 @@ def test_forcing_periods():
     rough = trace.with_(ground=replace(trace.ground, friction_variation=Sine(0.1, 2.0),
                                        profile=replace(trace.ground.profile, periodic=True)))
     assert contact_field(rough, []).forcing_period(np.empty(0)) == pytest.approx(6.0 / 12e-3)
+
+
+def test_a_contact_system_is_no_field_yet():
+    system = two_mass_system()
+    for task in (lambda: find_equilibrium(system),
+                 lambda: equilibrium_branch(system, "ground.speed"),
+                 lambda: stability_map(system, {"ground.speed": [1.0], "normal.force": [1.0]})):
+        with pytest.raises(InputError, match="needed, not a ContactSystem; make one"):
+            task()
