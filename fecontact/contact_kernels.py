@@ -161,12 +161,10 @@ def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
             j, x, height, x_rate, height_rate, memory_of(j, y, s), travel, speed, s, force, rates)
 
 
-@kernel(types.void(f8, vector, SYSTEM, vector))
-def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
-    """Fill out (2 m + n s,) with y'."""
-    y, s = borrowed(y), borrowed(s)
-    n, m = s.Tx.shape
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+@helper
+def body_rates(t, y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out (2 m + n s,) with y' as it is without contact."""
+    m = s.Tx.shape[1]
     drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
     drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]
     for i in range(m):
@@ -180,9 +178,16 @@ def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         for i in range(m):
             out[m + i] += value * s.load_shapes[k, i]
-    states = s.memory.max()
-    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
     out[2 * m :] = 0.0
+
+
+@helper
+def rates_at(t, y, s, force, rates, out):  # type: ignore[no-untyped-def]
+    """Fill out (2 m + n s,) with y'; ``force`` (3 + s,) and ``rates`` (s, 3 + s) are room."""
+    n, m = s.Tx.shape
+    states = len(rates)
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    body_rates(t, y, s, out)
     for j in range(n):
         x, height, x_rate, height_rate = node_motion(j, y, s)
         F, R, _, _, _, _ = node_forces(j, x, height, x_rate, height_rate, memory_of(j, y, s),
@@ -192,6 +197,14 @@ def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
                 out[m + i] += s.Ty[j, i] * F - s.Tx[j, i] * R
         for k in range(s.memory[j]):
             out[2 * m + j * states + k] = rates[k, 0]
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector))
+def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out (2 m + n s,) with y'."""
+    y, s = borrowed(y), borrowed(s)
+    states = s.memory.max()
+    rates_at(t, y, s, np.empty(3 + states), np.empty((states, 3 + states)), out)
 
 
 @kernel(types.void(vector, matrix, SYSTEM, block))

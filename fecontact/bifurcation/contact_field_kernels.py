@@ -7,51 +7,26 @@ is allocated per state.
 import numpy as np
 from numba import types
 
-from fecontact.compiled import block, borrowed, helper, kernel, matrix, vector
-from fecontact.contact_kernels import SYSTEM, memory_of, node_forces, node_gradients, node_motion
+from fecontact.compiled import block, borrowed, kernel, matrix, vector
+from fecontact.contact_kernels import (
+    SYSTEM,
+    body_rates,
+    memory_of,
+    node_gradients,
+    node_motion,
+    rates_at,
+)
 from fecontact.laws.contract import signal_at
-
-
-@helper
-def _body_rates(time, y, s, out):  # type: ignore[no-untyped-def]
-    """Fill out with y' as it is without contact."""
-    m = s.Tx.shape[1]
-    drive_x = signal_at(s.drive[0])(time, s.drive_parameters[0])[0]
-    drive_y = signal_at(s.drive[1])(time, s.drive_parameters[1])[0]
-    for i in range(m):
-        out[i] = y[m + i]
-        total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
-                 + drive_y * s.drive_shapes[1, i])
-        for k in range(m):
-            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
-        out[m + i] = total
-    for k in range(len(s.load)):
-        value = signal_at(s.load[k])(time, s.load_parameters[k])[0]
-        for i in range(m):
-            out[m + i] += value * s.load_shapes[k, i]
-    out[2 * m :] = 0.0
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix))
 def batch_rates(t, x, s, f):  # type: ignore[no-untyped-def]
     """Fill f (N, 2 m + n s) with y' at times t (N,) and states x (N, 2 m + n s)."""
     t, x, s, f = borrowed(t), borrowed(x), borrowed(s), borrowed(f)
-    n, m = s.Tx.shape
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
     for c in range(len(t)):
-        y, out = x[c], f[c]
-        travel, speed = signal_at(s.ground_motion)(t[c], s.ground_motion_parameters)
-        _body_rates(t[c], y, s, out)
-        for j in range(n):
-            along, height, along_rate, height_rate = node_motion(j, y, s)
-            F, R, _, _, _, _ = node_forces(j, along, height, along_rate, height_rate,
-                                           memory_of(j, y, s), travel, speed, s, force, rates)
-            if F != 0.0:
-                for i in range(m):
-                    out[m + i] += s.Ty[j, i] * F - s.Tx[j, i] * R
-            for k in range(s.memory[j]):
-                out[2 * m + j * states + k] = rates[k, 0]
+        rates_at(t[c], x[c], s, force, rates, f[c])
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix, block))
@@ -66,7 +41,7 @@ def batch_derivatives(t, x, s, f, J):  # type: ignore[no-untyped-def]
         y, out, A = x[c], f[c], J[c]
         travel, speed = signal_at(s.ground_motion)(t[c], s.ground_motion_parameters)
         A[:, :] = 0.0
-        _body_rates(t[c], y, s, out)
+        body_rates(t[c], y, s, out)
         for i in range(m):
             A[i, m + i] = 1.0
             for k in range(m):

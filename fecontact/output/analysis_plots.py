@@ -35,11 +35,6 @@ def plot_spectrum(
     highest_hz : float, optional
         End of the axis [Hz].
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -68,11 +63,6 @@ def plot_spectrogram(
         As for :func:`plot_spectrum`.
     piece : float, optional
         Length of the pieces that are transformed [s]; a thirty-second of the run by default.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
@@ -103,12 +93,7 @@ def plot_poincare(
     axis : "x" or "y"
         Direction of the motion.
     period, phase
-        As for :func:`fecontact.analysis.periods.strobed_statesd_states`.
-
-    Returns
-    -------
-    Path
-        The file.
+        As for :func:`fecontact.analysis.periods.strobed_states`.
 
     Raises
     ------
@@ -127,11 +112,6 @@ def plot_friction_work(trajectory: Trajectory, path: str | Path) -> Path:
     ----------
     trajectory, path
         As for :func:`plot_spectrum`.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
@@ -156,11 +136,6 @@ def plot_response(
         A .png, .pdf or .svg file; it is replaced if it exists.
     labels : sequence of str
         A name for each.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

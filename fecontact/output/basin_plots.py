@@ -36,11 +36,6 @@ def plot_basins(
         (:meth:`fecontact.bifurcation.basins.Axis.row`); with them the sections of the motions are
         marked.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError

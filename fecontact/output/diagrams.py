@@ -67,11 +67,6 @@ def plot_branches(
         Phase planes of chosen points, drawn above the diagram; see
         :func:`fecontact.output.diagram_extras.phase_inset`.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError

@@ -24,11 +24,6 @@ def plot_history(trajectory: Trajectory, path: str | Path, points: Sequence[Poin
     points : sequence of str, int or (x, y)
         As for :meth:`Trajectory.displacement`; B and the contact node in the middle by default.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -52,11 +47,6 @@ def plot_phase(
         As for :meth:`Trajectory.displacement`.
     axis : "x" or "y"
         Direction of the motion.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
@@ -82,11 +72,6 @@ def plot_contact_map(trajectory: Trajectory, path: str | Path) -> Path:
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -104,11 +89,6 @@ def plot_energies(trajectory: Trajectory, path: str | Path) -> Path:
         The run.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
@@ -130,11 +110,6 @@ def plot_modes(basis: ModalBasis, path: str | Path, *, count: int = 12) -> Path:
     count : int
         Largest number of modes.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -153,11 +128,6 @@ def plot_convergence(result: ModeConvergence, path: str | Path) -> Path:
         What :func:`fecontact.mode_convergence.mode_convergence` found.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

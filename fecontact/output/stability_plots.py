@@ -37,11 +37,6 @@ def plot_eigenvalues(branch: "Branch", path: str | Path, *, x_label: str | None 
     range_hz : (float, float)
         Modes that are never in this range are left out.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -67,11 +62,6 @@ def plot_stability_map(
         interpolated from the map.
     x_label, y_label : str, optional
         Labels of the parameters, with their units.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

@@ -73,11 +73,6 @@ def write_case(
         that the folder can be moved as a whole; by default that of the case. Laws elsewhere are
         named by their absolute paths.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError

@@ -30,11 +30,6 @@ def plot_sweep(
     over : one or two parameters, optional
         One for curves, two for a map in which the others have their first value.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -65,11 +60,6 @@ def plot_strobed(table: SweepTable, parameter: str, path: str | Path) -> Path:
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -91,11 +81,6 @@ def plot_sobol(found: Mapping[str, SobolIndices], path: str | Path) -> Path:
         What :func:`fecontact.sobol_indices` found.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
