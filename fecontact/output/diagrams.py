@@ -12,6 +12,7 @@ from fecontact.errors import InputError, choices
 from fecontact.output.diagram_extras import draw_beneath, draw_insets, main_axis
 from fecontact.output.figures import COLOURS, new_figure
 from fecontact.output.saving import save_figure
+from fecontact.parameter_units import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -206,7 +207,9 @@ def _legend(
 
 def _label(quantity: Quantity, parameter: str) -> str:
     if quantity == "parameter":
-        return parameter
+        return parameter_label(parameter)
+    if quantity == "period":
+        return "period [s]"
     if isinstance(quantity, int):
         return f"state {quantity}"
     return quantity if isinstance(quantity, str) else ""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.output.figures import COLOURS, new_figure
 from fecontact.output.saving import save_figure
+from fecontact.parameter_units import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,7 +98,7 @@ def eigenvalues_figure(
                        textcoords="offset points", fontsize=9.0)
     upper.set_ylabel("frequency [Hz]")
     lower.set_ylabel("growth rate [1/s]")
-    lower.set_xlabel(x_label or branch.name)
+    lower.set_xlabel(x_label or parameter_label(branch.name))
     lower.set_xlim(values.min(), values.max())
     figure.align_ylabels([upper, lower])
     return figure
@@ -132,8 +133,8 @@ def stability_map_figure(
         centre = inside[np.argmin(((inside - inside.mean(axis=0)) ** 2).sum(axis=1))]
         axis.text(found.first[centre[1]], found.second[centre[0]], "stable", ha="center",
                   va="center")
-    axis.set_xlabel(x_label or found.names[0])
-    axis.set_ylabel(y_label or found.names[1])
+    axis.set_xlabel(x_label or parameter_label(found.names[0]))
+    axis.set_ylabel(y_label or parameter_label(found.names[1]))
     axis.grid(False)
     return figure
 

@@ -84,7 +84,7 @@ def test_map_and_files(tmp_path):
     shown = np.ma.asarray(axis.collections[0].get_array()).reshape(10, 12)
     assert (shown.mask == (found.unstable == 0).T).all()
     assert shown.compressed() == pytest.approx(found.frequency_hz.T[~shown.mask])
-    assert (axis.get_xlabel(), axis.get_ylabel()) == ("B", "ground.speed")
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("B", "ground speed [m/s]")
     assert plot_stability_map(found, tmp_path / "map.pdf").exists()
     assert plot_branches(BRANCH, tmp_path / "branch.svg", "size").exists()
     with pytest.raises(InputError, match="must end in"):
