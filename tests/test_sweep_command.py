@@ -153,7 +153,8 @@ def grid_table():
 def test_a_map_shows_each_case_in_its_place():
     figure = sweep_figures.sweep_figure(grid_table(), "friction_power")
     axes = figure.axes[0]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("ground.speed", "load.normal")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (
+        "ground speed [m/s]", "load normal [N]")
     assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "log")
     drawn = axes.collections[0].get_array()
     x, y = np.linspace(1.0, 4.0, 10), np.geomspace(1.0, 100.0, 9)
@@ -177,7 +178,8 @@ def test_curves_scatter_and_names_on_axes():
     assert curves[1].get_ydata().tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
     loose = SweepTable(grid.parameters, grid.values, grid.keys, grid.reasons)
     figure = sweep_figures.sweep_figure(loose, "friction_power")
-    assert [axes.get_xlabel() for axes in figure.axes] == ["ground.speed", "load.normal", "cases"]
+    assert [axes.get_xlabel() for axes in figure.axes] == [
+        "ground speed [m/s]", "load normal [N]", "cases"]
     assert figure.axes[2].patches
 
 
