@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -13,6 +13,7 @@ from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.contact_field import ContactField, contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from fecontact.bifurcation.observation import observe, shot
+from fecontact.bifurcation.problem import Settings
 from fecontact.console import waiting
 from fecontact.errors import FecontactError
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _EQUILIBRIA = "steady sliding"
+# Longest step along equilibria, in parts of the diagram.
+_FINE = 0.02
 # Amplitudes of the first orbit that count as one in the length of a step.
 _SIZE = 10.0
 
@@ -114,10 +117,16 @@ def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) ->
     low, high = wanted.bounds
     if wanted.kind != "orbits":
         yield _Task(_EQUILIBRIA, 0, lambda: equilibrium_branch(
-            field, wanted.name, settings=wanted.settings(),
+            field, wanted.name, settings=_fine(wanted.settings()),
             direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
     if wanted.kind != "equilibria":
         yield _Task("orbits of the run", 0, lambda: _orbits(field, wanted, initial))
+
+
+def _fine(settings: Settings) -> Settings:
+    """Shorter steps: equilibria cost little, and curves are drawn through them."""
+    return replace(settings, step=min(settings.step, _FINE),
+                   largest_step=min(settings.largest_step, _FINE))
 
 
 def _tasks_beyond(
