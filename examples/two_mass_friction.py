@@ -5,7 +5,7 @@ sliding loses its stability at Hopf points, the vibrations that begin there turn
 double their period again and again. Unstable orbits are part of the picture: the one between the
 fold T1 and the Hopf point H1 parts the starts that come to rest from those that go on vibrating.
 
-Usage: python examples/two_mass_friction.py [FOLDER]      (pictures and the table; a minute)
+Usage: python examples/two_mass_friction.py [FOLDER]      (pictures and the table; two minutes)
 
 Time is scaled by sqrt(m2 / c2), B = F_N / c2 and D = d2 / (2 sqrt(c2 m2)). The equations are those
 of the book with the constants that reproduce its figures: masses 2.5 and 1, stiffnesses 2 and 1,
@@ -20,20 +20,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecontact import (
+    Axis,
+    Basins,
     Branch,
     ContactSystem,
+    Crossing,
     Ground,
     ModalBasis,
     PrescribedForce,
     ProductFriction,
+    basins,
     contact_field,
     equilibrium_branch,
+    find_equilibrium,
     simulate,
 )
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.orbit_output import amplitude, orbit_history
 from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
 from fecontact.bifurcation.problem import Settings
+from fecontact.output.basin_plots import plot_basins
 from fecontact.output.diagrams import plot_branches
 from fecontact.output.figures import COLOURS, new_figure
 from fecontact.output.saving import save_figure
@@ -132,8 +138,7 @@ def attractors(v0: float, diagram: dict[str, Branch]) -> list[tuple[str, np.ndar
                 if low < amplitude(row)(point) < high and point.parameter < 4.2]
         nearest = min(fits, key=lambda point: abs(point.parameter - v0))
         starts.append(orbit_history(nearest, field.dimension)[1][0])
-    starts.append(equilibrium_branch(field, "ground.speed", bounds=(v0 - 1.0, v0 + 1.0),
-                                     settings=Settings(points=1)).points[0].values["state"])
+    starts.append(find_equilibrium(field).state)
     found = []
     for start in starts:
         period = 9.7
@@ -144,6 +149,21 @@ def attractors(v0: float, diagram: dict[str, Branch]) -> list[tuple[str, np.ndar
         name = f"orbit, amplitude {size:.2f}" if size > 0.01 else "steady sliding"
         found.append((name, motion - [float(row @ starts[-1]), 0.0]))
     return found
+
+
+def basins_of_attraction(v0: float, count: int = 60) -> tuple[Basins, list[np.ndarray]]:
+    """Where starts of the second mass lead at v_0, B = 20; and the rows that give x_3 and x_3'.
+
+    The first mass begins at its place in steady sliding, and at rest.
+    """
+    field = oscillator(B=20.0, v0=v0)
+    system, sliding = field.system(), find_equilibrium(field).state
+    place, speed = Axis(1, "x"), Axis(1, "x", "velocity")
+    around = float(place.row(system) @ sliding) + np.linspace(-18.0, 18.0, count)
+    found = basins(system, (place, around), (speed, np.linspace(-12.0, 8.0, count)), base=sliding,
+                   transient=300.0, keep=16,
+                   section=Crossing(1, "x", value=0.05, of="velocity", direction="falling"))
+    return found, [axis.row(system) for axis in (place, speed)]
 
 
 def phase_figure(motions: Sequence[tuple[str, np.ndarray]], v0: float) -> "Figure":
@@ -185,6 +205,12 @@ def table(over_B: dict[str, Branch], over_speed: dict[str, Branch]) -> list[tupl
     return rows
 
 
+def shares(found: Basins) -> str:
+    """Part of the starts that lead to each attractor."""
+    return ", ".join(f"{'steady sliding' if one.kind == 'equilibrium' else 'orbit'} {one.share:.1%}"
+                     for one in found.attractors)
+
+
 def main(folder: Path) -> None:
     """Compute, draw and print everything."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -198,10 +224,14 @@ def main(folder: Path) -> None:
                       x_label=label, y_label="amplitude of x3 [m]", names=list(branches))
     motions = attractors(3.8, over_speed)
     save_figure(folder / "two_masses_attractors.png", lambda: phase_figure(motions, 3.8))
+    found, rows = basins_of_attraction(3.8)
+    plot_basins(found, folder / "two_masses_basins.png", x_label="x3 at the start [m]",
+                y_label="x3' at the start [m/s]", rows=rows)
     print(f"{'':48} printed  computed")
     for what, printed, value in table(over_B, over_speed):
         print(f"{what:48} {printed:>7}  {value:.4f}")
-    print(f"attractors at v_0 = 3.8: {', '.join(name for name, _ in motions)}")
+    print(f"attractors at v_0 = 3.8: {', '.join(name for name, _ in motions)}; share of the starts "
+          f"that lead to each: {shares(found)}")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from pictures import save
 from scipy.optimize import brentq
 
 from fecontact import Branch, amplitude
+from fecontact.output.basin_plots import basins_figure
 from fecontact.output.diagrams import branches_figure
 from fecontact.output.figures import STYLE
 
@@ -30,12 +31,15 @@ def section(images: Path) -> str:
                                      y_label="amplitude of x3 [m]", names=list(branches))
             save(figure, images / f"two-masses-{name}.png")
         save(example.phase_figure(motions, SPEED), images / "two-masses-attractors.png")
+        found, axes = example.basins_of_attraction(SPEED)
+        save(basins_figure(found, "x3 at the start [m]", "x3' at the start [m/s]", axes),
+             images / "two-masses-basins.png")
     rows = [(what, printed, f"{value:.4f}", deviation(printed, value))
             for what, printed, value in example.table(over_B, over_speed)]
     rows.append((f"stable motions at v_0 = {SPEED:g} m/s", 3, len(motions), ""))
     return TEXT.format(
         printed=table(("", "printed", "computed", "deviation from the print"), rows),
-        attractors=", ".join(name for name, _ in motions),
+        attractors=", ".join(name for name, _ in motions), shares=example.shares(found),
         exact=comparisons(hopf_points(over_B["steady sliding"])),
         damping=table(("", "B = 10 m", "B = 20 m"),
                       list(zip(*map(over_damping, (None, 10.0, 20.0)), strict=True))))
@@ -98,7 +102,9 @@ The first Hopf point and the fold of the orbits born there lie 5.7 % and 1.2 % a
 which seems wrong in these two places: with the same constants all the rest agrees to the last digit
 printed, but for the third doubling, which rounds to 9.37. Between T1 and H1 steady sliding and a
 stable orbit exist side by side, as the source says; the unstable orbit between them parts the
-starts. The three stable motions at 3.8 m/s, found by runs of 400 s: {attractors}.
+starts. The three stable motions at 3.8 m/s, found by runs of 400 s: {attractors}. Of the starts of
+the second mass in the last picture, the first one resting at its place in steady sliding, lead to
+them: {shares}.
 
 {exact}
 
@@ -110,6 +116,8 @@ ends of the range with three attractors.
 ![Amplitude over v_0](images/validation/two-masses-v0.png)
 
 ![The three stable motions at v_0 = 3.8 m/s](images/validation/two-masses-attractors.png)
+
+![Basins of attraction at v_0 = 3.8 m/s](images/validation/two-masses-basins.png)
 
 Over D the source shows turning points, Hopf points and period doublings, but the values of B and
 v_0 of this diagram cannot be recovered. Computed instead at v_0 = 1 m/s, values of D, on the

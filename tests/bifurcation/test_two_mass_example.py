@@ -10,6 +10,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 
 import two_mass_friction as example
 
+from fecontact import simulate
+
 
 def test_table_and_attractors():
     over_B, over_speed = example.diagram_over_B(), example.diagram_over_speed()
@@ -33,3 +35,26 @@ def test_table_and_attractors():
     for motion in motions.values():
         if np.ptp(motion[:, 0]) > 1.0:
             assert (np.abs(motion[:, 1] - 3.8) < 0.05).mean() > 0.2
+
+
+def test_basins_where_three_motions_coexist():
+    """Each start ends where a run of its own does: at rest, or with the orbit's amplitude."""
+    found, (row, rate) = example.basins_of_attraction(3.8, count=7)
+    assert sorted(one.kind for one in found.attractors) == ["equilibrium", "periodic", "periodic"]
+    assert sum(one.share for one in found.attractors) == pytest.approx(1.0)
+    system = example.oscillator(B=20.0, v0=3.8).system()
+    first = example.oscillator().displacement_row(0)
+    sliding, = (one.points[0] for one in found.attractors if one.kind == "equilibrium")
+    amplitudes = []
+    for number, one in enumerate(found.attractors):
+        i, k = np.argwhere(found.label == number)[-1]
+        # The smallest change of modal coordinates moves one mass alone, as the mass matrix is
+        # diagonal.
+        change = np.linalg.lstsq(np.array([row, rate]), np.array(
+            [found.first[i] - row @ sliding, found.second[k]]), rcond=None)[0]
+        assert first @ change == pytest.approx(0.0, abs=1e-12)
+        run = simulate(system, 400.0, initial=sliding + change, rtol=1e-8,
+                       outputs=np.append(0.0, np.linspace(380.0, 400.0, 2000)))
+        amplitudes.append(np.ptp(run.states[1:] @ row) / 2.0)
+        assert (one.kind == "equilibrium") == (amplitudes[-1] < 1e-3)
+    assert sorted(amplitudes)[1:] == pytest.approx([7.24, 8.53], abs=0.02)
