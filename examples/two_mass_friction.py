@@ -92,21 +92,32 @@ def diagram_over_B() -> dict[str, Branch]:
     branches["second branch"] = orbits_from_hopf(
         field, sliding, second_hopf, settings=settings, bounds=bounds, intervals=100,
         scales=SMALL)
-    return branches
+    return branches | doubled(field, branches["second branch"], bounds, "second branch, period 2")
+
+
+def doubled(
+    field: ContactField, orbits: Branch, bounds: tuple[float, float], name: str,
+) -> dict[str, Branch]:
+    """Orbits of twice the period from each doubling of a branch, those once that lie on several."""
+    settings, found = Settings(step=0.005, largest_step=0.04, points=300), dict[str, Branch]()
+    for point in orbits.of_kind("period doubling"):
+        if not any(abs(place.parameter - point.parameter) < 1e-5
+                   for other in found.values() for place in other.special):
+            label = name + "'" * len(found)
+            found[label] = orbits_beyond(field, orbits, point, settings=settings, bounds=bounds)
+    return found
 
 
 def diagram_over_speed() -> dict[str, Branch]:
     """Orbits over v_0 from both Hopf points, B = 20, D = 0.1."""
     field, bounds = oscillator(B=20.0, v0=8.0), (1.2, 8.0)
     sliding = equilibrium_branch(field, "ground.speed", bounds=bounds, direction=-1.0)
-    first, second = sliding.of_kind("Hopf")
-    settings = Settings(step=0.005, largest_step=0.04, points=350)
-    return {"steady sliding": sliding,
-            "orbits": orbits_from_hopf(field, sliding, first, settings=settings, bounds=bounds,
-                                       intervals=100, scales=LARGE),
-            "second branch": orbits_from_hopf(field, sliding, second, bounds=bounds, intervals=100,
-                                              settings=Settings(step=0.005, points=60),
-                                              scales=LARGE)}
+    settings = Settings(step=0.005, largest_step=0.04, points=600)
+    branches = {"steady sliding": sliding}
+    for name, point in zip(("orbits", "second branch"), sliding.of_kind("Hopf"), strict=True):
+        branches[name] = orbits_from_hopf(field, sliding, point, settings=settings, bounds=bounds,
+                                          intervals=100, scales=LARGE)
+    return branches | doubled(field, branches["orbits"], bounds, "period 2")
 
 
 def diagram_over_damping(B: float) -> dict[str, Branch]:
@@ -117,7 +128,7 @@ def diagram_over_damping(B: float) -> dict[str, Branch]:
     found = {"steady sliding": sliding}
     for name, point in zip(names, sliding.of_kind("Hopf"), strict=True):
         found[name] = orbits_from_hopf(field, sliding, point, bounds=bounds, intervals=100,
-                                       settings=Settings(step=0.005, points=250), scales=LARGE)
+                                       settings=Settings(step=0.005, points=600), scales=LARGE)
     return found
 
 

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 # Special points of a branch, and the distance to both sides over which they are located again.
 _KINDS = ("fold", "period doubling", "Neimark-Sacker", "branch point")
+# Parts of the first step that are tried one after the other to leave a special point.
+_FIRST = (1.0, 0.2, 0.04)
 _NEAR = (1e-3, 1e-2)
 
 
@@ -158,8 +160,16 @@ def orbits_beyond(
                          f"{point.kind or 'a regular point'!r}, no other orbits begin; choose one "
                          f"of the kind 'period doubling' or 'branch point'.")
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
-    # The first step leaves the point, where the branches cannot be told apart.
-    return _followed((problem, u + chosen.step * tangent, tangent), chosen, None)
+    # The first step leaves the point, where the branches cannot be told apart; the new one may be
+    # strongly bent there.
+    for part in _FIRST:
+        step = max(part * chosen.step, chosen.smallest_step)
+        try:
+            return _followed((problem, u + step * tangent, tangent), replace(chosen, step=step),
+                             None)
+        except InputError as error:
+            failed = error
+    raise failed
 
 
 def restored(

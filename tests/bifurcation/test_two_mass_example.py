@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 import two_mass_friction as example
 
 from fecontact import simulate
+from fecontact.bifurcation.branch import Status
 
 
 def test_table_and_attractors():
@@ -58,3 +59,21 @@ def test_basins_where_three_motions_coexist():
         amplitudes.append(np.ptp(run.states[1:] @ row) / 2.0)
         assert (one.kind == "equilibrium") == (amplitudes[-1] < 1e-3)
     assert sorted(amplitudes)[1:] == pytest.approx([7.24, 8.53], abs=0.02)
+
+
+def test_doublings_at_which_the_new_branch_is_strongly_bent():
+    """The second branch over v_0 doubles close to its fold; it is left with a shorter step."""
+    over_speed = example.diagram_over_speed()
+    second = over_speed["second branch"]
+    close = second.of_kind("period doubling")[0]
+    assert second.of_kind("fold")[0].parameter - close.parameter < 1e-3
+    settings = example.Settings(step=0.005, largest_step=0.04, points=3)
+    doubled = example.orbits_beyond(example.oscillator(B=20.0, v0=8.0), second, close,
+                                    settings=settings, bounds=(1.2, 8.0))
+    assert len(doubled) == 3
+    assert doubled.points[0].values["period"] == pytest.approx(2.0 * close.values["period"],
+                                                               rel=1e-2)
+    # Subcritical: on the side on which the single orbit is the more stable one.
+    assert doubled.parameter.max() < close.parameter
+    # Both branches of the diagram end at its bounds.
+    assert {branch.status for branch in over_speed.values()} == {Status.BOUND}
