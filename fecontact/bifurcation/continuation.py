@@ -125,7 +125,7 @@ def start_of(
 def _step(problem: Problem, here: Solution, step: float, settings: Settings) -> Solution | None:
     row = problem.weights() * here.tangent
     found = corrected(problem, here.u + step * here.tangent, row, settings.tolerance,
-                       settings.iterations)
+                      settings.iterations, known=here.linearisation)
     return None if found is None else finished(problem, *found, row, settings)
 
 
