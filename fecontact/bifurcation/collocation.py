@@ -7,15 +7,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.collocation_kernels import at_points, fill_mesh, fill_phase_row
 from fecontact.bifurcation.interpolation import (
     Rule,
-    at_points,
+    carry_over,
     equidistributed,
     extremes,
-    interpolate,
-    node_times,
     rule,
-    to_nodes,
 )
 from fecontact.bifurcation.linearised import Linearised
 from fecontact.bifurcation.problem import Problem
@@ -85,10 +83,10 @@ class Collocation(Problem):
 
     keeps_matrix: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def autonomous(self) -> bool:
         """Whether the period is an unknown."""
-        return self._forcing_period is None
+        return self.field.forcing_period(self.values) is None
 
     @property
     def intervals(self) -> int:
@@ -111,32 +109,34 @@ class Collocation(Problem):
         return (self.free,) if self.second is None else (self.second, self.free)
 
     @cached_property
-    def _forcing_period(self) -> float | None:
-        return self.field.forcing_period(self.values)
-
-    @cached_property
     def rule(self) -> Rule:
         """Basis polynomials and Gauss points."""
         return rule(self.degree)
 
     @cached_property
+    def _on_mesh(self) -> tuple[Array, Array, Array]:
+        """Widths of the intervals, times of the Gauss points, weights of the inner product."""
+        points = self.intervals * self.degree
+        found = (np.empty(self.intervals), np.empty(points), np.empty(self.size + self.common))
+        fill_mesh(self.mesh, self.rule.points, self.scales, *found)
+        return found
+
+    @property
     def widths(self) -> Array:
         """Widths (N,) of the intervals."""
-        return np.diff(self.mesh)
+        return self._on_mesh[0]
 
-    @cached_property
+    @property
     def times(self) -> Array:
         """Times (N m,) of the Gauss points in [0, 1]."""
-        return (self.mesh[:-1, None] + self.widths[:, None] * self.rule.points).reshape(-1)
+        return self._on_mesh[1]
 
     @cached_property
     def phase_row(self) -> Array:
         """Row (N m d,) of the phase condition."""
-        _, slopes = self.at_gauss_points(self.reference)
-        row = np.empty_like(self.reference)
-        to_nodes(slopes, self.rule.weights[:, None] * self.rule.values, np.ones(self.intervals),
-                 row)
-        return row.reshape(-1)
+        row = np.empty(self.size)
+        fill_phase_row(self.reference, self.rule.weights, self.rule.values, self.rule.slopes, row)
+        return row
 
     def at_gauss_points(self, nodes: Array) -> tuple[Array, Array]:
         """States (N m, d) and their slopes over one interval, h x', at the Gauss points."""
@@ -159,7 +159,9 @@ class Collocation(Problem):
     def parameters(self, u: Array) -> Array:
         """Parameter values (k,)."""
         values = self.values.copy()
-        values[list(self.active)] = u[-len(self.active):]
+        values[self.free] = u[-1]
+        if self.second is not None:
+            values[self.second] = u[-2]
         return values
 
     def linearise(self, u: Array) -> Linearised:
@@ -172,14 +174,7 @@ class Collocation(Problem):
 
     def weights(self) -> Array:
         """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""
-        return self._weights
-
-    @cached_property
-    def _weights(self) -> Array:
-        d = self.field.dimension
-        times = np.repeat(self.widths / self.degree, self.degree)
-        nodal = (times[:, None] / self.scales[:d] ** 2).reshape(-1)
-        return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
+        return self._on_mesh[2]
 
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
@@ -225,14 +220,13 @@ class Collocation(Problem):
 
     def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """Problem, u and tangent on another mesh."""
-        times = node_times(mesh, self.degree)
-        d = self.field.dimension
-        both = interpolate(self.mesh, np.concatenate([self.nodes(u), self.nodes(tangent)], axis=1),
-                           times)
-        reference = np.ascontiguousarray(both[:, :d])
-        problem = replace(self, mesh=mesh, age=0, reference=reference)
-        return (problem, np.concatenate([reference.reshape(-1), u[self.size :]]),
-                np.concatenate([both[:, d:].reshape(-1), tangent[self.size :]]))
+        points, d = (len(mesh) - 1) * self.degree, self.field.dimension
+        common = len(u) - self.size
+        moved, turned = np.empty(points * d + common), np.empty(points * d + common)
+        moved[-common:], turned[-common:] = u[self.size :], tangent[self.size :]
+        nodes, directions = (room[:-common].reshape(points, d) for room in (moved, turned))
+        carry_over(self.mesh, mesh, self.nodes(u), self.nodes(tangent), nodes, directions)
+        return replace(self, mesh=mesh, age=0, reference=nodes.copy()), moved, turned
 
 
 def require_mesh(intervals: int, degree: int) -> None:
