@@ -13,23 +13,34 @@ from fecontact.laws.contract import signal_at
 
 
 @helper
-def _body_rates(time, y, s, out):  # type: ignore[no-untyped-def]
-    """Fill out with y' as it is without contact."""
-    m = s.Tx.shape[1]
+def _given(time, s, load):  # type: ignore[no-untyped-def]
+    """Fill load (m,) with what is given in time; the ground's travel and speed."""
+    m = len(load)
     drive_x = signal_at(s.drive[0])(time, s.drive_parameters[0])[0]
     drive_y = signal_at(s.drive[1])(time, s.drive_parameters[1])[0]
     for i in range(m):
-        out[i] = y[m + i]
-        total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
-                 + drive_y * s.drive_shapes[1, i])
-        for k in range(m):
-            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
-        out[m + i] = total
+        load[i] = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
+                   + drive_y * s.drive_shapes[1, i])
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(time, s.load_parameters[k])[0]
         for i in range(m):
-            out[m + i] += value * s.load_shapes[k, i]
-    out[2 * m :] = 0.0
+            load[i] += value * s.load_shapes[k, i]
+    travel, speed = signal_at(s.ground_motion)(time, s.ground_motion_parameters)
+    return travel, speed
+
+
+@helper
+def _body_rates(load, y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out with y' as it is without contact."""
+    m = s.Tx.shape[1]
+    for i in range(m):
+        out[i] = y[m + i]
+        total = load[i]
+        for k in range(m):
+            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
+        out[m + i] = total
+    for i in range(2 * m, len(out)):
+        out[i] = 0.0
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix))
@@ -39,10 +50,12 @@ def batch_rates(t, x, s, f):  # type: ignore[no-untyped-def]
     n, m = s.Tx.shape
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    load, travel, speed = np.empty(m), 0.0, 0.0
     for c in range(len(t)):
         y, out = x[c], f[c]
-        travel, speed = signal_at(s.ground_motion)(t[c], s.ground_motion_parameters)
-        _body_rates(t[c], y, s, out)
+        if c == 0 or t[c] != t[c - 1]:
+            travel, speed = _given(t[c], s, load)
+        _body_rates(load, y, s, out)
         for j in range(n):
             along, height, along_rate, height_rate = node_motion(j, y, s)
             F, R, _, _, _, _ = node_forces(j, along, height, along_rate, height_rate,
@@ -62,11 +75,13 @@ def batch_derivatives(t, x, s, f, J):  # type: ignore[no-untyped-def]
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
     partial, gradient = np.empty((3, 4)), np.empty((2, 2 * m))
+    load, travel, speed = np.empty(m), 0.0, 0.0
     for c in range(len(t)):
         y, out, A = x[c], f[c], J[c]
-        travel, speed = signal_at(s.ground_motion)(t[c], s.ground_motion_parameters)
+        if c == 0 or t[c] != t[c - 1]:
+            travel, speed = _given(t[c], s, load)
         A[:, :] = 0.0
-        _body_rates(t[c], y, s, out)
+        _body_rates(load, y, s, out)
         for i in range(m):
             A[i, m + i] = 1.0
             for k in range(m):
