@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.elimination import FACTORS, eliminate, forward
-from fecontact.compiled import block, borrowed, f8, helper, kernel, matrix, vector
+from fecontact.compiled import borrowed, f8, helper, kernel, matrix, vector
 from fecontact.lanes import LANES, gather, read, spread, write
 
 

@@ -34,7 +34,9 @@ def right_side(residual, row, u, guess, rhs):  # type: ignore[no-untyped-def]
 
 @kernel(types.void(vector, matrix, i8))
 def improve(weights, steps, count):  # type: ignore[no-untyped-def]
-    """Correct steps[count], made with the matrix of steps[0], by what the steps taught (Broyden).
+    """Correct steps[count], made with the matrix of steps[0], by what those before it taught.
+
+    Broyden's update of the matrix, applied as sums over the steps.
     """
     weights, steps = borrowed(weights), borrowed(steps)
     change = steps[count]

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import borrowed, f8, helper, kernel, matrix, vector
+from fecontact.compiled import borrowed, helper, kernel, matrix, vector
 
 Array = NDArray[np.float64]
 

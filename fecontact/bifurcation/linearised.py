@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation import elimination
 from fecontact.bifurcation.bordered import Border, Bordered
-from fecontact.bifurcation.floquet import Floquet, floquet_of
 from fecontact.bifurcation.collocation_kernels import fill_residual
+from fecontact.bifurcation.floquet import Floquet, floquet_of
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.collocation import Collocation
