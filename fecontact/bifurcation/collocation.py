@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.collocation_kernels import at_points, fill_mesh, fill_phase_row
+from fecontact.bifurcation.corrector_kernels import weighted_norm, weighted_product
 from fecontact.bifurcation.interpolation import (
     Rule,
     carry_over,
@@ -21,6 +22,9 @@ from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
+
+# The most by which a guess is bent away from the tangent, in steps.
+_MOST_BENT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +69,10 @@ class Collocation(Problem):
     second : int, optional
         Index of another free parameter, which stands before the first one in u; two equations
         are missing then.
+    before : (array, array), optional
+        u and the tangent from which the last step went.
+    bend : (n,) array, optional
+        Derivative of the tangent along the branch.
     """
 
     field: VectorField
@@ -80,6 +88,8 @@ class Collocation(Problem):
     limits: Array | None = None
     precision: float = 1e-12
     second: int | None = None
+    before: tuple[Array, Array] | None = None
+    bend: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -200,13 +210,38 @@ class Collocation(Problem):
 
         return examined(kind, self, u, linearisation, self.precision < 1e-6)
 
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """Along the tangent, and bent like the step before."""
+        guess = u + step * tangent
+        if self.bend is None:
+            return guess
+        aside = 0.5 * step * step * self.bend
+        straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
+        return guess if straight else guess + aside
+
     def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
         problem = replace(self, age=self.age + 1, scales=self._grown(u))
+        bend = self._bend(u, tangent)
+        vectors = [u, tangent] if bend is None else [u, tangent, bend]
         if self.renewal and problem.age >= self.renewal:
             mesh = equidistributed(self.mesh, self.nodes(u), self.degree, self.intervals)
-            return problem.on_mesh(mesh, u, tangent)
-        return replace(problem, reference=self.nodes(u).copy()), u, tangent
+            problem, vectors = problem._with_mesh(mesh, vectors)
+        else:
+            problem = replace(problem, reference=self.nodes(u).copy())
+        # The tangent has another length in the new mesh and scales.
+        size = weighted_norm(problem.weights(), vectors[1])
+        bend = vectors[2] / size**2 if len(vectors) > 2 else None
+        before = (vectors[0], vectors[1] / size)
+        return replace(problem, before=before, bend=bend), vectors[0], vectors[1]
+
+    def _bend(self, u: Array, tangent: Array) -> Array | None:
+        """Derivative of the tangent along the branch, from the last step."""
+        if self.before is None or len(self.before[0]) != len(u):
+            return None
+        start, direction = self.before
+        length = weighted_product(self.weights(), direction, u - start)
+        return (tangent - direction) / length if length > 0.0 else None
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, larger where the orbit has outgrown them."""
@@ -220,13 +255,16 @@ class Collocation(Problem):
 
     def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """Problem, u and tangent on another mesh."""
-        points, d = (len(mesh) - 1) * self.degree, self.field.dimension
-        common = len(u) - self.size
-        moved, turned = np.empty(points * d + common), np.empty(points * d + common)
-        moved[-common:], turned[-common:] = u[self.size :], tangent[self.size :]
-        nodes, directions = (room[:-common].reshape(points, d) for room in (moved, turned))
-        carry_over(self.mesh, mesh, self.nodes(u), self.nodes(tangent), nodes, directions)
-        return replace(self, mesh=mesh, age=0, reference=nodes.copy()), moved, turned
+        problem, (moved, turned) = self._with_mesh(mesh, [u, tangent])
+        return problem, moved, turned
+
+    def _with_mesh(self, mesh: Array, vectors: list[Array]) -> tuple["Collocation", list[Array]]:
+        """The problem and vectors like u, which is the first of them, on another mesh."""
+        nodal = (len(mesh) - 1) * self.degree * self.field.dimension
+        out = np.empty((len(vectors), nodal + len(vectors[0]) - self.size))
+        carry_over(self.mesh, mesh, self.degree, np.array(vectors), out)
+        reference = out[0, :nodal].reshape(-1, self.field.dimension).copy()
+        return replace(self, mesh=mesh, age=0, reference=reference), [*out]
 
 
 def require_mesh(intervals: int, degree: int) -> None:

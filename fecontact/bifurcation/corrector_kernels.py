@@ -15,6 +15,12 @@ def _product(weights, a, b):  # type: ignore[no-untyped-def]
     return total
 
 
+@kernel(f8(vector, vector, vector))
+def weighted_product(weights, a, b):  # type: ignore[no-untyped-def]
+    """Sum w a b."""
+    return _product(weights, a, b)
+
+
 @kernel(f8(vector, vector))
 def weighted_norm(weights, x):  # type: ignore[no-untyped-def]
     """Square root of sum w x x."""

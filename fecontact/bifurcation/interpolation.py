@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import borrowed, helper, kernel, matrix, vector
+from fecontact.compiled import borrowed, helper, i8, kernel, matrix, vector
 
 Array = NDArray[np.float64]
 
@@ -116,21 +116,29 @@ def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
         _combined(nodes, j, weights, out[row])
 
 
-@kernel(types.void(vector, vector, matrix, matrix, matrix, matrix))
-def carry_over(mesh, renewed, first, second, to_first, to_second):  # type: ignore[no-untyped-def]
-    """Fill the nodes (N m, d) on another mesh of two periodic solutions."""
-    mesh, renewed = borrowed(mesh), borrowed(renewed)
-    first, second = borrowed(first), borrowed(second)
-    to_first, to_second = borrowed(to_first), borrowed(to_second)
-    m = len(first) // (len(mesh) - 1)
+@kernel(types.void(vector, vector, i8, matrix, matrix))
+def carry_over(mesh, renewed, m, given, out):  # type: ignore[no-untyped-def]
+    """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
+
+    The e last entries of each, which are no nodes, are copied.
+    """
+    mesh, renewed, given, out = borrowed(mesh), borrowed(renewed), borrowed(given), borrowed(out)
+    total, renewed_total = (len(mesh) - 1) * m, (len(renewed) - 1) * m
+    d = given.shape[1] // total
+    common = given.shape[1] - total * d
     weights, scales = np.empty(m + 1), _scales_of_basis(m)
     j = 0
-    for interval in range(len(renewed) - 1):
+    for node in range(renewed_total):
+        interval = node // m
         width = renewed[interval + 1] - renewed[interval]
-        for k in range(m):
-            j = _basis_at(mesh, renewed[interval] + width * k / m, j, scales, weights)
-            _combined(first, j, weights, to_first[interval * m + k])
-            _combined(second, j, weights, to_second[interval * m + k])
+        t = renewed[interval] + width * (node - interval * m) / m
+        j = _basis_at(mesh, t, j, scales, weights)
+        for index in range(len(given)):
+            nodes = given[index, : total * d].reshape((total, d))
+            _combined(nodes, j, weights, out[index, node * d : (node + 1) * d])
+    for index in range(len(given)):
+        for k in range(common):
+            out[index, renewed_total * d + k] = given[index, total * d + k]
 
 
 def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
