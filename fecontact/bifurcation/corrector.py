@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 # Steps of this relative size that grow again are rounding, as next to branch points.
 _ROUNDING = 1e-6
 # A matrix is kept as long as each step is shorter than this part of the one before.
-_SERVES = 0.3
+_SERVES = 0.2
 
 
 @dataclass(frozen=True, eq=False)
