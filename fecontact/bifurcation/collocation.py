@@ -69,10 +69,9 @@ class Collocation(Problem):
     second : int, optional
         Index of another free parameter, which stands before the first one in u; two equations
         are missing then.
-    before : (array, array), optional
-        u and the tangent from which the last step went.
-    bend : (n,) array, optional
-        Derivative of the tangent along the branch.
+    before : tuple of (n,) arrays
+        u, the tangent and, after the first step, its derivative along the branch, from which the
+        last step went; empty before the first one.
     """
 
     field: VectorField
@@ -88,8 +87,7 @@ class Collocation(Problem):
     limits: Array | None = None
     precision: float = 1e-12
     second: int | None = None
-    before: tuple[Array, Array] | None = None
-    bend: Array | None = None
+    before: tuple[Array, ...] = ()
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -213,34 +211,32 @@ class Collocation(Problem):
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Along the tangent, and bent like the step before."""
         guess = u + step * tangent
-        if self.bend is None:
+        if len(self.before) < 3:
             return guess
-        aside = 0.5 * step * step * self.bend
+        # The tangent of old has another length in the mesh and scales of today.
+        length = step / weighted_norm(self.weights(), self.before[1])
+        aside = 0.5 * length * length * self.before[2]
         straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
         return guess if straight else guess + aside
 
     def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
-        problem = replace(self, age=self.age + 1, scales=self._grown(u))
         bend = self._bend(u, tangent)
         vectors = [u, tangent] if bend is None else [u, tangent, bend]
-        if self.renewal and problem.age >= self.renewal:
-            mesh = equidistributed(self.mesh, self.nodes(u), self.degree, self.intervals)
-            problem, vectors = problem._with_mesh(mesh, vectors)
-        else:
-            problem = replace(problem, reference=self.nodes(u).copy())
-        # The tangent has another length in the new mesh and scales.
-        size = weighted_norm(problem.weights(), vectors[1])
-        bend = vectors[2] / size**2 if len(vectors) > 2 else None
-        before = (vectors[0], vectors[1] / size)
-        return replace(problem, before=before, bend=bend), vectors[0], vectors[1]
+        mesh, age = self.mesh, self.age + 1
+        if self.renewal and age >= self.renewal:
+            mesh, age = equidistributed(mesh, self.nodes(u), self.degree, self.intervals), 0
+            vectors = self._on_other_mesh(mesh, vectors)
+        problem = replace(self, mesh=mesh, age=age, reference=self.nodes(vectors[0]).copy(),
+                          scales=self._grown(u), before=tuple(vectors))
+        return problem, vectors[0], vectors[1]
 
     def _bend(self, u: Array, tangent: Array) -> Array | None:
         """Derivative of the tangent along the branch, from the last step."""
-        if self.before is None or len(self.before[0]) != len(u):
+        if not self.before:
             return None
-        start, direction = self.before
-        length = weighted_product(self.weights(), direction, u - start)
+        direction = self.before[1] / weighted_norm(self.weights(), self.before[1])
+        length = weighted_product(self.weights(), direction, u - self.before[0])
         return (tangent - direction) / length if length > 0.0 else None
 
     def _grown(self, u: Array) -> Array:
@@ -255,16 +251,17 @@ class Collocation(Problem):
 
     def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """Problem, u and tangent on another mesh."""
-        problem, (moved, turned) = self._with_mesh(mesh, [u, tangent])
-        return problem, moved, turned
+        moved, turned = self._on_other_mesh(mesh, [u, tangent])
+        nodal = (len(mesh) - 1) * self.degree * self.field.dimension
+        reference = moved[:nodal].reshape(-1, self.field.dimension).copy()
+        return replace(self, mesh=mesh, age=0, reference=reference, before=()), moved, turned
 
-    def _with_mesh(self, mesh: Array, vectors: list[Array]) -> tuple["Collocation", list[Array]]:
-        """The problem and vectors like u, which is the first of them, on another mesh."""
+    def _on_other_mesh(self, mesh: Array, vectors: list[Array]) -> list[Array]:
+        """Vectors like u on another mesh."""
         nodal = (len(mesh) - 1) * self.degree * self.field.dimension
         out = np.empty((len(vectors), nodal + len(vectors[0]) - self.size))
         carry_over(self.mesh, mesh, self.degree, np.array(vectors), out)
-        reference = out[0, :nodal].reshape(-1, self.field.dimension).copy()
-        return replace(self, mesh=mesh, age=0, reference=reference), [*out]
+        return [*out]
 
 
 def require_mesh(intervals: int, degree: int) -> None:

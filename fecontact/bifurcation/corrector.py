@@ -63,10 +63,8 @@ def _iterated(
         linearisation = problem.linearise(u) if kept is None else problem.evaluate(u)
         right_side(linearisation.residual, row, u, guess, rhs)
         steps[count_kept] = (kept or linearisation).solve(row, rhs)
-        if count_kept:
-            improve(weights, steps, count_kept)
+        size = improve(weights, steps, count_kept)
         change = steps[count_kept]
-        size = weighted_norm(weights, change)
         if count > 2 and size > before and before <= _ROUNDING * scale:
             return u, linearisation, count
         if not np.isfinite(size) or (count > 2 - more and size > before):

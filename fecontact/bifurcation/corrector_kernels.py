@@ -38,11 +38,11 @@ def right_side(residual, row, u, guess, rhs):  # type: ignore[no-untyped-def]
     rhs[len(residual)] = -total
 
 
-@kernel(types.void(vector, matrix, i8))
+@kernel(f8(vector, matrix, i8))
 def improve(weights, steps, count):  # type: ignore[no-untyped-def]
     """Correct steps[count], made with the matrix of steps[0], by what those before it taught.
 
-    Broyden's update of the matrix, applied as sums over the steps.
+    Broyden's update of the matrix, applied as sums over the steps. Returns the step's length.
     """
     weights, steps = borrowed(weights), borrowed(steps)
     change = steps[count]
@@ -56,3 +56,4 @@ def improve(weights, steps, count):  # type: ignore[no-untyped-def]
         else:
             for k in range(len(change)):
                 change[k] /= 1.0 - part
+    return math.sqrt(_product(weights, change, change))
