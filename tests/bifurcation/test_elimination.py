@@ -39,7 +39,7 @@ def dense(J, f, P, widths, T, degree, with_period):
 
 
 # Fewer intervals than lanes, as many, one more, lanes that stay empty or half empty.
-@pytest.mark.parametrize("intervals", [2, 5, 8, 9, 23, 57])
+@pytest.mark.parametrize("intervals", [1, 2, 5, 8, 9, 23, 57])
 @pytest.mark.parametrize(("degree", "states", "with_period", "parameters"),
                          [(4, 4, 1, 1), (3, 1, 1, 1), (2, 3, 0, 1), (7, 2, 1, 2), (4, 6, 0, 0)])
 def test_bordered_solutions(intervals, degree, states, with_period, parameters):
