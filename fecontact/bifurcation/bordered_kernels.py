@@ -8,7 +8,15 @@ pivot row: (G, (m - 1) d, 8) of the inner nodes, (G - 1, d, 8) of the chains wit
 import numpy as np
 from numba import types
 
-from fecontact.bifurcation.elimination import FACTORS, eliminate, forward
+from fecontact.bifurcation.elimination import FACTORS
+from fecontact.bifurcation.row_interchanges import (
+    back_lanes,
+    eliminate,
+    forward,
+    forward_lanes,
+    reduce_row,
+    reduce_row_lanes,
+)
 from fecontact.compiled import borrowed, f8, helper, kernel, matrix, vector
 from fecontact.lanes import LANES, gather, read, spread, write
 
@@ -24,28 +32,6 @@ def _parts(factors, pivots):  # type: ignore[no-untyped-def]
     return (pivots[:first].reshape((groups, inner, LANES)),
             pivots[first:second].reshape((groups - 1, d, LANES)),
             pivots[second:].reshape((len(factors.top), d)))
-
-
-@helper
-def _reduce_row(a, count, row, weights):  # type: ignore[no-untyped-def]
-    """Eliminate the first entries of a further row (columns,); ``weights`` (count,) says how."""
-    columns = len(row)
-    for k in range(count):
-        factor = row[k] * a[k, k]
-        weights[k] = factor
-        for c in range(k + 1, columns):
-            row[c] -= factor * a[k, c]
-
-
-@helper
-def _reduce_row_lanes(a, count, row, weights):  # type: ignore[no-untyped-def]
-    """As :func:`_reduce_row`, for a row (columns, 8)."""
-    columns = len(row)
-    for k in range(count):
-        factor = read(row[k]) * read(a[k, k])
-        write(weights[k], factor)
-        for c in range(k + 1, columns):
-            write(row[c], read(row[c]) - factor * read(a[k, c]))
 
 
 @helper
@@ -93,7 +79,7 @@ def reduce_border(factors, given, weights, small):  # type: ignore[no-untyped-de
             write(row[inner + d + c], nothing)
         for c in range(e):
             write(row[inner + 2 * d + c], read(link[3 * d + c]))
-        _reduce_row_lanes(factors.inner[group], inner, row, inner_weights[group])
+        reduce_row_lanes(factors.inner[group], inner, row, inner_weights[group])
         for c in range(e):
             write(link[3 * d + c], read(row[inner + 2 * d + c]))
         for c in range(d):
@@ -105,7 +91,7 @@ def reduce_border(factors, given, weights, small):  # type: ignore[no-untyped-de
             _take(given, 0, group, groups, N, size, d, places, left)
             for c in range(d):
                 write(link[c], read(row[inner + c]) + read(left[c]))
-            _reduce_row_lanes(factors.chain[group - 1], d, link, chain_weights[group - 1])
+            reduce_row_lanes(factors.chain[group - 1], d, link, chain_weights[group - 1])
         for c in range(d):
             write(link[2 * d + c], read(link[2 * d + c]) + read(row[inner + d + c]))
     whole = np.empty(3 * d + e)
@@ -120,21 +106,11 @@ def reduce_border(factors, given, weights, small):  # type: ignore[no-untyped-de
         for c in range(d):
             whole[c] = whole[2 * d + c] + link[d + c, lane]
             whole[2 * d + c] = 0.0
-        _reduce_row(factors.top[lane - 1], d, whole, top_weights[lane - 1])
+        reduce_row(factors.top[lane - 1], d, whole, top_weights[lane - 1])
         for c in range(d):
             whole[2 * d + c] += link[2 * d + c, lane]
     for c in range(columns):
         small[c] = whole[d + c]
-
-
-@helper
-def _forward_lanes(a, count, r):  # type: ignore[no-untyped-def]
-    """As :func:`forward`, for r (rows, 8) whose rows are in their order already."""
-    rows = len(r)
-    for k in range(count):
-        known = read(r[k])
-        for i in range(k + 1, rows):
-            write(r[i], read(r[i]) - read(a[i, k]) * known)
 
 
 @kernel(types.void(FACTORS, vector, vector, vector))
@@ -158,7 +134,7 @@ def reduce_side(factors, rhs, reduced, side):  # type: ignore[no-untyped-def]
             for lane in range(LANES):
                 j = lane * groups + group
                 r[i, lane] = rhs[j * size + (order[i, lane] if inner else i)] if j < N else 0.0
-        _forward_lanes(factors.inner[group], inner, r)
+        forward_lanes(factors.inner[group], inner, r)
         for i in range(inner):
             write(of_inner[group, i], read(r[i]))
         if group == 0:
@@ -173,7 +149,7 @@ def reduce_side(factors, rhs, reduced, side):  # type: ignore[no-untyped-def]
             for lane in range(LANES):
                 places[lane] = factors.chain_order[group - 1, i, lane] * LANES + lane
             write(pair[i], gather(numbers, places, 0))
-        _forward_lanes(factors.chain[group - 1], d, pair)
+        forward_lanes(factors.chain[group - 1], d, pair)
         for i in range(d):
             write(of_chain[group - 1, i], read(pair[i]))
     both = np.empty(2 * d)
@@ -187,27 +163,6 @@ def reduce_side(factors, rhs, reduced, side):  # type: ignore[no-untyped-def]
         for i in range(d):
             of_top[lane - 1, i] = both[i]
             side[i] = both[d + i]
-
-
-@helper
-def _back_lanes(a, count, r, known):  # type: ignore[no-untyped-def]
-    """Fill known[:count] (.., 8), the rest given, from the reduced right side r (count, 8)."""
-    width = len(known)
-    for i in range(count):
-        total, other = read(r[i]), spread(0.0)
-        c = count
-        while c + 1 < width:
-            total = total - read(a[i, c]) * read(known[c])
-            other = other - read(a[i, c + 1]) * read(known[c + 1])
-            c += 2
-        if c < width:
-            total = total - read(a[i, c]) * read(known[c])
-        write(known[i], total + other)
-    for k in range(count - 1, -1, -1):
-        found = read(known[k]) * read(a[k, k])
-        write(known[k], found)
-        for i in range(k):
-            write(known[i], read(known[i]) - read(a[i, k]) * found)
 
 
 @kernel(types.void(FACTORS, vector, vector, vector, vector, vector))
@@ -249,13 +204,13 @@ def expand(factors, reduced, start, end, common, out):  # type: ignore[no-untype
         if group:
             for c in range(d):
                 write(link[2 * d + c], read(ends[group + 1, c]))
-            _back_lanes(factors.chain[group - 1], d, of_chain[group - 1], link)
+            back_lanes(factors.chain[group - 1], d, of_chain[group - 1], link)
             for c in range(d):
                 write(ends[group, c], read(link[c]))
         for c in range(d):
             write(known[inner + c], read(ends[group, c]))
             write(known[inner + d + c], read(ends[group + 1, c]))
-        _back_lanes(factors.inner[group], inner, of_inner[group], known)
+        back_lanes(factors.inner[group], inner, of_inner[group], known)
         for lane in range(LANES):
             first = (lane * groups + group) * size
             if lane * groups + group < N:

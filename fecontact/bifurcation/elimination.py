@@ -22,8 +22,9 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.row_interchanges import eliminate, eliminate_lanes
 from fecontact.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
-from fecontact.lanes import LANES, gather, magnitude, read, spread, where_larger, write
+from fecontact.lanes import LANES, gather, read, spread, write
 
 Array = NDArray[np.float64]
 
@@ -86,129 +87,6 @@ def _aligned(groups: int, rows: int, columns: int) -> Array:
 
 
 @helper
-def eliminate(a, count, pivots):  # type: ignore[no-untyped-def]
-    """Eliminate the first columns of a (rows, columns) in place, with row interchanges."""
-    rows, columns = a.shape
-    for k in range(count):
-        row, largest = k, abs(a[k, k])
-        for i in range(k + 1, rows):
-            if abs(a[i, k]) > largest:
-                row, largest = i, abs(a[i, k])
-        pivots[k] = row
-        if row != k:
-            for c in range(columns):
-                a[k, c], a[row, c] = a[row, c], a[k, c]
-        inverse = 1.0 / a[k, k]
-        a[k, k] = inverse
-        i = k + 1
-        while i + 3 < rows:
-            f0, f1 = a[i, k] * inverse, a[i + 1, k] * inverse
-            f2, f3 = a[i + 2, k] * inverse, a[i + 3, k] * inverse
-            a[i, k], a[i + 1, k], a[i + 2, k], a[i + 3, k] = f0, f1, f2, f3
-            for c in range(k + 1, columns):
-                pivot = a[k, c]
-                a[i, c] -= f0 * pivot
-                a[i + 1, c] -= f1 * pivot
-                a[i + 2, c] -= f2 * pivot
-                a[i + 3, c] -= f3 * pivot
-            i += 4
-        while i < rows:
-            factor = a[i, k] * inverse
-            a[i, k] = factor
-            for c in range(k + 1, columns):
-                a[i, c] -= factor * a[k, c]
-            i += 1
-
-
-@helper
-def forward(a, count, pivots, r):  # type: ignore[no-untyped-def]
-    """Apply to a right side r (rows,) what :func:`eliminate` did to the rows."""
-    for k in range(count):
-        row = pivots[k]
-        r[k], r[row] = r[row], r[k]
-    for i in range(1, len(r)):
-        total = r[i]
-        for k in range(min(i, count)):
-            total -= a[i, k] * r[k]
-        r[i] = total
-
-
-@helper
-def _with_pivot(a, k, order, room):  # type: ignore[no-untyped-def]
-    """Bring the largest entry of column k to row k in each lane; its inverse, kept there."""
-    rows, columns, _ = a.shape
-    largest, place = magnitude(read(a[k, k])), spread(float(k))
-    for i in range(k + 1, rows):
-        size = magnitude(read(a[i, k]))
-        place = where_larger(size, largest, spread(float(i)), place)
-        largest = where_larger(size, largest, size, largest)
-    write(room, place)
-    row, same = int(room[0]), True
-    for lane in range(1, LANES):
-        same = same and room[lane] == room[0]
-    if same and row != k:
-        for c in range(columns):
-            above = read(a[k, c])
-            write(a[k, c], read(a[row, c]))
-            write(a[row, c], above)
-    for lane in range(LANES):
-        row = int(room[lane])
-        if row != k:
-            order[k, lane], order[row, lane] = order[row, lane], order[k, lane]
-            if not same:
-                for c in range(columns):
-                    a[k, c, lane], a[row, c, lane] = a[row, c, lane], a[k, c, lane]
-    inverse = spread(1.0) / read(a[k, k])
-    write(a[k, k], inverse)
-    return inverse
-
-
-@helper
-def _eliminate_lanes(a, count, order, room):  # type: ignore[no-untyped-def]
-    """As :func:`eliminate` for a (rows, columns, 8); ``order`` (rows, 8) is filled.
-
-    Four columns are eliminated from the rows below at once: less is read and written.
-    """
-    rows, columns, _ = a.shape
-    for i in range(rows):
-        for lane in range(LANES):
-            order[i, lane] = i
-    for first in range(0, count, 4):
-        last = min(first + 4, count)
-        for k in range(first, last):
-            inverse = _with_pivot(a, k, order, room)
-            for i in range(k + 1, rows):
-                factor = read(a[i, k]) * inverse
-                write(a[i, k], factor)
-                for c in range(k + 1, last):
-                    write(a[i, c], read(a[i, c]) - factor * read(a[k, c]))
-        for k in range(first + 1, last):
-            for above in range(first, k):
-                factor = read(a[k, above])
-                for c in range(last, columns):
-                    write(a[k, c], read(a[k, c]) - factor * read(a[above, c]))
-        i = last
-        while last - first == 4 and i + 1 < rows:
-            k, low = first, i + 1
-            f0, f1, f2, f3 = (read(a[i, k]), read(a[i, k + 1]), read(a[i, k + 2]),
-                              read(a[i, k + 3]))
-            g0, g1, g2, g3 = (read(a[low, k]), read(a[low, k + 1]), read(a[low, k + 2]),
-                              read(a[low, k + 3]))
-            for c in range(last, columns):
-                p0, p1, p2, p3 = (read(a[k, c]), read(a[k + 1, c]), read(a[k + 2, c]),
-                                  read(a[k + 3, c]))
-                write(a[i, c], read(a[i, c]) - f0 * p0 - f1 * p1 - f2 * p2 - f3 * p3)
-                write(a[low, c], read(a[low, c]) - g0 * p0 - g1 * p1 - g2 * p2 - g3 * p3)
-            i += 2
-        while i < rows:
-            for k in range(first, last):
-                factor = read(a[i, k])
-                for c in range(last, columns):
-                    write(a[i, c], read(a[i, c]) - factor * read(a[k, c]))
-            i += 1
-
-
-@helper
 def _take_links(local, group, groups, places, links):  # type: ignore[no-untyped-def]
     """Fill links (d, 2 d + e, 8) with the equations of a group; x_j = x_(j+1) beyond the last."""
     N, d, columns = local.shape
@@ -248,7 +126,7 @@ def _chain_segments(local, chain, order, end):  # type: ignore[no-untyped-def]
             for c in range(e):
                 write(a[i, 3 * d + c], read(end[i, 2 * d + c]))
                 write(a[d + i, 3 * d + c], read(links[i, 2 * d + c]))
-        _eliminate_lanes(a, d, order[group - 1], room)
+        eliminate_lanes(a, d, order[group - 1], room)
         for i in range(d):
             for c in range(columns):
                 write(end[i, c], read(a[d + i, d + c]))
@@ -337,7 +215,7 @@ def condense(J, f, P, widths, T, values, slopes, with_period, factors):  # type:
                 for c in range(q):
                     write(a[row, inner + 2 * d + with_period + c],
                           read(step) * gather(of_common, places, c))
-        _eliminate_lanes(a, inner, factors.inner_order[group], room)
+        eliminate_lanes(a, inner, factors.inner_order[group], room)
         for lane in range(LANES):
             j = lane * groups + group
             if j < N:
