@@ -162,32 +162,42 @@ def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def body_rates(t, y, s, out):  # type: ignore[no-untyped-def]
-    """Fill out (2 m + n s,) with y' as it is without contact."""
-    m = s.Tx.shape[1]
+def given_at(t, s, load):  # type: ignore[no-untyped-def]
+    """Fill load (m,) with the modal forces that are given in time; the ground's travel and speed."""
+    m = len(load)
     drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
     drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]
     for i in range(m):
-        out[i] = y[m + i]
-        total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
-                 + drive_y * s.drive_shapes[1, i])
-        for k in range(m):
-            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
-        out[m + i] = total
+        load[i] = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
+                   + drive_y * s.drive_shapes[1, i])
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         for i in range(m):
-            out[m + i] += value * s.load_shapes[k, i]
-    out[2 * m :] = 0.0
+            load[i] += value * s.load_shapes[k, i]
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    return travel, speed
 
 
 @helper
-def rates_at(t, y, s, force, rates, out):  # type: ignore[no-untyped-def]
+def body_rates(load, y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out (2 m + n s,) with y' as it is without contact, under modal forces ``load``."""
+    m = len(load)
+    for i in range(m):
+        out[i] = y[m + i]
+        total = load[i]
+        for k in range(m):
+            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
+        out[m + i] = total
+    for i in range(2 * m, len(out)):
+        out[i] = 0.0
+
+
+@helper
+def rates_under(load, travel, speed, y, s, force, rates, out):  # type: ignore[no-untyped-def]
     """Fill out (2 m + n s,) with y'; ``force`` (3 + s,) and ``rates`` (s, 3 + s) are room."""
     n, m = s.Tx.shape
     states = len(rates)
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    body_rates(t, y, s, out)
+    body_rates(load, y, s, out)
     for j in range(n):
         x, height, x_rate, height_rate = node_motion(j, y, s)
         F, R, _, _, _, _ = node_forces(j, x, height, x_rate, height_rate, memory_of(j, y, s),
@@ -204,7 +214,10 @@ def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
     """Fill out (2 m + n s,) with y'."""
     y, s = borrowed(y), borrowed(s)
     states = s.memory.max()
-    rates_at(t, y, s, np.empty(3 + states), np.empty((states, 3 + states)), out)
+    load = np.empty(s.Tx.shape[1])
+    travel, speed = given_at(t, s, load)
+    rates_under(load, travel, speed, y, s, np.empty(3 + states), np.empty((states, 3 + states)),
+                out)
 
 
 @kernel(types.void(vector, matrix, SYSTEM, block))

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation import bordered_kernels
-from fecontact.bifurcation.elimination import Factors
+from fecontact.bifurcation.elimination import Factors, pivot_rows
 
 Array = NDArray[np.float64]
 
@@ -13,12 +13,9 @@ class Border:
     """A further row, reduced to x_0, x_N and the common unknowns."""
 
     def __init__(self, factors: Factors, row: Array) -> None:
-        N, _, _ = factors.local.shape
-        d = factors.end.shape[0]
-        self.local = np.empty((N, factors.local_pivots.shape[1]))
-        self.chain = np.empty((N - 1, d))
+        self.weights = np.empty(pivot_rows(factors))
         self.small = np.empty(factors.end.shape[1])
-        bordered_kernels.reduce_border(factors, row, self.local, self.chain, self.small)
+        bordered_kernels.reduce_border(factors, row, self.weights, self.small)
 
 
 class Bordered:
@@ -28,14 +25,12 @@ class Bordered:
         self, factors: Factors, borders: list[Border], closing: float
     ) -> None:
         self._factors, self._closing = factors, closing
-        count, N, d = len(borders), len(factors.local), len(factors.end)
-        self._local = np.empty((count, N, factors.local_pivots.shape[1]))
-        self._chain = np.empty((count, N - 1, d))
-        self._small = np.empty((d + count, factors.end.shape[1]))
+        d = len(factors.end)
+        self._weights = np.empty((len(borders), pivot_rows(factors)))
+        self._small = np.empty((d + len(borders), factors.end.shape[1]))
         self._small[:d] = factors.end
         for index, border in enumerate(borders):
-            self._local[index], self._chain[index] = border.local, border.chain
-            self._small[d + index] = border.small
+            self._weights[index], self._small[d + index] = border.weights, border.small
 
     @property
     def matrix(self) -> Array:
@@ -45,20 +40,20 @@ class Bordered:
 
     def solve(self, rhs: Array) -> Array:
         """All unknowns for a right side of all rows; not finite where the system is singular."""
-        N, size, _ = self._factors.local.shape
         d = len(self._factors.end)
-        out = np.empty(N * size + self._small.shape[1] - 2 * d)
-        bordered_kernels.solve(self._factors, rhs, self._local, self._chain, self._small,
-                          self._closing, out)
+        out = np.empty(self._nodal + self._small.shape[1] - 2 * d)
+        bordered_kernels.solve(self._factors, rhs, self._weights, self._small, self._closing, out)
         return out
 
     def expand(self, solution: Array) -> Array:
         """All unknowns from x_0 and the common ones where the right side is zero."""
-        N, size, _ = self._factors.local.shape
-        d = len(self._factors.end)
-        out = np.empty(N * size + len(solution) - d)
-        out[N * size :] = solution[d:]
-        bordered_kernels.expand(self._factors, np.zeros((N, size)), np.zeros((N - 1, 2 * d)),
-                           solution[:d], self._closing * solution[:d], solution[d:],
-                           out[: N * size])
+        d, nodal = len(self._factors.end), self._nodal
+        out = np.empty(nodal + len(solution) - d)
+        out[nodal:] = solution[d:]
+        bordered_kernels.expand(self._factors, np.zeros(pivot_rows(self._factors)), solution[:d],
+                                self._closing * solution[:d], solution[d:], out[:nodal])
         return out
+
+    @property
+    def _nodal(self) -> int:
+        return len(self._factors.local) * self._factors.inner.shape[1]

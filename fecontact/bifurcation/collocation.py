@@ -7,15 +7,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.collocation_kernels import at_points, fill_mesh, fill_phase_row
+from fecontact.bifurcation.corrector_kernels import weighted_norm, weighted_product
 from fecontact.bifurcation.interpolation import (
     Rule,
-    at_points,
+    carry_over,
     equidistributed,
     extremes,
-    interpolate,
-    node_times,
     rule,
-    to_nodes,
 )
 from fecontact.bifurcation.linearised import Linearised
 from fecontact.bifurcation.problem import Problem
@@ -23,6 +22,9 @@ from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
+
+# The most by which a guess is bent away from the tangent, in steps.
+_MOST_BENT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,9 @@ class Collocation(Problem):
     second : int, optional
         Index of another free parameter, which stands before the first one in u; two equations
         are missing then.
+    before : tuple of (n,) arrays
+        u, the tangent and, after the first step, its derivative along the branch, from which the
+        last step went; empty before the first one.
     """
 
     field: VectorField
@@ -82,13 +87,14 @@ class Collocation(Problem):
     limits: Array | None = None
     precision: float = 1e-12
     second: int | None = None
+    before: tuple[Array, ...] = ()
 
     keeps_matrix: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def autonomous(self) -> bool:
         """Whether the period is an unknown."""
-        return self._forcing_period is None
+        return self.field.forcing_period(self.values) is None
 
     @property
     def intervals(self) -> int:
@@ -111,32 +117,34 @@ class Collocation(Problem):
         return (self.free,) if self.second is None else (self.second, self.free)
 
     @cached_property
-    def _forcing_period(self) -> float | None:
-        return self.field.forcing_period(self.values)
-
-    @cached_property
     def rule(self) -> Rule:
         """Basis polynomials and Gauss points."""
         return rule(self.degree)
 
     @cached_property
+    def _on_mesh(self) -> tuple[Array, Array, Array]:
+        """Widths of the intervals, times of the Gauss points, weights of the inner product."""
+        points = self.intervals * self.degree
+        found = (np.empty(self.intervals), np.empty(points), np.empty(self.size + self.common))
+        fill_mesh(self.mesh, self.rule.points, self.scales, *found)
+        return found
+
+    @property
     def widths(self) -> Array:
         """Widths (N,) of the intervals."""
-        return np.diff(self.mesh)
+        return self._on_mesh[0]
 
-    @cached_property
+    @property
     def times(self) -> Array:
         """Times (N m,) of the Gauss points in [0, 1]."""
-        return (self.mesh[:-1, None] + self.widths[:, None] * self.rule.points).reshape(-1)
+        return self._on_mesh[1]
 
     @cached_property
     def phase_row(self) -> Array:
         """Row (N m d,) of the phase condition."""
-        _, slopes = self.at_gauss_points(self.reference)
-        row = np.empty_like(self.reference)
-        to_nodes(slopes, self.rule.weights[:, None] * self.rule.values, np.ones(self.intervals),
-                 row)
-        return row.reshape(-1)
+        row = np.empty(self.size)
+        fill_phase_row(self.reference, self.rule.weights, self.rule.values, self.rule.slopes, row)
+        return row
 
     def at_gauss_points(self, nodes: Array) -> tuple[Array, Array]:
         """States (N m, d) and their slopes over one interval, h x', at the Gauss points."""
@@ -159,7 +167,9 @@ class Collocation(Problem):
     def parameters(self, u: Array) -> Array:
         """Parameter values (k,)."""
         values = self.values.copy()
-        values[list(self.active)] = u[-len(self.active):]
+        values[self.free] = u[-1]
+        if self.second is not None:
+            values[self.second] = u[-2]
         return values
 
     def linearise(self, u: Array) -> Linearised:
@@ -172,14 +182,7 @@ class Collocation(Problem):
 
     def weights(self) -> Array:
         """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""
-        return self._weights
-
-    @cached_property
-    def _weights(self) -> Array:
-        d = self.field.dimension
-        times = np.repeat(self.widths / self.degree, self.degree)
-        nodal = (times[:, None] / self.scales[:d] ** 2).reshape(-1)
-        return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
+        return self._on_mesh[2]
 
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
@@ -205,13 +208,36 @@ class Collocation(Problem):
 
         return examined(kind, self, u, linearisation, self.precision < 1e-6)
 
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """Along the tangent, and bent like the step before."""
+        guess = u + step * tangent
+        if len(self.before) < 3:
+            return guess
+        # The tangent of old has another length in the mesh and scales of today.
+        length = step / weighted_norm(self.weights(), self.before[1])
+        aside = 0.5 * length * length * self.before[2]
+        straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
+        return guess if straight else guess + aside
+
     def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
-        problem = replace(self, age=self.age + 1, scales=self._grown(u))
-        if self.renewal and problem.age >= self.renewal:
-            mesh = equidistributed(self.mesh, self.nodes(u), self.degree, self.intervals)
-            return problem.on_mesh(mesh, u, tangent)
-        return replace(problem, reference=self.nodes(u).copy()), u, tangent
+        bend = self._bend(u, tangent)
+        vectors = [u, tangent] if bend is None else [u, tangent, bend]
+        mesh, age = self.mesh, self.age + 1
+        if self.renewal and age >= self.renewal:
+            mesh, age = equidistributed(mesh, self.nodes(u), self.degree, self.intervals), 0
+            vectors = self._on_other_mesh(mesh, vectors)
+        problem = replace(self, mesh=mesh, age=age, reference=self.nodes(vectors[0]).copy(),
+                          scales=self._grown(u), before=tuple(vectors))
+        return problem, vectors[0], vectors[1]
+
+    def _bend(self, u: Array, tangent: Array) -> Array | None:
+        """Derivative of the tangent along the branch, from the last step."""
+        if not self.before:
+            return None
+        direction = self.before[1] / weighted_norm(self.weights(), self.before[1])
+        length = weighted_product(self.weights(), direction, u - self.before[0])
+        return (tangent - direction) / length if length > 0.0 else None
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, larger where the orbit has outgrown them."""
@@ -225,14 +251,17 @@ class Collocation(Problem):
 
     def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
         """Problem, u and tangent on another mesh."""
-        times = node_times(mesh, self.degree)
-        d = self.field.dimension
-        both = interpolate(self.mesh, np.concatenate([self.nodes(u), self.nodes(tangent)], axis=1),
-                           times)
-        reference = np.ascontiguousarray(both[:, :d])
-        problem = replace(self, mesh=mesh, age=0, reference=reference)
-        return (problem, np.concatenate([reference.reshape(-1), u[self.size :]]),
-                np.concatenate([both[:, d:].reshape(-1), tangent[self.size :]]))
+        moved, turned = self._on_other_mesh(mesh, [u, tangent])
+        nodal = (len(mesh) - 1) * self.degree * self.field.dimension
+        reference = moved[:nodal].reshape(-1, self.field.dimension).copy()
+        return replace(self, mesh=mesh, age=0, reference=reference, before=()), moved, turned
+
+    def _on_other_mesh(self, mesh: Array, vectors: list[Array]) -> list[Array]:
+        """Vectors like u on another mesh."""
+        nodal = (len(mesh) - 1) * self.degree * self.field.dimension
+        out = np.empty((len(vectors), nodal + len(vectors[0]) - self.size))
+        carry_over(self.mesh, mesh, self.degree, np.array(vectors), out)
+        return [*out]
 
 
 def require_mesh(intervals: int, degree: int) -> None:

@@ -11,10 +11,11 @@ from fecontact.compiled import block, borrowed, kernel, matrix, vector
 from fecontact.contact_kernels import (
     SYSTEM,
     body_rates,
+    given_at,
     memory_of,
     node_gradients,
     node_motion,
-    rates_at,
+    rates_under,
 )
 from fecontact.laws.contract import signal_at
 
@@ -25,8 +26,11 @@ def batch_rates(t, x, s, f):  # type: ignore[no-untyped-def]
     t, x, s, f = borrowed(t), borrowed(x), borrowed(s), borrowed(f)
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    load, travel, speed = np.empty(s.Tx.shape[1]), 0.0, 0.0
     for c in range(len(t)):
-        rates_at(t[c], x[c], s, force, rates, f[c])
+        if c == 0 or t[c] != t[c - 1]:
+            travel, speed = given_at(t[c], s, load)
+        rates_under(load, travel, speed, x[c], s, force, rates, f[c])
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix, block))
@@ -37,11 +41,13 @@ def batch_derivatives(t, x, s, f, J):  # type: ignore[no-untyped-def]
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
     partial, gradient = np.empty((3, 4)), np.empty((2, 2 * m))
+    load, travel, speed = np.empty(m), 0.0, 0.0
     for c in range(len(t)):
         y, out, A = x[c], f[c], J[c]
-        travel, speed = signal_at(s.ground_motion)(t[c], s.ground_motion_parameters)
+        if c == 0 or t[c] != t[c - 1]:
+            travel, speed = given_at(t[c], s, load)
         A[:, :] = 0.0
-        body_rates(t[c], y, s, out)
+        body_rates(load, y, s, out)
         for i in range(m):
             A[i, m + i] = 1.0
             for k in range(m):

@@ -124,8 +124,8 @@ def start_of(
 
 def _step(problem: Problem, here: Solution, step: float, settings: Settings) -> Solution | None:
     row = problem.weights() * here.tangent
-    found = corrected(problem, here.u + step * here.tangent, row, settings.tolerance,
-                       settings.iterations)
+    found = corrected(problem, problem.predicted(here.u, here.tangent, step), row,
+                      settings.tolerance, settings.iterations, known=here.linearisation)
     return None if found is None else finished(problem, *found, row, settings)
 
 

@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.inner_product import weighted_norm
+from fecontact.bifurcation.corrector_kernels import improve, right_side, weighted_norm
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
 from fecontact.errors import AnalysisError
 
@@ -16,6 +15,8 @@ Array = NDArray[np.float64]
 
 # Steps of this relative size that grow again are rounding, as next to branch points.
 _ROUNDING = 1e-6
+# A matrix is kept as long as each step is shorter than this part of the one before.
+_SERVES = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,45 +32,56 @@ class Solution:
 
 
 def corrected(
-    problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int
+    problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int, *,
+    known: Linearisation | None = None, exact: bool = False,
 ) -> tuple[Array, Linearisation, int] | None:
-    """Newton's method at right angles to a row, from a guess; None where it does not converge."""
-    u, before, kept = guess, np.inf, None
-    steps: list[Array] = []
-    scale = 1.0 + norm(problem, guess)
-    for count in range(1, iterations + 1):
+    """Newton's method at right angles to a row, from a guess; None where it does not converge.
+
+    Problems that keep their matrix begin with that of ``known``, the equations at a neighbour, and
+    take the matrix at the guess only where the former does not serve. The linearisation returned
+    is that of the last step or, where that is much larger than rounding or ``exact`` is asked
+    for, of the solution itself. The number of steps is that which a new matrix would have taken.
+    """
+    if known is not None and problem.keeps_matrix:
+        found = _iterated(problem, guess, row, tolerance, iterations, known, exact)
+        if found is not None:
+            return found
+    return _iterated(problem, guess, row, tolerance, iterations, None, exact)
+
+
+def _iterated(
+    problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int,
+    known: Linearisation | None, exact: bool,
+) -> tuple[Array, Linearisation, int] | None:
+    """One attempt of :func:`corrected`, beginning with the matrix of ``known`` if there is one."""
+    u, before, kept = guess, np.inf, known
+    weights, scale = problem.weights(), 1.0 + norm(problem, guess)
+    more = 0 if known is None else 1
+    steps, count_kept = np.empty((iterations + more, len(guess))), 0
+    rhs = np.empty(len(guess))
+    for count in range(1, iterations + more + 1):
         linearisation = problem.linearise(u) if kept is None else problem.evaluate(u)
-        rhs = np.append(-linearisation.residual, -(row @ (u - guess)))
-        change = (kept or linearisation).solve(row, rhs)
-        if kept is not None:
-            change = _improved(problem, change, steps)
-        size = norm(problem, change)
+        right_side(linearisation.residual, row, u, guess, rhs)
+        steps[count_kept] = (kept or linearisation).solve(row, rhs)
+        size = improve(weights, steps, count_kept)
+        change = steps[count_kept]
         if count > 2 and size > before and before <= _ROUNDING * scale:
             return u, linearisation, count
-        if not np.isfinite(size) or (count > 2 and size > before):
+        if not np.isfinite(size) or (count > 2 - more and size > before):
             return None
         u = u + change
         if kept is None and size <= tolerance * scale:
-            return u, linearisation, count
+            return u, problem.linearise(u) if exact else linearisation, count
         # With a matrix that is kept the error falls by about the same factor each time.
-        if kept is not None and size * size / before <= max(0.1 * tolerance, 1e-13) * scale:
-            return u, problem.linearise(u), max(1, count - 2)
+        falls = size / before if count > 1 else _SERVES
+        if kept is not None and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
+            return u, problem.linearise(u), max(1, count - 2 - more)
         if problem.keeps_matrix:
-            keeps = kept is None or size < 0.2 * before
+            keeps = kept is None or falls <= _SERVES
             kept = (kept or linearisation) if keeps else None
-            steps = [*steps, change] if keeps else []
+            count_kept = count_kept + 1 if keeps else 0
         before = size
     return None
-
-
-def _improved(problem: Problem, change: Array, steps: list[Array]) -> Array:
-    """A step with the matrix of the first of ``steps``, corrected by what they taught (Broyden)."""
-    weights = problem.weights()
-    for step, following in pairwise(steps):
-        along = weights * step
-        change = change + following * float(along @ change / (along @ step))
-    along = weights * steps[-1]
-    return np.asarray(change / (1.0 - float(along @ change / (along @ steps[-1]))))
 
 
 def finished(

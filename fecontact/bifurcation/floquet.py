@@ -1,6 +1,7 @@
 """Floquet multipliers of a periodic orbit, and what they say of its stability."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,13 +50,11 @@ class Floquet:
             return 0.0
         return float(abs(self.multipliers[self.trivial] - 1.0))
 
-    @property
+    @cached_property
     def unstable(self) -> int:
         """Number of multipliers outside the unit circle."""
-        outside = np.abs(self.multipliers) > 1.0
-        if self.trivial is not None:
-            outside[self.trivial] = False
-        return int(outside.sum())
+        return sum(place != self.trivial and abs(multiplier) > 1.0
+                   for place, multiplier in enumerate(self.multipliers.tolist()))
 
     @property
     def stable(self) -> bool:

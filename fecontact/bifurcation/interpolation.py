@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import borrowed, f8, kernel, matrix, vector
+from fecontact.compiled import borrowed, helper, i8, kernel, matrix, vector
 
 Array = NDArray[np.float64]
 
@@ -60,89 +60,85 @@ def rule(degree: int) -> Rule:
         np.array([[p(x) for p in basis] for x in np.linspace(0.0, 1.0, 8 * degree + 1)]))
 
 
-@kernel(types.void(matrix, matrix, matrix, matrix, matrix))
-def at_points(nodes, values, slopes, x, rates):  # type: ignore[no-untyped-def]
-    """Fill x and rates (N m, d), values and interval-scaled slopes, from nodes (N m, d)."""
-    nodes, x, rates = borrowed(nodes), borrowed(x), borrowed(rates)
-    m = len(values)
+@helper
+def _scales_of_basis(m):  # type: ignore[no-untyped-def]
+    """What each basis polynomial is divided by to be one at its own node."""
+    scales = np.ones(m + 1)
+    for k in range(m + 1):
+        for other in range(m + 1):
+            if other != k:
+                scales[k] /= k - other
+    return scales
+
+
+@helper
+def _basis_at(mesh, t, j, scales, weights):  # type: ignore[no-untyped-def]
+    """Fill weights (m + 1,) of the nodes of the interval of t; its index, looked for from j on."""
+    N, m = len(mesh) - 1, len(weights) - 1
+    while j > 0 and t < mesh[j]:
+        j -= 1
+    while j < N - 1 and t >= mesh[j + 1]:
+        j += 1
+    place = (t - mesh[j]) / (mesh[j + 1] - mesh[j]) * m
+    for k in range(m + 1):
+        weight = scales[k]
+        for other in range(m + 1):
+            if other != k:
+                weight *= place - other
+        weights[k] = weight
+    return j
+
+
+@helper
+def _combined(nodes, j, weights, out):  # type: ignore[no-untyped-def]
+    """Fill out (d,) with the weighted nodes of interval j."""
     total, d = nodes.shape
-    for j in range(total // m):
-        for point in range(m):
-            row = j * m + point
-            for i in range(d):
-                x[row, i] = 0.0
-                rates[row, i] = 0.0
-            for k in range(m + 1):
-                node = j * m + k
-                if node == total:
-                    node = 0
-                value, slope = values[point, k], slopes[point, k]
-                for i in range(d):
-                    x[row, i] += value * nodes[node, i]
-                    rates[row, i] += slope * nodes[node, i]
-
-
-@kernel(types.void(matrix, matrix, vector, f8, vector))
-def fill_residual(slopes, f, widths, T, out):  # type: ignore[no-untyped-def]
-    """Fill the first N m d entries of out with slopes - h T f."""
-    slopes, f, out = borrowed(slopes), borrowed(f), borrowed(out)
-    total, d = f.shape
-    m = total // len(widths)
-    for j in range(len(widths)):
-        step = widths[j] * T
-        for row in range(j * m, (j + 1) * m):
-            for i in range(d):
-                out[row * d + i] = slopes[row, i] - step * f[row, i]
-
-
-@kernel(types.void(matrix, matrix, vector, matrix))
-def to_nodes(at_points, values, widths, out):  # type: ignore[no-untyped-def]
-    """Fill out (N m, d), the nodes' weights in sum_j h_j sum_c values_ck at_points_jc x_jk."""
-    at_points, out = borrowed(at_points), borrowed(out)
-    m = len(values)
-    total, d = out.shape
-    out[:] = 0.0
-    for j in range(total // m):
-        for point in range(m):
-            row = j * m + point
-            for k in range(m + 1):
-                node = j * m + k
-                if node == total:
-                    node = 0
-                weight = widths[j] * values[point, k]
-                for i in range(d):
-                    out[node, i] += weight * at_points[row, i]
+    m = len(weights) - 1
+    for i in range(d):
+        out[i] = 0.0
+    for k in range(m + 1):
+        node = j * m + k
+        if node == total:
+            node = 0
+        for i in range(d):
+            out[i] += weights[k] * nodes[node, i]
 
 
 @kernel(types.void(vector, matrix, vector, matrix))
 def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
     """Fill out (k, d); the times need not be in order."""
     mesh, nodes, times, out = borrowed(mesh), borrowed(nodes), borrowed(times), borrowed(out)
-    N = len(mesh) - 1
-    total, d = nodes.shape
-    m = total // N
-    weights = np.empty(m + 1)
+    m = len(nodes) // (len(mesh) - 1)
+    weights, scales = np.empty(m + 1), _scales_of_basis(m)
     j = 0
     for row in range(len(times)):
-        t = times[row]
-        while j > 0 and t < mesh[j]:
-            j -= 1
-        while j < N - 1 and t >= mesh[j + 1]:
-            j += 1
-        place = (t - mesh[j]) / (mesh[j + 1] - mesh[j]) * m
-        for k in range(m + 1):
-            weight = 1.0
-            for other in range(m + 1):
-                if other != k:
-                    weight *= (place - other) / (k - other)
-            weights[k] = weight
-        out[row] = 0.0
-        for k in range(m + 1):
-            node = j * m + k
-            if node == total:
-                node = 0
-            for i in range(d):
-                out[row, i] += weights[k] * nodes[node, i]
+        j = _basis_at(mesh, times[row], j, scales, weights)
+        _combined(nodes, j, weights, out[row])
+
+
+@kernel(types.void(vector, vector, i8, matrix, matrix))
+def carry_over(mesh, renewed, m, given, out):  # type: ignore[no-untyped-def]
+    """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
+
+    The e last entries of each, which are no nodes, are copied.
+    """
+    mesh, renewed, given, out = borrowed(mesh), borrowed(renewed), borrowed(given), borrowed(out)
+    total, renewed_total = (len(mesh) - 1) * m, (len(renewed) - 1) * m
+    d = given.shape[1] // total
+    common = given.shape[1] - total * d
+    weights, scales = np.empty(m + 1), _scales_of_basis(m)
+    j = 0
+    for node in range(renewed_total):
+        interval = node // m
+        width = renewed[interval + 1] - renewed[interval]
+        t = renewed[interval] + width * (node - interval * m) / m
+        j = _basis_at(mesh, t, j, scales, weights)
+        for index in range(len(given)):
+            nodes = given[index, : total * d].reshape((total, d))
+            _combined(nodes, j, weights, out[index, node * d : (node + 1) * d])
+    for index in range(len(given)):
+        for k in range(common):
+            out[index, renewed_total * d + k] = given[index, total * d + k]
 
 
 def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
@@ -172,14 +168,16 @@ def _extremes(nodes, fine, low, high):  # type: ignore[no-untyped-def]
         for j in range(total // m):
             near = False
             for k in range(m + 1):
-                value = nodes[(j * m + k) % total, i]
+                node = j * m + k
+                value = nodes[node if node < total else 0, i]
                 near = near or value > top - margin or value < bottom + margin
             if not near:
                 continue
             for row in range(len(fine)):
                 value = 0.0
                 for k in range(m + 1):
-                    value += fine[row, k] * nodes[(j * m + k) % total, i]
+                    node = j * m + k
+                    value += fine[row, k] * nodes[node if node < total else 0, i]
                 values[row] = value
             for row in range(1, len(fine) - 1):
                 left, here, right = values[row - 1], values[row], values[row + 1]
@@ -201,10 +199,9 @@ def node_times(mesh: Array, degree: int) -> Array:
     return (mesh[:-1, None] + np.diff(mesh)[:, None] * np.arange(degree) / degree).reshape(-1)
 
 
-@kernel(types.void(vector, matrix, vector, vector))
+@helper
 def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
     """Fill share (N,) with h |x^(m+1)|^(1/(m+1)) of each interval."""
-    mesh, nodes, top, share = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(share)
     N = len(share)
     total, d = nodes.shape
     m = total // N
@@ -218,10 +215,11 @@ def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
         for j in range(N):
             value = 0.0
             for k in range(m + 1):
-                value += top[k] * nodes[(j * m + k) % total, i]
+                node = j * m + k
+                value += top[k] * nodes[node if node < total else 0, i]
             derivative[j] = value / (mesh[j + 1] - mesh[j]) ** m
         for j in range(N):
-            after = (j + 1) % N
+            after = j + 1 if j + 1 < N else 0
             spacing = (mesh[j + 1] - mesh[j] + mesh[after + 1] - mesh[after]) / 2.0
             jump = abs(derivative[after] - derivative[j]) / (spacing * (high - low))
             steep[j] += jump / 2.0
@@ -229,8 +227,32 @@ def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
     for j in range(N):
         steep[j] = steep[j] ** (1.0 / (m + 1))
     for j in range(N):
-        mean = (steep[j - 1] + 2.0 * steep[j] + steep[(j + 1) % N]) / 4.0
+        mean = (steep[j - 1] + 2.0 * steep[j] + steep[j + 1 if j + 1 < N else 0]) / 4.0
         share[j] = mean * (mesh[j + 1] - mesh[j])
+
+
+@kernel(types.void(vector, matrix, vector, vector))
+def _equidistribute(mesh, nodes, top, renewed):  # type: ignore[no-untyped-def]
+    """Fill a mesh, see :func:`equidistributed`."""
+    mesh, nodes, top, renewed = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(renewed)
+    N, intervals = len(mesh) - 1, len(renewed) - 1
+    share = np.zeros(N)
+    _monitor(mesh, nodes, top, share)
+    total = share.sum()
+    uniform = not 0.0 < total < np.inf
+    # A part is spread evenly over time: no interval gets longer than ten times the mean.
+    before, after, j = 0.0, 0.0, -1
+    for row in range(1, intervals):
+        goal = 1.1 * row / intervals
+        while j < N - 1 and after < goal:
+            j += 1
+            before = after
+            after += share[j] / total + 0.1 * (mesh[j + 1] - mesh[j])
+        part = (goal - before) / (after - before)
+        renewed[row] = mesh[j] + min(part, 1.0) * (mesh[j + 1] - mesh[j])
+        if uniform:
+            renewed[row] = row / intervals
+    renewed[0], renewed[intervals] = 0.0, 1.0
 
 
 def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> Array:
@@ -240,15 +262,6 @@ def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> A
     evenly (de Boor). The derivative of order m + 1 comes from the jumps of that of order m.
     Each state counts by its own range over the orbit.
     """
-    widths = np.diff(mesh)
-    share = np.zeros(len(widths))
-    _monitor(mesh, nodes, rule(degree).top, share)
-    total = share.sum()
-    if not 0.0 < total < np.inf:
-        return np.linspace(0.0, 1.0, intervals + 1)
-    # A part is spread evenly over time: no interval gets longer than ten times the mean.
-    share = share / total + 0.1 * widths
-    cumulative = np.concatenate([[0.0], np.cumsum(share)])
-    result = np.interp(np.linspace(0.0, cumulative[-1], intervals + 1), cumulative, mesh)
-    result[0], result[-1] = 0.0, 1.0
+    result = np.empty(intervals + 1)
+    _equidistribute(mesh, nodes, rule(degree).top, result)
     return result

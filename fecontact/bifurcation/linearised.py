@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation import elimination
 from fecontact.bifurcation.bordered import Border, Bordered
+from fecontact.bifurcation.collocation_kernels import fill_residual
 from fecontact.bifurcation.floquet import Floquet, floquet_of
-from fecontact.bifurcation.interpolation import fill_residual
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.collocation import Collocation
@@ -22,47 +22,48 @@ _DIFFERENCE = 1e-5  # relative step in a parameter that moves the period of the 
 class Linearised:
     """Residual of the collocation equations at u, and solutions of systems with their derivative.
 
+    Attributes
+    ----------
+    period : float
+        Period T [s].
+
     Residual: the collocation rows (N m d), interval by interval, Gauss point by Gauss point, and
     the phase condition where the period is unknown.
     """
 
     def __init__(self, problem: "Collocation", u: Array, whole: bool = True) -> None:
         self.problem, self.u, self._whole = problem, u, whole
+        self.period = problem.period(u)
+        self._x, self._slopes = problem.at_gauss_points(problem.nodes(u))
         self._last: tuple[Array, float, Bordered] | None = None
-
-    @cached_property
-    def _points(self) -> tuple[Array, Array]:
-        return self.problem.at_gauss_points(self.problem.nodes(self.u))
-
-    @cached_property
-    def period(self) -> float:
-        """Period T [s]."""
-        return self.problem.period(self.u)
 
     @cached_property
     def residual(self) -> Array:
         """Residual (N m d + 1,), without the last entry for forced systems."""
         problem = self.problem
-        x, slopes = self._points
         if self._whole:
             f = self.derivatives[0]
         else:
-            f = problem.field.rates(problem.times * self.period, x, problem.parameters(self.u))
+            f = problem.field.rates(self._times, self._x, problem.parameters(self.u))
         out = np.empty(problem.size + problem.autonomous)
-        fill_residual(slopes, f, problem.widths, self.period, out)
-        if problem.autonomous:
-            out[-1] = problem.phase_row @ self.u[: problem.size]
+        fill_residual(self._slopes, f, problem.widths, self.period,
+                      problem.phase_row if problem.autonomous else self.u, self.u, out)
         return out
+
+    @property
+    def _times(self) -> Array:
+        """Times (N m,) [s] of the Gauss points; all zero where nothing depends on them."""
+        if self.problem.autonomous:
+            return np.zeros(len(self._x))
+        return self.problem.times * self.period
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array, Array]:
         """Rates and their derivatives to state and parameter at the Gauss points."""
-        problem, T = self.problem, self.period
-        x, _ = self._points
-        values = problem.parameters(self.u)
-        f, J, P = problem.field.derivatives(problem.times * T, x, values, problem.active)
+        problem, values = self.problem, self.problem.parameters(self.u)
+        f, J, P = problem.field.derivatives(self._times, self._x, values, problem.active)
         if not problem.autonomous:
-            self._add_forcing(x, values, P)
+            self._add_forcing(self._x, values, P)
         return f, J, P
 
     def _add_forcing(self, x: Array, values: Array, P: Array) -> None:

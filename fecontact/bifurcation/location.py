@@ -94,13 +94,13 @@ def _zero(
     def value(along: float) -> float:
         if along <= 0.0 or along >= length:
             return before if along <= 0.0 else after
+        # The test functions are those of this very point, not of the last Newton step.
         found = corrected(problem, between(problem, here, there, along), row, exact,
-                           2 * settings.iterations)
+                          2 * settings.iterations, exact=True,
+                          known=(best[-1][1] if best else there).linearisation)
         if found is None:
             raise _LostError
-        # The test functions are those of this very point, not of the last Newton step.
-        u, _, count = found
-        at = finished(problem, u, problem.linearise(u), count, row, settings)
+        at = finished(problem, *found, row, settings)
         result = test(at)
         best.append((abs(result), at))
         return result

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.bordered import Border, Bordered
+from fecontact.bifurcation.collocation_kernels import to_nodes
 from fecontact.bifurcation.elimination import condense, factors_for
-from fecontact.bifurcation.interpolation import to_nodes
 from fecontact.bifurcation.linearised import Linearised
 
 if TYPE_CHECKING:

@@ -224,7 +224,7 @@ def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
     tangent = before.on_mesh(problem.mesh, start, direction)[2]
     mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, problem.intervals)
     problem, u, tangent = problem.on_mesh(mesh, u, tangent)
-    problem = replace(problem, renewal=0)
+    problem = replace(problem, renewal=0, precision=1e-9)
     # The scales may have grown along the branch.
     tangent = tangent / np.sqrt(problem.weights() @ tangent**2)
     for near in _NEAR:

@@ -74,6 +74,10 @@ class Problem(Protocol):
         """
         return {}
 
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """Where Newton's method begins, a step from u."""
+        return u + step * tangent
+
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
         """The problem on a better mesh, with u and tangent on it, after each step; None to stay."""
         return None

@@ -144,8 +144,10 @@ class _Corners:
             start += size
 
     def hold(self, values: Array) -> bool:
-        return all(low <= value <= high for (low, high), value in
-                   zip(self._limits, values.tolist(), strict=True))
+        for (low, high), value in zip(self._limits, values.tolist(), strict=True):
+            if not low <= value <= high:
+                return False
+        return True
 
     def at(self, values: Array) -> SystemArrays:
         weights = [1.0]

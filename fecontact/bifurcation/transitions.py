@@ -43,13 +43,12 @@ def transitions(factors, out):  # type: ignore[no-untyped-def]
     factors, out = borrowed(factors), borrowed(out)
     local = factors.local
     N, d, _ = out.shape
-    inner = factors.local_pivots.shape[1]
     a = np.empty((d, d))
     for j in range(N):
         for i in range(d):
             for c in range(d):
-                a[i, c] = local[j, inner + i, inner + d + c]
-                out[j, i, c] = -local[j, inner + i, inner + c]
+                a[i, c] = local[j, i, d + c]
+                out[j, i, c] = -local[j, i, c]
         _solve(a, out[j], d)
 
 
