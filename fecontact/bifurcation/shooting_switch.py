@@ -1,6 +1,6 @@
 """Branches of orbits by shooting that begin on others: at Hopf points and period doublings."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,14 +16,15 @@ from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.shooting import Shooting, Shot, shooting_from
-from fecontact.errors import InputError
+from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
 
-# How a branch of doubled orbits ends that has come back to single ones.
+# How a branch of doubled orbits ends that comes back to single ones.
 _HALVING = "period halving"
-# Part of their usual distance within which the two halves of an orbit are the same.
-_SAME = 0.05
+# Part of their largest distance below which the two halves of an orbit come together. Closer to
+# single orbits Newton's method finds either, as both solve the equations.
+_CLOSE = 0.1
 
 
 def restored_shooting(
@@ -117,9 +118,9 @@ def doubled_by_shooting(
                   "scales": twice.scales, "periods": twice.periods,
                   "segments": len(twice.mesh) - 1}
     stops = [chosen.stop_at] if isinstance(chosen.stop_at, str) else list(chosen.stop_at)
-    found = follow(twice, start + chosen.step * tangent, replace(
-        chosen, stop_at=[*stops, _HALVING]), name=branch.name, tangent=tangent,
-        attributes=attributes)
+    twice, start, tangent = twice.adapted(start + chosen.step * tangent, tangent)
+    found = follow(twice, start, replace(chosen, stop_at=[*stops, _HALVING]), name=branch.name,
+                   tangent=tangent, attributes=attributes)
     return _ended(found, problem, chosen)
 
 
@@ -130,71 +131,78 @@ def _halves(u: Array, common: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Doubled(Shooting):
-    """Orbits of twice a period, with a test for those that have become single again.
+    """Orbits of twice a period, with a test for those that come back to single ones.
 
-    ``apart`` is what the second half of the last orbit lacked to the first. The difference of the
-    halves, along it, passes zero where they are the same.
+    ``apart`` (K d / 2,) is by how much the halves of the last orbit differed, ``largest`` the
+    largest length of such a difference so far.
     """
 
-    apart: Array | None = None
+    apart: Array = field(default_factory=lambda: np.zeros(0))
+    largest: float = 0.0
 
-    def _along(self, u: Array) -> float:
-        """Difference of the halves along ``apart``, one where it has not changed."""
-        assert self.apart is not None
-        first, second = _halves(u, self.common)
-        weighted = self.weights()[: len(self.apart)] * self.apart
-        return float(weighted @ (first - second) / (weighted @ self.apart))
+    def length(self, apart: Array) -> float:
+        """Length of a difference of the halves."""
+        return float(np.sqrt(self.weights()[: len(apart)] @ apart**2))
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[_Doubled, Array, Array]":
-        problem, u, tangent = super().adapted(u, tangent)
         first, second = _halves(u, self.common)
-        return replace(problem, apart=first - second), u, tangent  # type: ignore[call-arg]
+        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
+                       apart=first - second,
+                       largest=max(self.largest, self.length(first - second))), u, tangent
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        return {**super().tests(u, linearisation, tangent), _HALVING: self._along(u)}
+        first, second = _halves(u, self.common)
+        along = self.weights()[: len(first)] * self.apart @ (first - second)
+        return {**super().tests(u, linearisation, tangent), _HALVING: float(
+            along / (self.length(self.apart) * self.largest) - _CLOSE)}
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        if kind != _HALVING:
-            return super().examine(kind, u, linearisation, tangent)
-        assert self.apart is not None
-        first, second = _halves(u, self.common)
-        weights = self.weights()[: len(first)]
-        left, usual = (float(weights @ part**2) for part in (first - second, self.apart))
-        return {} if left <= _SAME**2 * usual else None
+        return {} if kind == _HALVING else super().examine(kind, u, linearisation, tangent)
 
 
 def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
-    """The branch, with an end at single orbits located on these.
-
-    Doubled and single orbits cross there, so that Newton's method for doubled ones may find either.
-    The turn in the parameter at the crossing is none.
-    """
-    points = branch.points
-    if branch.status is not Status.STOPPED or points[-1].kind != _HALVING:
+    """The branch, with an end that comes back to single orbits located on these."""
+    points, common = branch.points, single.common
+    if branch.status is not Status.STOPPED or points[-1].kind != _HALVING or len(points) < 2:
         return branch
-    last, common = points[-1], single.common
-    halves = [_halves(point.u, common) for point in points[-3:-1]]
-    apart = [float(np.abs(first - second).max()) for first, second in halves]
-    if points[-2].kind == "fold" and apart[-1] <= _SAME * apart[0]:
-        points = (*points[:-2], last)
+    before, last = points[-2:]
+    # The parameter is even in what parts the halves.
+    sizes = [float(np.sum(np.subtract(*_halves(point.u, common)) ** 2)) for point in (before, last)]
+    there = last.parameter + sizes[1] * (last.parameter - before.parameter) / (sizes[1] - sizes[0])
+    first, second = _halves(last.u, common)
     tail = last.u[-common:].copy()
     tail[:-1] /= 2.0
-    beside = replace(settings, points=3, stop_at=(), largest_step=settings.step)
-    near = follow(single, np.append(_halves(last.u, common)[0], tail), beside,
-                  name=branch.name, both=True).of_kind("period doubling")
-    if near:
-        closest = min(near, key=lambda point: abs(point.parameter - last.parameter))
-        start, tail = closest.u[:-common], closest.u[-common:].copy()
-        tail[:-1] *= 2.0
-        last = replace(last, u=np.concatenate([start, start, tail]), values={
-            **last.values, "period": 2.0 * closest.values["period"],
-            "multipliers": closest.values["multipliers"] ** 2})
-    return replace(branch, points=(*points[:-1], last))
+    tail[-1] = there
+    near = _doublings_near(single, np.concatenate([(first + second) / 2.0, tail]), settings,
+                           abs(there - last.parameter), branch.name)
+    if not near:
+        return replace(branch, points=points[:-1])
+    closest = min(near, key=lambda point: abs(point.parameter - there))
+    start, tail = closest.u[:-common], closest.u[-common:].copy()
+    tail[:-1] *= 2.0
+    end = replace(last, u=np.concatenate([start, start, tail]), values={
+        **last.values, "period": 2.0 * closest.values["period"],
+        "multipliers": closest.values["multipliers"] ** 2})
+    return replace(branch, points=(*points[:-1], end))
 
 
-def _doubled(problem: Shooting, u: Array) -> tuple[Shooting, Array, Array]:
+def _doublings_near(
+    single: Shooting, u: Array, settings: Settings, off: float, name: str
+) -> tuple[BranchPoint, ...]:
+    """Doublings of the single orbits, ``off`` or so in the parameter from that near u."""
+    step = max(4.0 * off / float(single.scales[-1]), settings.step)
+    low, high = settings.bounds
+    beside = replace(settings, step=step, largest_step=step, points=4, stop_at=(),
+                     bounds=(min(low, u[-1] - 20.0 * off), max(high, u[-1] + 20.0 * off)))
+    try:
+        return follow(single, u, beside, name=name, both=True).of_kind("period doubling")
+    except FecontactError:
+        return ()
+
+
+def _doubled(problem: Shooting, u: Array) -> tuple[_Doubled, Array, Array]:
     """The orbit run through twice, and the direction (of length one) in which it parts."""
     starts = problem.starts(u)
     rounds = [run.monodromy for run in Shot(problem, u).runs]
@@ -215,6 +223,6 @@ def _doubled(problem: Shooting, u: Array) -> tuple[Shooting, Array, Array]:
     start = np.concatenate([starts.reshape(-1), starts.reshape(-1), tail])
     shape = np.concatenate(carried)
     twice = _Doubled(problem.field, problem.values, problem.free, mesh, problem.reference, scales,
-                     2 * problem.periods, problem.rtol, apart=2.0 * shape)
+                     2 * problem.periods, problem.rtol)
     tangent = np.concatenate([shape, -shape, np.zeros(problem.common)])
     return twice, start, tangent / np.sqrt(twice.weights() @ tangent**2)

@@ -45,7 +45,7 @@ def plot_branches(
     Parameters
     ----------
     branches : Branch or sequence of Branch
-        Each gets its own colour.
+        Each gets its own colour, those of one name the same.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
     y, x : str, int or callable
@@ -56,7 +56,7 @@ def plot_branches(
     x_label, y_label : str, optional
         Labels of the axes, with units.
     names : sequence of str
-        Names of the branches for the legend.
+        Names of the branches for the legend, in which each name stands once.
     beneath : BruteForce, optional
         Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
         should be 'observed_section'.
@@ -98,11 +98,14 @@ def branches_figure(
     dots = draw_beneath(axis, beneath, observe)
     known: dict[str, list[tuple[float, float]]] = {}
     dashed = False
-    for number, branch in enumerate(branches):
+    groups = [*names[: len(branches)], *range(len(names), len(branches))]
+    colours = {group: COLOURS[number % len(COLOURS)]
+               for number, group in enumerate(dict.fromkeys(groups))}
+    for group, branch in zip(groups, branches, strict=True):
         places, curves = _values(branch, x), _values(branch, y, rows=True)
         stable = _stable_pieces(branch)
         dashed |= not stable.all()
-        colour = COLOURS[number % len(COLOURS)]
+        colour = colours[group]
         heights = curves if curves.ndim == 1 else curves[:, 0]
         for first, last in _runs(stable):
             axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
@@ -117,8 +120,7 @@ def branches_figure(
     axis.autoscale_view()
     _mark(axis, known)
     draw_insets(figure, axis, insets)
-    _legend(axis, [COLOURS[k % len(COLOURS)] for k in range(len(branches))], names, known, dashed,
-            dots)
+    _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
     return figure
 
 
@@ -188,13 +190,13 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
 
 
 def _legend(
-    axis: "Axes", colours: Sequence[str], names: Sequence[str],
-    known: dict[str, list[tuple[float, float]]], dashed: bool, dots: Sequence[Any],
+    axis: "Axes", colours: dict[str, str], known: dict[str, list[tuple[float, float]]],
+    dashed: bool, dots: Sequence[Any],
 ) -> None:
     from matplotlib.lines import Line2D
 
     handles: list[Any] = [Line2D([], [], color=colour, linewidth=1.8, label=name)
-                          for colour, name in zip(colours, names, strict=False)]
+                          for name, colour in colours.items()]
     if dashed:
         handles.append(Line2D([], [], color="#303030", linewidth=1.8, label="stable"))
         handles.append(Line2D([], [], color="#303030", linewidth=1.2, linestyle=_DASHES,
