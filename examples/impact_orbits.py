@@ -50,7 +50,7 @@ class Start(NamedTuple):
 
 
 # The first two are parts of one branch.
-STARTS = (Start(42.0, "up", (23.5, 43.0), 560), Start(44.0, "up", (43.0, 80.0), 300),
+STARTS = (Start(42.0, "up", (23.5, 43.0), 560), Start(44.0, "up", (43.0, 80.0), 450),
           Start(30.0, "up", (26.0, 31.0), 170), Start(25.2, "up", (25.0, 29.0), 60))
 
 
@@ -202,12 +202,44 @@ def _meets(branch: fc.Branch, w: float, y: Array) -> bool:
     return False
 
 
-def drawn(branch: fc.Branch) -> fc.Branch:
-    """The branch with its section; doublings are marked on the single orbits alone."""
-    return replace(branch, points=tuple(
-        replace(point, kind=None if point.kind == "period halving" else point.kind,
-                values={**point.values, "observed_section": section(point)})
-        for point in branch.points))
+def pieces(branch: fc.Branch, low: float, high: float, marked: bool) -> list[fc.Branch]:
+    """What of a branch lies within a range, with its section; doublings stand on single orbits."""
+    found: list[list[BranchPoint]] = [[]]
+    for point in branch.points:
+        inside = low <= point.parameter <= high
+        if inside and (marked or point.kind in (None, "period halving")):
+            found[-1].append(replace(
+                point, kind=None if point.kind == "period halving" else point.kind,
+                values={**point.values, "observed_section": section(point)}))
+        elif not inside and found[-1]:
+            found.append([])
+    return [replace(branch, points=tuple(points)) for points in found if len(points) > 1]
+
+
+def draw(
+    path: Path, branches: Sequence[fc.Branch], found: fc.BruteForce, low: float, high: float,
+    chosen: Sequence[tuple[int, float]], marked: bool = False,
+) -> None:
+    """The diagram of a range, with phase planes of orbits of so many periods near some places."""
+    shown = sorted((piece for branch in branches for piece in pieces(branch, low, high, marked)),
+                   key=periods)
+    insets = []
+    for count, w in chosen:
+        point, branch = min(
+            ((point, branch) for branch in shown if periods(branch) == count
+             for point in branch.points if point.kind is None),
+            key=lambda pair: abs(pair[0].parameter - w))
+        kind = "" if point.values["stable"] else ", unstable"
+        insets.append(fc.phase_inset(field_at(w), branch, point, float(section(point)[0]),
+                                     ("B", "y"), f"{point.parameter:.2f} rad/s{kind}"))
+    part = (low <= found.values) & (found.values <= high)
+    fc.plot_branches(shown, path, "observed_section",
+                     x_label="angular frequency of the drive [rad/s]",
+                     y_label="displacement once per period [m]",
+                     names=[f"period {periods(branch)}" for branch in shown],
+                     beneath=replace(found, values=found.values[part], up=found.up[part],
+                                     down=found.down[part]),
+                     observe=("B", "y"), insets=insets)
 
 
 def main(folder: Path = Path("impact-orbits")) -> None:
@@ -224,12 +256,10 @@ def main(folder: Path = Path("impact-orbits")) -> None:
     count, others = covered(found, branches)
     print(f"\n{count} runs that repeat every 1, 2 or 4 periods are on these branches; others are "
           f"at {', '.join(f'{w:.1f}' for w in others)} rad/s.")
-    shown = [drawn(branch) for branch in branches]
-    fc.plot_branches(shown, folder / "impact_orbits.png", "observed_section",
-                     x_label="angular frequency of the drive [rad/s]",
-                     y_label="displacement once per period [m]",
-                     names=[f"period {periods(branch)}" for branch in shown],
-                     beneath=found, observe=("B", "y"))
+    draw(folder / "impact_orbits.png", branches, found, 5.0, 80.0,
+         [(1, 26.0), (2, 37.4), (1, 45.0), (1, 64.32)])
+    draw(folder / "impact_doublings.png", branches, found, 34.0, 41.5,
+         [(2, 36.0), (1, 37.4), (4, 39.0), (1, 39.5)], marked=True)
 
 
 if __name__ == "__main__":

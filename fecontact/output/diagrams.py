@@ -118,6 +118,7 @@ def branches_figure(
     axis.set_ylabel(y_label or _label(y, branches[0].name))
     axis.margins(x=0.02, y=0.06)
     axis.autoscale_view()
+    axis.ticklabel_format(axis="y", scilimits=(-3, 5))
     _mark(axis, known)
     draw_insets(figure, axis, insets)
     _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
@@ -161,7 +162,7 @@ def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
-    """Markers and letters; those of points close to another one point away from it."""
+    """Markers, and letters on the side where there is room; without where there is none."""
     special: list[tuple[str, str, float, float]] = []
     for kind, places in known.items():
         letters, marker = _SPECIAL.get(kind, ("", "."))
@@ -176,17 +177,24 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    to_axes = axis.transData + axis.transAxes.inverted()
-    seen = np.array([to_axes.transform((x, y)) for _, _, x, y in special]).reshape(-1, 2)
-    for index, (text, marker, x, y) in enumerate(special):
+    points = 72.0 / axis.figure.dpi
+    seen = axis.transData.transform([(x, y) for _, _, x, y in special] or np.empty((0, 2))) * points
+    taken: list[Array] = [np.concatenate([place - 4.0, place + 4.0]) for place in seen]
+    for (text, marker, x, y), place in zip(special, seen, strict=True):
         axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
                   linestyle="none", zorder=4)
-        away = seen[index] - np.delete(seen, index, axis=0)
-        near = away[np.abs(away).max(axis=1) < 0.06]
-        left, below = (near.sum(axis=0) < 0.0) if len(near) else (False, False)
-        axis.annotate(text, (x, y), xytext=(-6.0 if left else 6.0, -6.0 if below else 6.0),
-                      ha="right" if left else "left", va="top" if below else "bottom",
-                      textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
+        size = np.array([6.5 * len(text), 10.0])
+        for right, above in ((1, 1), (0, 0), (0, 1), (1, 0)):
+            side = np.array([right, above])
+            corner = place + 6.0 * (2 * side - 1) - (1 - side) * size
+            box = np.concatenate([corner, corner + size])
+            if any((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all() for other in taken):
+                continue
+            taken.append(box)
+            axis.annotate(text, (x, y), xytext=6.0 * (2 * side - 1),
+                          ha="left" if right else "right", va="bottom" if above else "top",
+                          textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
+            break
 
 
 def _legend(

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 import impact_orbits
 
 # States near orbits of one period, from which Newton's method finds them.
+NEAR_SINGLE = np.array([5.1745e-5, 6.98e-7, -5.14e-4, -8.89e-4])    # 39.2 rad/s
 NEAR_UNSTABLE = np.array([1.989e-5, -1.2e-6, 1.13e-3, 6.2e-4])     # 30.0166 rad/s
 NEAR_GRAZING = np.array([4.49523e-5, -2.348e-7, -1.77e-3, -1.08e-3])    # 33.7077 rad/s
 
@@ -39,19 +40,19 @@ def orbit_at(w, y):
 
 @pytest.fixture(scope="module")
 def branch():
-    """The orbit of one period about its last doubling."""
-    return impact_orbits.orbits(39.2, (38.95, 39.25), points=14)
+    """The orbit of one period about its last three doublings."""
+    return impact_orbits.orbits(39.2, (38.1, 39.25), initial=NEAR_SINGLE, points=30)
 
 
 def test_growth_beside_an_unstable_orbit_is_its_multiplier():
     w = 30.0166
     y, multipliers = orbit_at(w, NEAR_UNSTABLE)
     assert multipliers[0].real < -1.5
-    beside = rounds(w, y + np.array([1e-9, 0.0, 0.0, 0.0]), 10)
-    away = beside[:, 0] - y[0]
-    assert away[8] / away[7] == pytest.approx(multipliers[0].real, rel=2e-3)
-    # It is lost in the end, to a motion of another size.
-    assert np.ptp(rounds(w, y, 4, transient=200, rtol=1e-6)[:, 0]) > 1e-6
+    one, other = (rounds(w, y + away, 10)[:, 0] for away in (0.0, np.array([1e-11, 0, 0, 0])))
+    growth = (other - one)[1:] / (other - one)[:-1]
+    assert growth[5:8] == pytest.approx(multipliers[0].real, rel=2e-3)
+    # Runs from its neighbourhood end elsewhere.
+    assert np.ptp(rounds(w, y + 1e-8, 4, transient=200, rtol=1e-6)[:, 0]) > 1e-6
 
 
 def test_multipliers_are_continuous_at_a_grazing():
@@ -74,48 +75,46 @@ def test_multipliers_are_continuous_at_a_grazing():
 
 def test_a_doubling_is_where_runs_double(branch):
     """Above it one period, below two, apart by the square root of the distance."""
-    doubling, = branch.of_kind("period doubling")
-    assert doubling.parameter == pytest.approx(39.02833, abs=2e-5)
-    field = impact_orbits.field_at(39.0)
-    twice = doubled_by_shooting(field, branch, doubling, bounds=(39.0, 39.1),
-                                settings=Settings(step=2e-3, largest_step=0.02, points=20))
+    doubling = max(branch.of_kind("period doubling"), key=lambda point: point.parameter)
+    assert doubling.parameter == pytest.approx(39.02833, abs=5e-5)
+    twice = doubled_by_shooting(
+        impact_orbits.field_at(39.0), branch, doubling, bounds=(38.9, 39.1),
+        settings=Settings(step=2e-3, largest_step=5e-3, points=20))
     end = twice.points[-1]
-    assert end.parameter == pytest.approx(39.0, rel=1e-12)
+    assert end.parameter == pytest.approx(38.9, rel=1e-12)
     assert end.values["stable"]
     states = end.u[:-1].reshape(2, 4)
-    # A run from beside the doubled orbit comes to it: the multiplier is 0.96.
-    run = rounds(39.0, states[0] + 1e-7 * np.array([1.0, 0.0, 0.0, 0.0]), 2, transient=298,
-                 rtol=1e-8)
-    assert run[-2:] == pytest.approx(states[[1, 0]], abs=2e-9, rel=1e-4)
-    apart = {point.parameter: np.ptp(impact_orbits.section(point)) for point in twice.points}
-    near = {w: size for w, size in apart.items() if 1e-4 < doubling.parameter - w < 8e-3}
-    assert len(near) >= 2
-    squares = [size**2 / (doubling.parameter - w) for w, size in near.items()]
-    assert max(squares) < 1.15 * min(squares)
-    # Above, the single orbit draws runs that begin beside it.
-    above = next(point for point in branch.points if point.parameter > 39.15)
-    y = above.u[:4]
-    begun = rounds(above.parameter, y + np.array([1e-7, 0.0, 0.0, 0.0]), 1, transient=120,
-                   rtol=1e-8)
-    assert begun[-1] == pytest.approx(y, abs=2e-9, rel=1e-4)
+    # The multiplier is 0.88: runs from beside come to the doubled orbit.
+    run = rounds(38.9, states[0] + np.array([1e-6, 0.0, 0.0, 0.0]), 2, transient=200, rtol=1e-8)
+    assert run[:, 0] == pytest.approx(states[:, 0], rel=1e-5)
+    assert abs(run[1, 0] - run[0, 0]) > 1e-5
+    squares = [np.ptp(impact_orbits.section(point))**2 / (doubling.parameter - point.parameter)
+               for point in twice.points if 5e-4 < doubling.parameter - point.parameter < 0.01]
+    assert len(squares) >= 2
+    assert max(squares) < 1.1 * min(squares)
 
 
-def test_motions_of_one_and_two_periods_coexist():
-    """At 39.5 rad/s runs stay on either."""
-    w = 39.5
-    single = rounds(w, np.zeros(4), 4, transient=250, rtol=1e-7)
-    assert np.ptp(single[:, 0]) < 1e-9
+def test_motions_of_one_and_of_more_periods_coexist(branch):
+    """Above the doubling both draw runs; those from rest come to the other."""
+    above = min(branch.points, key=lambda point: abs(point.parameter - 39.2))
+    w, y = above.parameter, above.u[:4]
+    single = rounds(w, y + np.array([1e-6, 0.0, 0.0, 0.0]), 2, transient=250, rtol=1e-8)
+    assert single[:, 0] == pytest.approx(y[0], rel=1e-5)
+    other = rounds(w, np.zeros(4), 8, transient=250, rtol=1e-6)[:, 0]
+    assert other[4:] == pytest.approx(other[:4], rel=1e-4)
+    assert np.ptp(other) > 5e-5
 
 
-def test_a_loop_of_doubled_orbits_ends_where_it_is_single():
-    start = impact_orbits.orbits(39.2, (38.1, 39.25), points=30)
-    later, = (point for point in start.of_kind("period doubling") if point.parameter < 38.3)
-    first, = (point for point in start.of_kind("period doubling") if 38.4 < point.parameter < 38.6)
-    loop = doubled_by_shooting(impact_orbits.field_at(38.3), start, first, bounds=(38.1, 38.6),
+def test_a_loop_of_doubled_orbits_ends_where_it_is_single(branch):
+    later, first, _ = sorted(branch.of_kind("period doubling"), key=lambda point: point.parameter)
+    assert later.parameter == pytest.approx(38.18365, abs=1e-4)
+    assert first.parameter == pytest.approx(38.48943, abs=1e-4)
+    loop = doubled_by_shooting(impact_orbits.field_at(38.3), branch, first, bounds=(38.1, 38.6),
                                settings=Settings(step=2e-3, largest_step=0.02, points=30))
     end = loop.points[-1]
     assert end.kind == "period halving"
-    assert end.parameter == pytest.approx(later.parameter, abs=1e-5)
-    assert not loop.of_kind("fold")
+    assert end.parameter == pytest.approx(later.parameter, abs=1e-4)
+    assert end.values["multipliers"][0] == pytest.approx(1.0, abs=1e-4)
+    assert [point.kind for point in loop.special] == ["period halving"]
     one, other = end.u[:-1].reshape(2, 4)
     assert one == pytest.approx(other, rel=1e-12)
