@@ -27,7 +27,7 @@ import fecontact as fc
 from fecontact.bifurcation.branch import BranchPoint
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.problem import Settings
-from fecontact.errors import AnalysisError
+from fecontact.errors import FecontactError
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Start(NamedTuple):
 
 
 # The first two are parts of one branch.
-STARTS = (Start(42.0, "up", (23.5, 43.0), 560), Start(44.0, "up", (43.0, 80.0), 450),
+STARTS = (Start(42.0, "up", (23.5, 43.0), 400), Start(44.0, "up", (43.0, 80.0), 450),
           Start(30.0, "up", (26.0, 31.0), 170), Start(25.2, "up", (25.0, 29.0), 60))
 
 
@@ -97,14 +97,16 @@ def orbits(
 
 def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch | None:
     """The branch of twice the period that begins at a doubling, if it is found."""
-    low, high = 25.0, 80.0
-    try:
-        return fc.doubled_by_shooting(
-            field_at(doubling.parameter), branch, doubling, bounds=(low, high),
-            settings=Settings(step=2e-3, largest_step=0.02, points=points))
-    except AnalysisError as error:
-        print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {error}")
-        return None
+    # On branches that part slowly the first step must leave the single orbits' neighbourhood.
+    for step in (2e-3, 8e-3):
+        try:
+            return fc.doubled_by_shooting(
+                field_at(doubling.parameter), branch, doubling, bounds=(25.0, 80.0),
+                settings=Settings(step=step, largest_step=0.02, points=points))
+        except FecontactError as error:
+            problem = error
+    print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {problem}")
+    return None
 
 
 def periods(branch: fc.Branch) -> int:
@@ -136,7 +138,7 @@ def all_orbits(found: fc.BruteForce) -> list[fc.Branch]:
         try:
             return orbits(float(found.values[index]), start.bounds, initial=states[index, -1],
                           points=start.points)
-        except AnalysisError as error:
+        except FecontactError as error:
             print(f"No orbits from the run at {start.w} rad/s: {error}")
             return None
 
