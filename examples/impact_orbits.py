@@ -1,47 +1,57 @@
 """Impacts over the frequency of excitation: stable and unstable orbits over runs by brute force.
 
 The impact oscillator of W. Sextro, Dynamical Contact Problems with Friction, section 4.2: a
-pendulum that strikes a stop, with its first bending mode. The source shows single motions; here the
-periodic ones are followed over the frequency of the drive by shooting with the compiled integrator,
-stable or not, and lie over the diagram that runs give. Where nothing is solid the motion is
-chaotic, or has more periods.
+pendulum that strikes a stop, with its first bending mode. The source shows single motions. Here
+runs over the frequency of the drive show what is found, up and down; orbits of one, two and four
+periods are followed by shooting through what runs cannot see: the unstable orbit inside the chaos,
+the folds between which motions coexist, and the doublings. Each doubled branch is followed too.
 
-From some 41 rad/s on, runs from rest all lead to one motion of one period. Its stability ends at a
-grazing: the tip touches the stop once more, and a multiplier jumps instead of passing through the
-unit circle. Such points are no folds and no doublings; between which
-frequencies they lie is printed.
+Printed are all folds, doublings and torus bifurcations, and how many of the repeating runs lie on
+the branches.
 
-Usage: python examples/impact_orbits.py [FOLDER]      (prints and draws; a few minutes)
+Usage: python examples/impact_orbits.py [FOLDER]      (prints and draws; some minutes)
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import fecontact as fc
+from fecontact.bifurcation.branch import BranchPoint
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.problem import Settings
-from fecontact.errors import AnalysisError
+from fecontact.errors import FecontactError
+
+Array = NDArray[np.float64]
 
 FREQUENCY = "drive.angular_frequency"
 BENDING_HZ, BENDING_DAMPING, AMPLITUDE, MASS = 230.0, 0.03, 0.6, 0.092
-# Amplitudes of an orbit that count as one in the length of a step: its phase turns quickly.
-SIZE = 20.0
+# Amplitudes of an orbit, and rad/s, that count as one in the length of a step. The bending
+# vibration that an impact leaves turns by a radian within 0.1 to 0.3 rad/s of the drive.
+SIZE, WIDTH = 20.0, 25.0
+RTOL = 1e-7
+SAME = 2e-6  # m by which motions once a period may differ and be the same
 
 
-class Window(NamedTuple):
-    """A range of the drive's angular frequency [rad/s], and where orbits are started."""
+class Start(NamedTuple):
+    """A run, by its frequency [rad/s] and way, and how far the orbit on which it is is followed."""
 
-    low: float
-    high: float
-    starts: Sequence[float]
+    w: float
+    way: str
+    bounds: tuple[float, float]
+    points: int
 
 
-WINDOWS = {"fast": Window(55.0, 80.0, (64.32,)), "slow": Window(35.0, 46.0, (42.0, 36.5))}
+# The first two are parts of one branch.
+STARTS = (Start(42.0, "up", (23.5, 43.0), 400), Start(44.0, "up", (43.0, 80.0), 450),
+          Start(30.0, "up", (26.0, 31.0), 170), Start(25.2, "up", (25.0, 29.0), 60))
 
 
 def oscillator(w: float = 64.32) -> fc.ContactSystem:
@@ -62,85 +72,196 @@ def field_at(w: float) -> ContactField:
     return fc.contact_field(oscillator(w), {FREQUENCY: w})
 
 
-def orbits(w: float, low: float, high: float, *, points: int = 60, step: float = 0.02) -> fc.Branch:
+def runs() -> fc.BruteForce:
+    """States once per period, up and down; more values where motions change quickly."""
+    values = np.concatenate([np.arange(5.0, 12.0, 0.5), np.arange(12.0, 46.0, 0.2),
+                             np.arange(46.0, 80.5, 0.5)])
+    return fc.brute_force(oscillator(), FREQUENCY, values, transient=100, keep=24,
+                          initial=np.zeros(4))
+
+
+def orbits(
+    w: float, bounds: tuple[float, float], *, initial: Array | None = None, points: int = 60,
+) -> fc.Branch:
     """The branch through the orbit on which a run at w settles, to both sides."""
     field = field_at(w)
-    motion = fc.settled_motion(field.system(), initial=np.zeros(4), longest_period=16 * 0.2)
-    size = np.ptp(motion.states, axis=0) / 2.0
+    motion = fc.settled_motion(
+        field.system(), initial=np.zeros(4) if initial is None else initial,
+        transient=None if initial is None else 2.0 * np.pi / w, longest_period=8 * 2.0 * np.pi / w)
     return fc.orbits_by_shooting(
         field, FREQUENCY, motion.times, motion.states, periods=motion.periods,
-        segments=2 * motion.periods, bounds=(low, high), both=True, scales=SIZE * size,
-        settings=Settings(step=step, largest_step=0.05, points=points))
+        segments=motion.periods, bounds=bounds, both=True, rtol=RTOL,
+        scales=SIZE * np.ptp(motion.states, axis=0) / 2.0, width=WIDTH,
+        settings=Settings(step=1e-3, largest_step=0.01, points=points))
 
 
-def jumps(branch: fc.Branch) -> list[tuple[float, float]]:
-    """Neighbouring frequencies [rad/s] between which the stability changes at no special point."""
-    return [(one.parameter, other.parameter)
-            for one, other in pairwise(branch.points)
-            if one.kind is None and other.kind is None
-            and one.values["unstable"] != other.values["unstable"]]
-
-
-def with_doublings(branch: fc.Branch, *, points: int = 30) -> list[fc.Branch]:
-    """A branch, and those of twice the period that begin on it."""
-    field = field_at(float(branch.attributes["parameter_values"][0]))
-    found = [branch]
-    low, high = branch.parameter.min(), branch.parameter.max()
-    for doubling in branch.of_kind("period doubling"):
+def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch | None:
+    """The branch of twice the period that begins at a doubling, if it is found."""
+    # On branches that part slowly the first step must leave the single orbits' neighbourhood.
+    for step in (2e-3, 8e-3):
         try:
-            found.append(fc.doubled_by_shooting(
-                field, branch, doubling, bounds=(low, high),
-                settings=Settings(step=2e-3, largest_step=0.05, points=points)))
-        except AnalysisError as error:
-            print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {error}")
-    return found
+            return fc.doubled_by_shooting(
+                field_at(doubling.parameter), branch, doubling, bounds=(25.0, 80.0),
+                settings=Settings(step=step, largest_step=0.02, points=points))
+        except FecontactError as error:
+            problem = error
+    print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {problem}")
+    return None
 
 
-def runs(low: float, high: float, count: int, keep: int = 32) -> fc.BruteForce:
-    """States once per period, up and down."""
-    return fc.brute_force(oscillator(low), FREQUENCY, np.linspace(low, high, count),
-                          transient=150, keep=keep, initial=np.zeros(4))
-
-
-def described(branch: fc.Branch) -> str:
+def periods(branch: fc.Branch) -> int:
     """Periods of the drive in one of the orbit."""
-    return f"period {int(branch.attributes['periods'])}"
+    return int(branch.attributes["periods"])
+
+
+def section(point: BranchPoint) -> Array:
+    """Displacement (n,) of the tip [m] at the start of each period."""
+    return point.u[:-1].reshape(-1, 4)[:, :2] @ np.array([1.0, AMPLITUDE]) / np.sqrt(MASS)
+
+
+def place(point: BranchPoint) -> Array:
+    """Frequency [rad/s], and mean and extremes of the section in units of what is the same."""
+    y = section(point) / SAME
+    return np.array([point.parameter * 1e3, y.mean(), y.min(), y.max()])
+
+
+def known(point: BranchPoint, others: Sequence[Array]) -> bool:
+    """Whether the point is one of others, whatever the period in which each begins."""
+    return any(bool((np.abs(place(point) - other) < 1.0).all()) for other in others)
+
+
+def all_orbits(found: fc.BruteForce) -> list[fc.Branch]:
+    """Branches from the starts, those that double there, and those that double on these."""
+    def begun(start: Start) -> fc.Branch | None:
+        index = int(np.argmin(np.abs(found.values - start.w)))
+        states = found.up if start.way == "up" else found.down
+        try:
+            return orbits(float(found.values[index]), start.bounds, initial=states[index, -1],
+                          points=start.points)
+        except FecontactError as error:
+            print(f"No orbits from the run at {start.w} rad/s: {error}")
+            return None
+
+    with ThreadPoolExecutor(2) as pool:
+        branches = [branch for branch in pool.map(begun, STARTS) if branch is not None]
+        # Inside the chaos below 26 rad/s there are too many.
+        latest = [branch for branch in branches if periods(branch) == 1]
+        for points in (110, 40):
+            doublings, ends = [], []
+            for branch in latest:
+                for point in branch.of_kind("period doubling"):
+                    if point.parameter > 26.0 and not known(point, ends):
+                        doublings.append((branch, point))
+                        ends.append(place(point))
+            tried = pool.map(lambda pair, count=points: doubled(*pair, count), doublings)
+            latest, reached = [], []
+            for (_, doubling), branch in zip(doublings, tried, strict=True):
+                # The same branch from its other end.
+                if branch is None or known(doubling, reached):
+                    continue
+                latest.append(branch)
+                reached += [place(end) for end in branch.of_kind("period halving")]
+            branches += latest
+    return branches
+
+
+def special(branches: Sequence[fc.Branch]) -> Iterator[tuple[int, BranchPoint]]:
+    """Periods and point of all special points, once each."""
+    told: list[Array] = []
+    for branch in branches:
+        for point in branch.special:
+            if point.kind != "period halving" and not known(point, told):
+                told.append(place(point))
+                yield periods(branch), point
+
+
+def covered(found: fc.BruteForce, branches: Sequence[fc.Branch]) -> tuple[int, list[float]]:
+    """Runs that repeat after up to 4 periods on an orbit that is known, and where others are."""
+    count, others = 0, []
+    for states in (found.up, found.down):
+        for w, kept in zip(found.values, states, strict=True):
+            y = kept[:, :2] @ np.array([1.0, AMPLITUDE]) / np.sqrt(MASS)
+            n = next((n for n in (1, 2, 4) if np.abs(y[n:] - y[:-n]).max() < SAME / 10.0), None)
+            if n is None:
+                continue
+            if any(_meets(branch, float(w), np.sort(y[-n:])) for branch in branches
+                   if periods(branch) == n):
+                count += 1
+            else:
+                others.append(float(w))
+    return count, sorted(set(others))
+
+
+def _meets(branch: fc.Branch, w: float, y: Array) -> bool:
+    """Whether a branch has an orbit with this section at w, by chords between its points."""
+    for one, other in pairwise(branch.points):
+        if (one.parameter - w) * (other.parameter - w) <= 0.0:
+            part = (w - one.parameter) / ((other.parameter - one.parameter) or 1.0)
+            first, last = np.sort(section(one)), np.sort(section(other))
+            allowed = SAME + 0.1 * np.abs(last - first)
+            if (np.abs(first + part * (last - first) - y) < allowed).all():
+                return True
+    return False
+
+
+def pieces(branch: fc.Branch, low: float, high: float, marked: bool) -> list[fc.Branch]:
+    """What of a branch lies within a range, with its section; doublings stand on single orbits."""
+    found: list[list[BranchPoint]] = [[]]
+    for point in branch.points:
+        inside = low <= point.parameter <= high
+        if inside and (marked or point.kind in (None, "period halving")):
+            found[-1].append(replace(
+                point, kind=None if point.kind == "period halving" else point.kind,
+                values={**point.values, "observed_section": section(point)}))
+        elif not inside and found[-1]:
+            found.append([])
+    return [replace(branch, points=tuple(points)) for points in found if len(points) > 1]
+
+
+def draw(
+    path: Path, branches: Sequence[fc.Branch], found: fc.BruteForce, low: float, high: float,
+    chosen: Sequence[tuple[int, float]], marked: bool = False,
+) -> None:
+    """The diagram of a range, with phase planes of orbits of so many periods near some places."""
+    shown = sorted((piece for branch in branches for piece in pieces(branch, low, high, marked)),
+                   key=periods)
+    insets = []
+    for count, w in chosen:
+        point, branch = min(
+            ((point, branch) for branch in shown if periods(branch) == count
+             for point in branch.points if point.kind is None),
+            key=lambda pair: abs(pair[0].parameter - w))
+        kind = "" if point.values["stable"] else ", unstable"
+        insets.append(fc.phase_inset(field_at(w), branch, point, float(section(point)[0]),
+                                     ("B", "y"), f"{point.parameter:.2f} rad/s{kind}"))
+    part = (low <= found.values) & (found.values <= high)
+    fc.plot_branches(shown, path, "observed_section",
+                     x_label="angular frequency of the drive [rad/s]",
+                     y_label="displacement once per period [m]",
+                     names=[f"period {periods(branch)}" for branch in shown],
+                     beneath=replace(found, values=found.values[part], up=found.up[part],
+                                     down=found.down[part]),
+                     observe=("B", "y"), insets=insets)
 
 
 def main(folder: Path = Path("impact-orbits")) -> None:
-    """Follow, print and draw the orbits of both windows."""
+    """Run, follow, print and draw."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, (low, high, starts) in WINDOWS.items():
-        found: list[fc.Branch] = []
-        for w in starts:
-            try:
-                found += with_doublings(orbits(w, low, high))
-            except AnalysisError as error:
-                print(f"No orbits from {w} rad/s: {error}")
-        field = field_at(starts[0])
-        shown = [fc.observe(field, branch, "B", "y") for branch in found]
-        for branch in shown:
-            print(f"\n{described(branch)}: {branch.parameter.min():.4f} to "
-                  f"{branch.parameter.max():.4f} rad/s, {len(branch)} points. "
-                  f"{branch.status.value}")
-            for point in branch.special:
-                print(f"  {point.kind} at {point.parameter:.5f} rad/s")
-            for ends in jumps(branch):
-                print(f"  stability jumps between {min(ends):.5f} and {max(ends):.5f} rad/s")
-        insets: list[fc.Inset] = []
-        for branch in shown:
-            stable = [point for point in branch.points
-                      if point.values["stable"] and point.kind is None]
-            if stable and len(insets) < 4:
-                middle = stable[len(stable) // 2]
-                insets.append(fc.phase_inset(field, branch, middle,
-                                          float(middle.values["observed_section"][0]),
-                                          ("B", "y")))
-        fc.plot_branches(shown, folder / f"impact_{name}.png", "observed_section",
-                      x_label="angular frequency of the drive [rad/s]",
-                      y_label="displacement once per period [m]",
-                      names=[described(branch) for branch in shown],
-                      beneath=runs(low, high, 201), observe=("B", "y"), insets=insets)
+    found = runs()
+    branches = all_orbits(found)
+    for branch in branches:
+        print(f"period {periods(branch)}: {branch.parameter.min():.4f} to "
+              f"{branch.parameter.max():.4f} rad/s, {len(branch)} points. {branch.status.value}")
+    print("\nperiods  kind              rad/s")
+    for count, point in sorted(special(branches), key=lambda each: each[1].parameter):
+        print(f"{count:7d}  {point.kind or '':16s} {point.parameter:8.4f}")
+    count, others = covered(found, branches)
+    print(f"\n{count} runs that repeat every 1, 2 or 4 periods are on these branches; others are "
+          f"at {', '.join(f'{w:.1f}' for w in others)} rad/s.")
+    draw(folder / "impact_orbits.png", branches, found, 5.0, 80.0,
+         [(1, 26.0), (2, 37.4), (1, 45.0), (1, 64.32)])
+    draw(folder / "impact_doublings.png", branches, found, 34.0, 41.5,
+         [(2, 36.0), (1, 37.4), (4, 39.0), (1, 39.5)], marked=True)
 
 
 if __name__ == "__main__":

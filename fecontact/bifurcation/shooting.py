@@ -57,6 +57,9 @@ class Shooting(Problem):
         Periods of the forcing in one of the orbit.
     rtol : float
         Relative tolerance of the runs.
+    precision : float
+        Part of a step to which special points are located on it. Beyond this, runs whose steps
+        differ decide, and each further trial costs a run with derivatives.
     """
 
     field: ContactField
@@ -67,6 +70,7 @@ class Shooting(Problem):
     scales: Array
     periods: int = 1
     rtol: float = 1e-9
+    precision: float = 1e-7
 
     keeps_matrix: ClassVar[bool] = True
 

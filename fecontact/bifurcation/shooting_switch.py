@@ -1,12 +1,13 @@
 """Branches of orbits by shooting that begin on others: at Hopf points and period doublings."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation import orbit_starts
-from fecontact.bifurcation.branch import Branch, BranchPoint
+from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
@@ -15,9 +16,15 @@ from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.shooting import Shooting, Shot, shooting_from
-from fecontact.errors import InputError
+from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
+
+# How a branch of doubled orbits ends that comes back to single ones.
+_HALVING = "period halving"
+# Part of their largest distance below which the two halves of an orbit come together. Closer to
+# single orbits Newton's method finds either, as both solve the equations.
+_CLOSE = 0.1
 
 
 def restored_shooting(
@@ -90,7 +97,9 @@ def doubled_by_shooting(
     """The branch of orbits of twice the period that begins at a period doubling.
 
     They leave along the eigenvector of the multiplier -1, carried along the orbit; the second
-    round takes it with the other sign. The arguments are those of
+    round takes it with the other sign. Where the two rounds become the same again, at another
+    doubling of the single orbit, the branch ends with a point 'period halving': beyond it are the
+    same orbits with their halves exchanged. The arguments are those of
     :func:`fecontact.bifurcation.orbits.orbits_beyond`, the branch that of
     :func:`fecontact.bifurcation.shooting_branch.orbits_by_shooting`.
 
@@ -108,11 +117,92 @@ def doubled_by_shooting(
     attributes = {**branch.attributes, "parameter_values": problem.values,
                   "scales": twice.scales, "periods": twice.periods,
                   "segments": len(twice.mesh) - 1}
-    return follow(twice, start + chosen.step * tangent, chosen, name=branch.name, tangent=tangent,
-                  attributes=attributes)
+    stops = [chosen.stop_at] if isinstance(chosen.stop_at, str) else list(chosen.stop_at)
+    twice, start, tangent = twice.adapted(start + chosen.step * tangent, tangent)
+    found = follow(twice, start, replace(chosen, stop_at=[*stops, _HALVING]), name=branch.name,
+                   tangent=tangent, attributes=attributes)
+    return _ended(found, problem, chosen)
 
 
-def _doubled(problem: Shooting, u: Array) -> tuple[Shooting, Array, Array]:
+def _halves(u: Array, common: int) -> tuple[Array, Array]:
+    first, second = np.split(u[:-common], 2)
+    return first, second
+
+
+@dataclass(frozen=True, eq=False)
+class _Doubled(Shooting):
+    """Orbits of twice a period, with a test for those that come back to single ones.
+
+    ``apart`` (K d / 2,) is by how much the halves of the last orbit differed, ``largest`` the
+    largest length of such a difference so far.
+    """
+
+    apart: Array = field(default_factory=lambda: np.zeros(0))
+    largest: float = 0.0
+
+    def length(self, apart: Array) -> float:
+        """Length of a difference of the halves."""
+        return float(np.sqrt(self.weights()[: len(apart)] @ apart**2))
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[_Doubled, Array, Array]":
+        first, second = _halves(u, self.common)
+        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
+                       apart=first - second,
+                       largest=max(self.largest, self.length(first - second))), u, tangent
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        first, second = _halves(u, self.common)
+        along = self.weights()[: len(first)] * self.apart @ (first - second)
+        return {**super().tests(u, linearisation, tangent), _HALVING: float(
+            along / (self.length(self.apart) * self.largest) - _CLOSE)}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        return {} if kind == _HALVING else super().examine(kind, u, linearisation, tangent)
+
+
+def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
+    """The branch, with an end that comes back to single orbits located on these."""
+    points, common = branch.points, single.common
+    if branch.status is not Status.STOPPED or points[-1].kind != _HALVING or len(points) < 2:
+        return branch
+    before, last = points[-2:]
+    # The parameter is even in what parts the halves.
+    sizes = [float(np.sum(np.subtract(*_halves(point.u, common)) ** 2)) for point in (before, last)]
+    there = last.parameter + sizes[1] * (last.parameter - before.parameter) / (sizes[1] - sizes[0])
+    first, second = _halves(last.u, common)
+    tail = last.u[-common:].copy()
+    tail[:-1] /= 2.0
+    tail[-1] = there
+    near = _doublings_near(single, np.concatenate([(first + second) / 2.0, tail]), settings,
+                           abs(there - last.parameter), branch.name)
+    if not near:
+        return replace(branch, points=points[:-1])
+    closest = min(near, key=lambda point: abs(point.parameter - there))
+    start, tail = closest.u[:-common], closest.u[-common:].copy()
+    tail[:-1] *= 2.0
+    end = replace(last, u=np.concatenate([start, start, tail]), values={
+        **last.values, "period": 2.0 * closest.values["period"],
+        "multipliers": closest.values["multipliers"] ** 2})
+    return replace(branch, points=(*points[:-1], end))
+
+
+def _doublings_near(
+    single: Shooting, u: Array, settings: Settings, off: float, name: str
+) -> tuple[BranchPoint, ...]:
+    """Doublings of the single orbits, ``off`` or so in the parameter from that near u."""
+    step = max(4.0 * off / float(single.scales[-1]), settings.step)
+    low, high = settings.bounds
+    beside = replace(settings, step=step, largest_step=step, points=4, stop_at=(),
+                     bounds=(min(low, u[-1] - 20.0 * off), max(high, u[-1] + 20.0 * off)))
+    try:
+        return follow(single, u, beside, name=name, both=True).of_kind("period doubling")
+    except FecontactError:
+        return ()
+
+
+def _doubled(problem: Shooting, u: Array) -> tuple[_Doubled, Array, Array]:
     """The orbit run through twice, and the direction (of length one) in which it parts."""
     starts = problem.starts(u)
     rounds = [run.monodromy for run in Shot(problem, u).runs]
@@ -127,11 +217,12 @@ def _doubled(problem: Shooting, u: Array) -> tuple[Shooting, Array, Array]:
     mesh = np.concatenate([problem.mesh[:-1], 1.0 + problem.mesh]) / 2.0
     scales = problem.scales.copy()
     scales[-2] *= 2.0
-    twice = replace(problem, mesh=mesh, scales=scales, periods=2 * problem.periods)
     tail = u[-problem.common:].copy()
     if problem.autonomous:
         tail[0] *= 2.0
     start = np.concatenate([starts.reshape(-1), starts.reshape(-1), tail])
     shape = np.concatenate(carried)
+    twice = _Doubled(problem.field, problem.values, problem.free, mesh, problem.reference, scales,
+                     2 * problem.periods, problem.rtol)
     tangent = np.concatenate([shape, -shape, np.zeros(problem.common)])
     return twice, start, tangent / np.sqrt(twice.weights() @ tangent**2)

@@ -46,7 +46,7 @@ def plot_branches(
     Parameters
     ----------
     branches : Branch or sequence of Branch
-        Each gets its own colour.
+        Each gets its own colour, those of one name the same.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
     y, x : str, int or callable
@@ -57,7 +57,7 @@ def plot_branches(
     x_label, y_label : str, optional
         Labels of the axes, with units.
     names : sequence of str
-        Names of the branches for the legend.
+        Names of the branches for the legend, in which each name stands once.
     beneath : BruteForce, optional
         Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
         should be 'observed_section'.
@@ -94,11 +94,14 @@ def branches_figure(
     dots = draw_beneath(axis, beneath, observe)
     known: dict[str, list[tuple[float, float]]] = {}
     dashed = False
-    for number, branch in enumerate(branches):
+    groups = [*names[: len(branches)], *range(len(names), len(branches))]
+    colours = {group: COLOURS[number % len(COLOURS)]
+               for number, group in enumerate(dict.fromkeys(groups))}
+    for group, branch in zip(groups, branches, strict=True):
         places, curves = _values(branch, x), _values(branch, y, rows=True)
         stable = _stable_pieces(branch)
         dashed |= not stable.all()
-        colour = COLOURS[number % len(COLOURS)]
+        colour = colours[group]
         heights = curves if curves.ndim == 1 else curves[:, 0]
         for first, last in _runs(stable):
             axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
@@ -111,10 +114,10 @@ def branches_figure(
     axis.set_ylabel(y_label or _label(y, branches[0].name))
     axis.margins(x=0.02, y=0.06)
     axis.autoscale_view()
+    axis.ticklabel_format(axis="y", scilimits=(-3, 5))
     _mark(axis, known)
     draw_insets(figure, axis, insets)
-    _legend(axis, [COLOURS[k % len(COLOURS)] for k in range(len(branches))], names, known, dashed,
-            dots)
+    _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
     return figure
 
 
@@ -155,7 +158,7 @@ def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
-    """Markers and letters; those of points close to another one point away from it."""
+    """Markers, and letters on the side where there is room; without where there is none."""
     special: list[tuple[str, str, float, float]] = []
     for kind, places in known.items():
         letters, marker = _SPECIAL.get(kind, ("", "."))
@@ -170,27 +173,34 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    to_axes = axis.transData + axis.transAxes.inverted()
-    seen = np.array([to_axes.transform((x, y)) for _, _, x, y in special]).reshape(-1, 2)
-    for index, (text, marker, x, y) in enumerate(special):
+    points = 72.0 / axis.figure.dpi
+    seen = axis.transData.transform([(x, y) for _, _, x, y in special] or np.empty((0, 2))) * points
+    taken: list[Array] = [np.concatenate([place - 4.0, place + 4.0]) for place in seen]
+    for (text, marker, x, y), place in zip(special, seen, strict=True):
         axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
                   linestyle="none", zorder=4)
-        away = seen[index] - np.delete(seen, index, axis=0)
-        near = away[np.abs(away).max(axis=1) < 0.06]
-        left, below = (near.sum(axis=0) < 0.0) if len(near) else (False, False)
-        axis.annotate(text, (x, y), xytext=(-6.0 if left else 6.0, -6.0 if below else 6.0),
-                      ha="right" if left else "left", va="top" if below else "bottom",
-                      textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
+        size = np.array([6.5 * len(text), 10.0])
+        for right, above in ((1, 1), (0, 0), (0, 1), (1, 0)):
+            side = np.array([right, above])
+            corner = place + 6.0 * (2 * side - 1) - (1 - side) * size
+            box = np.concatenate([corner, corner + size])
+            if any((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all() for other in taken):
+                continue
+            taken.append(box)
+            axis.annotate(text, (x, y), xytext=6.0 * (2 * side - 1),
+                          ha="left" if right else "right", va="bottom" if above else "top",
+                          textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
+            break
 
 
 def _legend(
-    axis: "Axes", colours: Sequence[str], names: Sequence[str],
-    known: dict[str, list[tuple[float, float]]], dashed: bool, dots: Sequence[Any],
+    axis: "Axes", colours: dict[str, str], known: dict[str, list[tuple[float, float]]],
+    dashed: bool, dots: Sequence[Any],
 ) -> None:
     from matplotlib.lines import Line2D
 
     handles: list[Any] = [Line2D([], [], color=colour, linewidth=1.8, label=name)
-                          for colour, name in zip(colours, names, strict=False)]
+                          for name, colour in colours.items()]
     if dashed:
         handles.append(Line2D([], [], color="#303030", linewidth=1.8, label="stable"))
         handles.append(Line2D([], [], color="#303030", linewidth=1.2, linestyle=_DASHES,

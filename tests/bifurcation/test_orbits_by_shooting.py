@@ -79,7 +79,7 @@ def test_orbits_of_a_hopf_point_agree_with_collocation(two_masses):
 
 def test_the_drives_frequency_moves_the_ends_of_the_segments():
     """At the end of the range the orbit is the motion of a run that knows nothing of it."""
-    branch = impact_orbits.orbits(64.32, 64.3, 64.5, points=25, step=0.05)
+    branch = impact_orbits.orbits(64.32, (64.3, 64.5), points=25)
     field = impact_orbits.field_at(64.32)
     end = observe(field, branch, "B", "y").points[-1]
     assert end.parameter == pytest.approx(64.5, rel=1e-9)
