@@ -163,7 +163,7 @@ def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
 
 @helper
 def given_at(t, s, load):  # type: ignore[no-untyped-def]
-    """Fill load (m,) with the modal forces that are given in time; the ground's travel and speed."""
+    """Fill load (m,) with modal forces given in time; returns the ground's travel and speed."""
     m = len(load)
     drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
     drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]

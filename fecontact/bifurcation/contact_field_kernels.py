@@ -17,7 +17,6 @@ from fecontact.contact_kernels import (
     node_motion,
     rates_under,
 )
-from fecontact.laws.contract import signal_at
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix))
