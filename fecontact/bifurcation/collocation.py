@@ -101,17 +101,17 @@ class Collocation(Problem):
         """Number N of intervals."""
         return len(self.mesh) - 1
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number N m d of nodal unknowns."""
         return self.reference.size
 
-    @property
+    @cached_property
     def common(self) -> int:
         """Number of unknowns that all intervals share."""
         return len(self.active) + self.autonomous
 
-    @property
+    @cached_property
     def active(self) -> tuple[int, ...]:
         """Indices of the parameters that are unknowns, in their order in u."""
         return (self.free,) if self.second is None else (self.second, self.free)
@@ -139,10 +139,15 @@ class Collocation(Problem):
         """Times (N m,) of the Gauss points in [0, 1]."""
         return self._on_mesh[1]
 
-    @cached_property
+    @property
     def phase_row(self) -> Array:
         """Row (N m d,) of the phase condition."""
-        row = np.empty(self.size)
+        return self.phase_border[: self.size]
+
+    @cached_property
+    def phase_border(self) -> Array:
+        """The same over all unknowns."""
+        row = np.empty(self.size + self.common)
         fill_phase_row(self.reference, self.rule.weights, self.rule.values, self.rule.slopes, row)
         return row
 

@@ -32,7 +32,7 @@ def fill_mesh(mesh, points, scales, widths, times, weights):  # type: ignore[no-
 
 @kernel(types.void(matrix, vector, matrix, matrix, vector))
 def fill_phase_row(nodes, gauss_weights, values, slopes, row):  # type: ignore[no-untyped-def]
-    """Fill row (N m d,) with the nodes' weights in int <x, y'>, y with these nodes."""
+    """Fill row with the nodes' weights (N m d,) in int <x, y'>, y with these nodes, then zeros."""
     nodes, row = borrowed(nodes), borrowed(row)
     values, slopes = borrowed(values), borrowed(slopes)
     m = len(values)

@@ -1,5 +1,6 @@
 """Newton's method back to a branch, and what is made at the solution."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.corrector_kernels import improve, right_side, weighted_norm
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
-from fecontact.errors import AnalysisError
+from fecontact.errors import AnalysisError, FecontactError
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,10 @@ def corrected(
     for, of the solution itself. The number of steps is that which a new matrix would have taken.
     """
     if known is not None and problem.keeps_matrix:
-        found = _iterated(problem, guess, row, tolerance, iterations, known, exact)
+        try:
+            found = _iterated(problem, guess, row, tolerance, iterations, known, exact)
+        except FecontactError:
+            found = None
         if found is not None:
             return found
     return _iterated(problem, guess, row, tolerance, iterations, None, exact)
@@ -67,7 +71,7 @@ def _iterated(
         change = steps[count_kept]
         if count > 2 and size > before and before <= _ROUNDING * scale:
             return u, linearisation, count
-        if not np.isfinite(size) or (count > 2 - more and size > before):
+        if not math.isfinite(size) or (count > 2 - more and size > before):
             return None
         u = u + change
         if kept is None and size <= tolerance * scale:

@@ -47,7 +47,7 @@ class Linearised:
             f = problem.field.rates(self._times, self._x, problem.parameters(self.u))
         out = np.empty(problem.size + problem.autonomous)
         fill_residual(self._slopes, f, problem.widths, self.period,
-                      problem.phase_row if problem.autonomous else self.u, self.u, out)
+                      problem.phase_border if problem.autonomous else self.u, self.u, out)
         return out
 
     @property
@@ -97,8 +97,7 @@ class Linearised:
 
     @cached_property
     def _phase(self) -> "Border":
-        row = np.concatenate([self.problem.phase_row, np.zeros(self.problem.common)])
-        return Border(self.factors, row)
+        return Border(self.factors, self.problem.phase_border)
 
     def with_rows(self, rows: list[Array]) -> Bordered:
         """The matrix [[G_u], [row], [row], ...]."""

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from collocation_fields import settled
 
+from fecontact.bifurcation import elimination
 from fecontact.bifurcation.collocation import Collocation
+from fecontact.bifurcation.continuation import continuation
 from fecontact.bifurcation.interpolation import (
     equidistributed,
     extremes,
@@ -158,6 +160,55 @@ def test_mesh_goes_where_the_solution_is_steep():
     assert mesh[0] == 0.0
     assert mesh[-1] == 1.0
     assert np.diff(mesh).min() > 0.0
+
+
+def test_guess_is_bent_like_the_branch(landau):
+    """Third order in the step, where the tangent alone is of second; circles of radius sqrt(r)."""
+    mesh = np.linspace(0.0, 1.0, 31)
+    problem, _ = orbit_on(landau, mesh, 4)
+    t = 2.0 * np.pi * node_times(mesh, 4)
+    circle = np.stack([np.cos(t), np.sin(t)], axis=1).reshape(-1)
+
+    def orbit(radius):
+        return np.concatenate([radius * circle, [np.pi, radius**2]])
+
+    def tangent(radius):
+        return np.concatenate([circle, [0.0, 2.0 * radius]]) / np.sqrt(1.0 + 4.0 * radius**2)
+
+    def error(step, guess):
+        radii = 0.7 + step * np.linspace(0.3, 1.2, 2001)
+        return min(np.sqrt(problem.weights() @ (guess - orbit(radius)) ** 2) for radius in radii)
+
+    bent, straight = [], []
+    for step in (0.1, 0.05):
+        first, _, _ = problem.adapted(orbit(0.7 - step), tangent(0.7 - step))
+        here, _, _ = first.adapted(orbit(0.7), tangent(0.7))
+        bent.append(error(step, here.predicted(orbit(0.7), tangent(0.7), step)))
+        straight.append(error(step, orbit(0.7) + step * tangent(0.7)))
+    assert bent[1] < bent[0] / 6.0
+    assert straight[0] / 5.0 < straight[1] < straight[0] / 3.0
+    assert bent[1] < 0.25 * straight[1]
+
+
+def test_one_factorisation_an_orbit(landau, monkeypatch):
+    """The matrix of the neighbour serves on the way to the next orbit."""
+    made = []
+    condense = elimination.condense
+
+    def counted(*arguments):
+        made.append(1)
+        condense(*arguments)
+
+    monkeypatch.setattr(elimination, "condense", counted)
+    problem, u = orbit_on(landau, np.linspace(0.0, 1.0, 21), 4)
+    made.clear()
+    settings = Settings(step=0.02, largest_step=0.02, points=30, locate=False)
+    points = list(continuation(problem, u, settings))
+    assert len(points) == 30
+    for point in points:
+        radius = np.linalg.norm(problem.nodes(point.u), axis=1)
+        assert radius == pytest.approx(np.sqrt(point.parameter), rel=1e-5)
+    assert len(made) <= 36
 
 
 def test_extremes_lie_between_the_nodes():
