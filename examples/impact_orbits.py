@@ -104,8 +104,8 @@ def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch 
                 field_at(doubling.parameter), branch, doubling, bounds=(25.0, 80.0),
                 settings=Settings(step=step, largest_step=0.02, points=points))
         except FecontactError as error:
-            problem = error
-    print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {problem}")
+            why = error
+    print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {why}")
     return None
 
 
@@ -195,7 +195,7 @@ def covered(found: fc.BruteForce, branches: Sequence[fc.Branch]) -> tuple[int, l
 def _meets(branch: fc.Branch, w: float, y: Array) -> bool:
     """Whether a branch has an orbit with this section at w, by chords between its points."""
     for one, other in pairwise(branch.points):
-        if (one.parameter - w) * (other.parameter - w) <= 0.0:
+        if (one.parameter - w) * (other.parameter - w) <= 1e-12:
             part = (w - one.parameter) / ((other.parameter - one.parameter) or 1.0)
             first, last = np.sort(section(one)), np.sort(section(other))
             allowed = SAME + 0.1 * np.abs(last - first)
