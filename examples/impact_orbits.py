@@ -97,8 +97,8 @@ def orbits(
 
 def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch | None:
     """The branch of twice the period that begins at a doubling, if it is found."""
-    # On branches that part slowly the first step must leave the single orbits' neighbourhood.
-    for step in (2e-3, 8e-3):
+    # Close to the single orbit the runs are not exact enough, far from it the guess is not.
+    for step in (5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4):
         try:
             return fc.doubled_by_shooting(
                 field_at(doubling.parameter), branch, doubling, bounds=(25.0, 80.0),
@@ -144,25 +144,31 @@ def all_orbits(found: fc.BruteForce) -> list[fc.Branch]:
 
     with ThreadPoolExecutor(2) as pool:
         branches = [branch for branch in pool.map(begun, STARTS) if branch is not None]
-        # Inside the chaos below 26 rad/s there are too many.
         latest = [branch for branch in branches if periods(branch) == 1]
         for points in (110, 40):
-            doublings, ends = [], []
-            for branch in latest:
-                for point in branch.of_kind("period doubling"):
-                    if point.parameter > 26.0 and not known(point, ends):
-                        doublings.append((branch, point))
-                        ends.append(place(point))
-            tried = pool.map(lambda pair, count=points: doubled(*pair, count), doublings)
-            latest, reached = [], []
-            for (_, doubling), branch in zip(doublings, tried, strict=True):
-                # The same branch from its other end.
-                if branch is None or known(doubling, reached):
-                    continue
-                latest.append(branch)
-                reached += [place(end) for end in branch.of_kind("period halving")]
+            latest = all_doubled(pool, latest, points)
             branches += latest
     return branches
+
+
+def all_doubled(
+    pool: ThreadPoolExecutor, branches: Sequence[fc.Branch], points: int
+) -> list[fc.Branch]:
+    """Branches from all doublings of others; inside the chaos below 26 rad/s there are too many."""
+    doublings: list[tuple[fc.Branch, BranchPoint]] = []
+    for branch in branches:
+        for point in branch.of_kind("period doubling"):
+            if point.parameter > 26.0 and not known(point, [place(one) for _, one in doublings]):
+                doublings.append((branch, point))
+    tried = pool.map(lambda pair: doubled(*pair, points), doublings)
+    found: list[fc.Branch] = []
+    reached: list[Array] = []
+    for (_, doubling), branch in zip(doublings, tried, strict=True):
+        # A branch that ends at this doubling is the same.
+        if branch is not None and not known(doubling, reached):
+            found.append(branch)
+            reached += [place(end) for end in branch.of_kind("period halving")]
+    return found
 
 
 def special(branches: Sequence[fc.Branch]) -> Iterator[tuple[int, BranchPoint]]:
