@@ -7,7 +7,7 @@ periods are followed by shooting through what runs cannot see: the unstable orbi
 the folds between which motions coexist, and the doublings. Each doubled branch is followed too.
 
 Printed are all folds, doublings and torus bifurcations, and how many of the repeating runs lie on
-the branches.
+the branches; docs/impacts.md says what they mean.
 
 Usage: python examples/impact_orbits.py [FOLDER]      (prints and draws; some minutes)
 """
@@ -233,10 +233,11 @@ def draw(
                    key=periods)
     insets = []
     for count, w in chosen:
-        point, branch = min(
-            ((point, branch) for branch in shown if periods(branch) == count
-             for point in branch.points if point.kind is None),
-            key=lambda pair: abs(pair[0].parameter - w))
+        there = [(point, branch) for branch in shown if periods(branch) == count
+                 for point in branch.points if point.kind is None]
+        if not there:
+            continue
+        point, branch = min(there, key=lambda pair: abs(pair[0].parameter - w))
         kind = "" if point.values["stable"] else ", unstable"
         insets.append(fc.phase_inset(field_at(w), branch, point, float(section(point)[0]),
                                      ("B", "y"), f"{point.parameter:.2f} rad/s{kind}"))
@@ -265,7 +266,7 @@ def main(folder: Path = Path("impact-orbits")) -> None:
     print(f"\n{count} runs that repeat every 1, 2 or 4 periods are on these branches; others are "
           f"at {', '.join(f'{w:.1f}' for w in others)} rad/s.")
     draw(folder / "impact_orbits.png", branches, found, 5.0, 80.0,
-         [(1, 26.0), (2, 37.4), (1, 45.0), (1, 64.32)])
+         [(1, 26.0), (2, 36.0), (1, 45.0), (1, 64.32)])
     draw(folder / "impact_doublings.png", branches, found, 34.0, 41.5,
          [(2, 36.0), (1, 37.4), (4, 39.0), (1, 39.5)], marked=True)
 
