@@ -163,14 +163,23 @@ class _Doubled(Shooting):
 
 
 def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
-    """The branch, with an end that comes back to single orbits located on these."""
-    points, common = branch.points, single.common
-    if branch.status is not Status.STOPPED or points[-1].kind != _HALVING or len(points) < 2:
+    """The branch, with an end that comes back to single orbits located on these.
+
+    Where that was passed in one step, what follows are single orbits, and is left out.
+    """
+    common = single.common
+    weights = single.weights()[:-common]
+    sizes = np.array([np.sqrt(weights @ np.subtract(*_halves(point.u, common)) ** 2)
+                      for point in branch.points])
+    close = np.flatnonzero(sizes <= 1.1 * _CLOSE * np.maximum.accumulate(sizes))
+    if not len(close):
         return branch
+    points = branch.points[: close[0] + 1]
+    branch = replace(branch, status=Status.STOPPED, message="")
     before, last = points[-2:]
     # The parameter is even in what parts the halves.
-    sizes = [float(np.sum(np.subtract(*_halves(point.u, common)) ** 2)) for point in (before, last)]
-    there = last.parameter + sizes[1] * (last.parameter - before.parameter) / (sizes[1] - sizes[0])
+    one, other = sizes[close[0] - 1 : close[0] + 1] ** 2
+    there = last.parameter + other * (last.parameter - before.parameter) / (other - one)
     first, second = _halves(last.u, common)
     tail = last.u[-common:].copy()
     tail[:-1] /= 2.0
@@ -182,7 +191,7 @@ def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
     closest = min(near, key=lambda point: abs(point.parameter - there))
     start, tail = closest.u[:-common], closest.u[-common:].copy()
     tail[:-1] *= 2.0
-    end = replace(last, u=np.concatenate([start, start, tail]), values={
+    end = replace(last, kind=_HALVING, u=np.concatenate([start, start, tail]), values={
         **last.values, "period": 2.0 * closest.values["period"],
         "multipliers": closest.values["multipliers"] ** 2})
     return replace(branch, points=(*points[:-1], end))

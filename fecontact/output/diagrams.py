@@ -187,7 +187,7 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
             if any((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all() for other in taken):
                 continue
             taken.append(box)
-            axis.annotate(text, (x, y), xytext=6.0 * (2 * side - 1),
+            axis.annotate(text, (x, y), xytext=(12.0 * right - 6.0, 12.0 * above - 6.0),
                           ha="left" if right else "right", va="bottom" if above else "top",
                           textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
             break

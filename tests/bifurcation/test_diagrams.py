@@ -59,6 +59,26 @@ def test_quantities_and_numbers_of_points():
         branches_figure([BRANCH], "state")
 
 
+def test_branches_of_one_name_share_colour_and_entry():
+    above = Branch("p", (point(0.0, 7.0, True), point(1.0, 8.0, True)))
+    axis = branches_figure([BRANCH, above, above], 0, names=["a", "b", "a"]).axes[0]
+    first, *_, other, again = (line.get_color() for line in axis.lines
+                               if line.get_linestyle() != "None")
+    assert first == again != other
+    assert [text.get_text() for text in axis.get_legend().get_texts()][:3] == [
+        "a", "b", "stable"]
+
+
+def test_letters_are_left_out_where_there_is_no_room():
+    crowd = tuple(point(1.0 + 1e-4 * k, 2.0 + 1e-4 * k, True, "fold") for k in range(9))
+    far = (point(0.0, 0.0, True), *crowd, point(3.0, 3.0, True, "fold"))
+    axis = branches_figure([Branch("p", far)], 0).axes[0]
+    assert len([line for line in axis.lines if line.get_marker() == "s"]) == 10
+    letters = [text.get_text() for text in axis.texts]
+    assert "F10" in letters
+    assert 2 <= len(letters) <= 5
+
+
 def test_flutter_shows_frequencies_that_meet(tmp_path):
     field = contact_field(mode_coupling(0.1), ["friction.friction_coefficient"])
     branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(0.0, 1.0))
