@@ -1,7 +1,9 @@
 """Periodic orbits of contact systems by multiple shooting with the compiled integrator."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,11 +20,15 @@ from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
 from fecontact.integrate.trajectory import Status
+from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
 
 # Times at which the states of a segment are kept, for their extremes.
 _SAMPLES = 33
+# Errors of one step of the derivatives, in those of the run, and at most. The derivatives of the
+# steps taken are exact; that they are those of the motion too matters to multipliers alone.
+_LOOSER, _LOOSEST = 1e5, 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +133,7 @@ class Shooting(Problem):
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""
         stability = linearisation.floquet
-        states = np.concatenate([run.states for run in linearisation.runs])
+        states = linearisation.paths.reshape(-1, self.field.dimension)
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh,
@@ -187,29 +193,39 @@ class Shot:
         problem = self.problem
         values = problem.parameters(self.u)
 
-        def system_at(_: Any, value: float) -> Any:
+        @cache
+        def moved(value: float) -> ContactSystem:
             beside = values.copy()
             beside[problem.free] = value
             return problem.field.system(beside)
 
-        return [sensitivity(self._system, float(end), t_start=float(begin), initial=start,
-                            outputs=_SAMPLES, parameter=(system_at, float(self.u[-1])),
-                            rtol=problem.rtol)
-                for start, begin, end in zip(problem.starts(self.u), self._times[:-1],
-                                             self._times[1:], strict=True)]
+        def run(start: Array, begin: float, end: float) -> Sensitivity:
+            return sensitivity(self._system, float(end), t_start=float(begin), initial=start,
+                               parameter=(lambda _, value: moved(value), float(self.u[-1])),
+                               rtol=problem.rtol,
+                               derivative_rtol=min(_LOOSER * problem.rtol, _LOOSEST))
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return list(pool.map(run, problem.starts(self.u), self._times[:-1], self._times[1:]))
 
     @cached_property
-    def _ends(self) -> Array:
-        if "runs" in self.__dict__:
-            return np.array([run.states[-1] for run in self.runs])
-        found = ensemble(self._system, np.stack([self._times[:-1], self._times[1:]], axis=1),
-                         initial=self.problem.starts(self.u), rtol=self.problem.rtol)
+    def paths(self) -> Array:
+        """States (K, samples, d) of the segments, from start to end."""
+        times = np.linspace(self._times[:-1], self._times[1:], _SAMPLES, axis=1)
+        found = ensemble(self._system, times, initial=self.problem.starts(self.u),
+                         rtol=self.problem.rtol)
         if not found.finished.all():
             status = found.status[int(np.argmin(found.finished))]
             if status is Status.INTERRUPTED:
                 raise KeyboardInterrupt
             raise AnalysisError(f"The run of a segment did not reach its end: {status.value}")
-        return found.states[:, -1]
+        return found.states
+
+    @cached_property
+    def _ends(self) -> Array:
+        if "runs" in self.__dict__:
+            return np.array([run.states[-1] for run in self.runs])
+        return self.paths[:, -1]
 
     @cached_property
     def residual(self) -> Array:
