@@ -28,7 +28,9 @@ Array = NDArray[np.float64]
 _SAMPLES = 33
 # Errors of one step of the derivatives, in those of the run, and at most. The derivatives of the
 # steps taken are exact; that they are those of the motion too matters to multipliers alone.
-_LOOSER, _LOOSEST = 1e5, 1e-2
+_LOOSER, _LOOSEST = 1e6, 1e-2
+# A guess is not bent by more than this part of its step.
+_MOST_BENT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,8 @@ class Shooting(Problem):
         Periods of the forcing in one of the orbit.
     rtol : float
         Relative tolerance of the runs.
+    before, bend
+        The orbit before with the tangent there, and the tangent's derivative along the branch.
     """
 
     field: ContactField
@@ -73,6 +77,8 @@ class Shooting(Problem):
     scales: Array
     periods: int = 1
     rtol: float = 1e-9
+    before: tuple[Array, Array] | None = None
+    bend: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -121,10 +127,24 @@ class Shooting(Problem):
         nodal = (np.diff(self.mesh)[:, None] / self.scales[:d] ** 2).reshape(-1)
         return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
 
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """Along the tangent, and bent like the step before."""
+        guess = u + step * tangent
+        if self.bend is None:
+            return guess
+        aside = 0.5 * step * step * self.bend
+        size = float(np.sqrt(self.weights() @ aside**2))
+        return guess if size > _MOST_BENT * step else guess + aside
+
     def adapted(self, u: Array, tangent: Array) -> "tuple[Shooting, Array, Array]":
         """The problem for the next step: the phase fixed by u."""
-        return replace(self, reference=self.starts(u)[0].copy(),
-                       values=self.parameters(u)), u, tangent
+        bend = None
+        if self.before is not None:
+            start, direction = self.before
+            length = float(self.weights() * direction @ (u - start))
+            bend = (tangent - direction) / length if length > 0.0 else None
+        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
+                       before=(u, tangent), bend=bend), u, tangent
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
