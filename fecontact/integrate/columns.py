@@ -1,8 +1,8 @@
 """Stages of the columns of derivatives in a step of the integrator.
 
-With the derivatives of the node forces ``inside``, at a stage, and ``ahead``, along it, see
-:mod:`fecontact.integrate.variation`. Without internal variables all columns go at once, by dense
-matrices of the size of the modes; else each goes from node to node.
+The stage systems are those of :mod:`fecontact.integrate.variation`, with the derivatives of the
+node forces ``inside`` a stage and ``ahead``, along it. Without internal variables all columns go at
+once, by dense matrices of the size of the modes; else each goes from node to node.
 """
 
 import numpy as np

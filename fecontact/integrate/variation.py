@@ -49,6 +49,12 @@ class Variation(NamedTuple):
     tolerance, faded : float
         Error of a column in a step that is allowed, in units of its size; of the part ``faded``
         of the largest size that it has had where it is smaller.
+    moved, right : (k, size) arrays
+        X_i and the right sides of a stage, column by column.
+    pushed, bent : (k, m) arrays
+        Accelerations by X_i and by H_i; solutions u_v.
+    inside_matrix, ahead_matrix, solver : (m, 2 m) arrays
+        What makes these of X_i, x and the right sides.
     """
 
     columns: Array
@@ -101,9 +107,10 @@ def variation_for(
         least[-1] = 0.1 * MOVE * 2.0 / (width * faded)
     return Variation(start, np.zeros((columns, size)), np.tile(least, (2, 1)), least,
                      np.zeros((rodas.STAGES * columns, size)), tolerance, faded,
-                     np.zeros((columns, size)), *np.zeros((2, columns, modes)),
-                     np.zeros((columns, size)), *np.zeros((3, modes, 2 * modes)),
-                     np.zeros((7, size)),
+                     np.zeros((columns, size)), np.zeros((columns, modes)),
+                     np.zeros((columns, modes)), np.zeros((columns, size)),
+                     np.zeros((modes, 2 * modes)), np.zeros((modes, 2 * modes)),
+                     np.zeros((modes, 2 * modes)), np.zeros((7, size)),
                      np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(motion.GIVEN),
                      np.zeros(modes), np.zeros(modes), *room)
 
