@@ -70,7 +70,7 @@ def stick_slip(speed: float, transient: float = 2.0) -> fc.SettledMotion:
 
 
 def orbits(motion: fc.SettledMotion, speed: float, bounds: tuple[float, float],
-           points: int = 60, both: bool = True) -> fc.Branch:
+           points: int = 100, both: bool = True) -> fc.Branch:
     """Stick-slip orbits by shooting from that of a run on, to slow and to fast belts."""
     return fc.orbits_by_shooting(
         fc.contact_field(beam(speed), {SPEED: speed}), SPEED, motion.times, motion.states,
@@ -79,7 +79,7 @@ def orbits(motion: fc.SettledMotion, speed: float, bounds: tuple[float, float],
 
 
 def slipping(branch: fc.Branch, motion: fc.SettledMotion, fastest: float,
-             points: int = 60) -> fc.Branch:
+             points: int = 100) -> fc.Branch:
     """Orbits without stick that are born where steady sliding ends."""
     field = fc.contact_field(beam(fastest), {SPEED: fastest})
     hopf, = branch.of_kind("Hopf")
@@ -96,8 +96,8 @@ def scales(motion: fc.SettledMotion) -> NDArray[np.float64]:
 
 
 def settings(points: int) -> Settings:
-    """Steps of the branches; they end where only tiny ones would go on."""
-    return Settings(step=0.01, smallest_step=5e-4, largest_step=0.2, points=points, locate=False)
+    """Steps of the branches: short ones find the folds; they end where only tiny ones go on."""
+    return Settings(step=0.01, smallest_step=5e-4, largest_step=0.03, points=points, locate=False)
 
 
 def seen(branch: fc.Branch) -> fc.Branch:
@@ -117,8 +117,19 @@ def run_amplitude(motion: fc.SettledMotion) -> float:
     return 500.0 * float(np.ptp(motion.states @ row))
 
 
+def side_by_side(branch: fc.Branch, speed: float) -> list[fc.SettledMotion]:
+    """Runs at a speed, begun on orbits before and behind the unstable part of the branch."""
+    unstable = np.flatnonzero(~branch.column("stable").astype(bool))
+    if len(unstable) == 0:
+        return []
+    parts = branch.points[: unstable[0]], branch.points[unstable[-1] + 1 :]
+    starts = (min(part, key=lambda point: abs(point.parameter - speed)).u[:-2] for part in parts)
+    return [fc.settled_motion(beam(speed), initial=np.ascontiguousarray(start), transient=3.0,
+                              longest_period=0.3, rtol=1e-7) for start in starts]
+
+
 def draw(path: Path, stuck_slip: fc.Branch, free: fc.Branch, hopf: BranchPoint,
-         runs: dict[float, fc.SettledMotion]) -> None:
+         runs: list[tuple[float, fc.SettledMotion]]) -> None:
     """Amplitude and period over the speed of the belt: stable solid, unstable dashed, runs dots."""
     import matplotlib.pyplot as plt
 
@@ -136,9 +147,8 @@ def draw(path: Path, stuck_slip: fc.Branch, free: fc.Branch, hopf: BranchPoint,
                       label="stick-slip" if branch is stuck_slip else None)
             axis.plot(speed, np.where(unstable, y, np.nan), "--", color=colour,
                       label="without stick" if branch is free else None)
-        values = [run_amplitude(run) if axis is axes[0] else 1e3 * run.period
-                  for run in runs.values()]
-        axis.plot(1e3 * np.array(list(runs)), values, "k.", label="runs")
+        values = [run_amplitude(run) if axis is axes[0] else 1e3 * run.period for _, run in runs]
+        axis.plot([1e3 * speed for speed, _ in runs], values, "k.", label="runs")
         axis.set_xlabel("speed of the belt [mm/s]")
         axis.set_ylabel("amplitude of B [mm]" if axis is axes[0] else "period [ms]")
     axes[0].plot([1e3 * hopf.parameter, 320.0], [0.0, 0.0], color="C2", label="steady sliding")
@@ -155,17 +165,19 @@ def main(path: Path) -> None:
     hopf, = steady.of_kind("Hopf")
     print(f"Steady sliding is stable above {1e3 * hopf.parameter:.4f} mm/s; there a vibration of "
           f"{hopf.details['frequency_hz']:.2f} Hz begins, {hopf.details['criticality']}.")
-    runs = {speed: stick_slip(speed) for speed in (0.03, 0.05, 0.08, 0.12, 0.16, 0.2, 0.24, 0.27)}
-    branch = seen(orbits(runs[0.05], 0.05, bounds=(0.025, 0.3)))
-    free = seen(slipping(steady, runs[0.05], fastest=0.14))
+    first = stick_slip(0.05)
+    branch = seen(orbits(first, 0.05, bounds=(0.025, 0.3)))
+    free = seen(slipping(steady, first, fastest=0.12))
+    runs = [(speed, stick_slip(speed)) for speed in (0.03, 0.08, 0.12, 0.16, 0.2, 0.24, 0.27)]
+    runs += [(0.05, first), *((0.04, run) for run in side_by_side(branch, 0.04))]
     for name, each in (("Stick-slip", branch), ("Without stick", free)):
-        print(f"{name}: {len(each)} points, {each.status.value} {each.message}")
+        print(f"{name}: {len(each)} points")
         for point in each.points:
             largest = np.sort(np.abs(point.values["multipliers"]))[::-1][:3]
             print(f"  {1e3 * point.parameter:9.4f} mm/s: {1e3 * point.values['period']:.5f} ms, B "
                   f"{amplitude(point):.4f} mm, multipliers {largest.round(4)}, "
                   f"{'stable' if point.values['stable'] else 'unstable'}")
-    for speed, run in runs.items():
+    for speed, run in runs:
         print(f"A run at {1e3 * speed:g} mm/s: {1e3 * run.period:.4f} ms, B "
               f"{run_amplitude(run):.4f} mm")
     draw(path, branch, free, hopf, runs)
