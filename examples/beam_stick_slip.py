@@ -1,22 +1,24 @@
-"""A steel beam on a belt, 40 contact nodes and 20 modes: from steady sliding to stick-slip.
+"""A steel beam on a belt, 40 contact nodes, 20 modes: steady sliding, stick-slip, what parts them.
 
-Friction that falls with slip velocity makes steady sliding unstable below some belt speed. There a
-stick-slip orbit is born unstable (the bifurcation is subcritical), so that stable stick-slip is
-found by a run that begins stuck to the belt, also far above that speed. The orbit is then taken to
-shooting with the compiled integrator, which has its multipliers.
+Friction that falls with slip velocity makes steady sliding unstable below some belt speed. There
+orbits without stick are born, unstable (the bifurcation is subcritical): a push that is larger
+than theirs makes the beam stick. Stable stick-slip is found by a run that begins stuck to the belt,
+and followed over the belt's speed by shooting with the compiled integrator. Its end on the fast
+side is where the beam only just sticks: there the unstable orbits meet it. On the slow side elastic
+vibration that is left from the slip before decides when the beam lets go; the branch folds twice,
+and between the folds two stick-slip motions exist side by side.
 
-A point of that branch takes some ten seconds: 40 states whose derivatives are carried along, over
-thousands of steps. Below some 0.02 m/s more of them are needed than are worth it: elastic vibration
-that is left from the slip before decides when the beam lets go, and the period wavers with the
-speed. Runs do there: their periods are printed too.
-
-Usage: python examples/beam_stick_slip.py      (prints; about a minute)
+Usage: python examples/beam_stick_slip.py [FILE.png]      (prints and draws; some two minutes)
 """
+
+import sys
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
+from fecontact.bifurcation.branch import BranchPoint
 from fecontact.bifurcation.problem import Settings
 from fecontact.integrate.initial import initial_state
 
@@ -67,35 +69,119 @@ def stick_slip(speed: float, transient: float = 2.0) -> fc.SettledMotion:
                              longest_period=0.3, rtol=1e-7)
 
 
-def orbits(motion: fc.SettledMotion, speed: float, points: int = 2) -> fc.Branch:
-    """Stick-slip orbits by shooting, from that of a run towards faster belts."""
-    field = fc.contact_field(beam(speed), {SPEED: speed})
-    modes = field.system().basis.modes
-    size = np.ptp(motion.states, axis=0) / 2.0
-    scales = 10.0 * np.repeat([size[:modes].max(), size[modes:].max()], modes)
+def orbits(motion: fc.SettledMotion, speed: float, bounds: tuple[float, float],
+           points: int = 100, both: bool = True) -> fc.Branch:
+    """Stick-slip orbits by shooting from that of a run on, to slow and to fast belts."""
     return fc.orbits_by_shooting(
-        field, SPEED, motion.times, motion.states, period=motion.period, segments=2, rtol=1e-7,
-        bounds=(0.02, 0.4), scales=scales,
-        settings=Settings(step=0.01, largest_step=0.1, points=points, locate=False))
+        fc.contact_field(beam(speed), {SPEED: speed}), SPEED, motion.times, motion.states,
+        period=motion.period, segments=1, rtol=1e-8, bounds=bounds, scales=scales(motion),
+        width=0.4, both=both, settings=settings(points))
 
 
-def main() -> None:
-    """Print where steady sliding ends, periods of stick-slip, and multipliers of its orbits."""
-    hopf, = sliding().of_kind("Hopf")
+def slipping(branch: fc.Branch, motion: fc.SettledMotion, fastest: float,
+             points: int = 100) -> fc.Branch:
+    """Orbits without stick that are born where steady sliding ends."""
+    field = fc.contact_field(beam(fastest), {SPEED: fastest})
+    hopf, = branch.of_kind("Hopf")
+    return fc.hopf_orbits_by_shooting(
+        field, branch, hopf, segments=1, rtol=1e-8, bounds=(2e-3, fastest), scales=scales(motion),
+        width=0.4, settings=settings(points))
+
+
+def scales(motion: fc.SettledMotion) -> NDArray[np.float64]:
+    """What counts as one in the length of a step: all displacements alike, all velocities alike."""
+    size = np.ptp(motion.states, axis=0) / 2.0
+    modes = len(size) // 2
+    return 10.0 * np.repeat([size[:modes].max(), size[modes:].max()], modes)
+
+
+def settings(points: int) -> Settings:
+    """Steps of the branches: short ones find the folds; they end where only tiny ones go on."""
+    return Settings(step=0.01, smallest_step=5e-4, largest_step=0.03, points=points, locate=False)
+
+
+def seen(branch: fc.Branch) -> fc.Branch:
+    """The branch with the extremes of point B."""
+    return fc.observe(fc.contact_field(beam(), {SPEED: 0.05}), branch, "B")
+
+
+def amplitude(point: BranchPoint) -> float:
+    """Half the way of point B [mm]."""
+    values = point.values
+    return 500.0 * (float(values["observed_maximum"]) - float(values["observed_minimum"]))
+
+
+def run_amplitude(motion: fc.SettledMotion) -> float:
+    """The same of a run [mm]."""
+    row = fc.contact_field(beam(), {}).displacement_row("B")
+    return 500.0 * float(np.ptp(motion.states @ row))
+
+
+def side_by_side(branch: fc.Branch, speed: float) -> list[fc.SettledMotion]:
+    """Runs at a speed, begun on orbits before and behind the unstable part of the branch."""
+    unstable = np.flatnonzero(~branch.column("stable").astype(bool))
+    if len(unstable) == 0:
+        return []
+    parts = branch.points[: unstable[0]], branch.points[unstable[-1] + 1 :]
+    starts = (min(part, key=lambda point: abs(point.parameter - speed)).u[:-2] for part in parts)
+    return [fc.settled_motion(beam(speed), initial=np.ascontiguousarray(start), transient=3.0,
+                              longest_period=0.3, rtol=1e-7) for start in starts]
+
+
+def draw(path: Path, stuck_slip: fc.Branch, free: fc.Branch, hopf: BranchPoint,
+         runs: list[tuple[float, fc.SettledMotion]]) -> None:
+    """Amplitude and period over the speed of the belt: stable solid, unstable dashed, runs dots."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 3, figsize=(11.0, 4.0), layout="constrained")
+    for axis in axes:
+        for branch, colour in ((stuck_slip, "C0"), (free, "C1")):
+            speed = 1e3 * branch.parameter
+            stable = np.array([point.values["stable"] for point in branch.points])
+            y = np.array([amplitude(point) if axis is axes[0] else 1e3 * point.values["period"]
+                          for point in branch.points])
+            unstable = ~stable
+            unstable[1:] |= ~stable[:-1]
+            unstable[:-1] |= ~stable[1:]
+            axis.plot(speed, np.where(stable, y, np.nan), color=colour,
+                      label="stick-slip" if branch is stuck_slip else None)
+            axis.plot(speed, np.where(unstable, y, np.nan), "--", color=colour,
+                      label="without stick" if branch is free else None)
+        values = [run_amplitude(run) if axis is axes[0] else 1e3 * run.period for _, run in runs]
+        axis.plot([1e3 * speed for speed, _ in runs], values, "k.", label="runs")
+        axis.set_xlabel("speed of the belt [mm/s]")
+        axis.set_ylabel("amplitude of B [mm]" if axis is axes[0] else "period [ms]")
+    axes[0].plot([1e3 * hopf.parameter, 320.0], [0.0, 0.0], color="C2", label="steady sliding")
+    axes[0].plot([2.0, 1e3 * hopf.parameter], [0.0, 0.0], "--", color="C2")
+    axes[0].legend(frameon=False)
+    axes[2].set(xlim=(39.2, 40.9), ylim=(57.8, 60.6))
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def main(path: Path) -> None:
+    """Print where steady sliding ends, orbits with their multipliers and periods of runs; draw."""
+    steady = sliding()
+    hopf, = steady.of_kind("Hopf")
     print(f"Steady sliding is stable above {1e3 * hopf.parameter:.4f} mm/s; there a vibration of "
           f"{hopf.details['frequency_hz']:.2f} Hz begins, {hopf.details['criticality']}.")
-    for speed in (0.01, 0.02, 0.05, 0.1, 0.2):
-        motion = stick_slip(speed)
-        size = float(np.ptp(motion.states @ fc.contact_field(beam(speed), {}).displacement_row(
-            "B"))) / 2.0
-        print(f"Stick-slip at {speed:g} m/s: period {1e3 * motion.period:.4f} ms, "
-              f"amplitude of B {1e3 * size:.4f} mm")
-    for point in orbits(stick_slip(0.05), 0.05).points:
-        largest = np.sort(np.abs(point.values["multipliers"]))[::-1][:3]
-        print(f"Orbit at {point.parameter:.5f} m/s: period {1e3 * point.values['period']:.5f} ms, "
-              f"largest multipliers {largest.round(4)}, "
-              f"{'stable' if point.values['stable'] else 'unstable'}")
+    first = stick_slip(0.05)
+    branch = seen(orbits(first, 0.05, bounds=(0.025, 0.3)))
+    free = seen(slipping(steady, first, fastest=0.12))
+    runs = [(speed, stick_slip(speed)) for speed in (0.03, 0.08, 0.12, 0.16, 0.2, 0.24, 0.27)]
+    runs += [(0.05, first), *((0.04, run) for run in side_by_side(branch, 0.04))]
+    for name, each in (("Stick-slip", branch), ("Without stick", free)):
+        print(f"{name}: {len(each)} points")
+        for point in each.points:
+            largest = np.sort(np.abs(point.values["multipliers"]))[::-1][:3]
+            print(f"  {1e3 * point.parameter:9.4f} mm/s: {1e3 * point.values['period']:.5f} ms, B "
+                  f"{amplitude(point):.4f} mm, multipliers {largest.round(4)}, "
+                  f"{'stable' if point.values['stable'] else 'unstable'}")
+    for speed, run in runs:
+        print(f"A run at {1e3 * speed:g} mm/s: {1e3 * run.period:.4f} ms, B "
+              f"{run_amplitude(run):.4f} mm")
+    draw(path, branch, free, hopf, runs)
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "beam_stick_slip.png"))

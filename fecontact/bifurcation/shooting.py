@@ -1,7 +1,9 @@
 """Periodic orbits of contact systems by multiple shooting with the compiled integrator."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,11 +20,17 @@ from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
 from fecontact.integrate.trajectory import Status
+from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
 
 # Times at which the states of a segment are kept, for their extremes.
 _SAMPLES = 33
+# Errors of one step of the derivatives, in those of the run, and at most. The derivatives of the
+# steps taken are exact; that they are those of the motion too matters to multipliers alone.
+_LOOSER, _LOOSEST = 1e6, 1e-2
+# A guess is not bent by more than this part of its step.
+_MOST_BENT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +68,8 @@ class Shooting(Problem):
     precision : float
         Part of a step to which special points are located on it. Beyond this, runs whose steps
         differ decide, and each further trial costs a run with derivatives.
+    before, bend
+        The orbit before with the tangent there, and the tangent's derivative along the branch.
     """
 
     field: ContactField
@@ -71,6 +81,8 @@ class Shooting(Problem):
     periods: int = 1
     rtol: float = 1e-9
     precision: float = 1e-7
+    before: tuple[Array, Array] | None = None
+    bend: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -119,10 +131,24 @@ class Shooting(Problem):
         nodal = (np.diff(self.mesh)[:, None] / self.scales[:d] ** 2).reshape(-1)
         return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
 
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """Along the tangent, and bent like the step before."""
+        guess = u + step * tangent
+        if self.bend is None:
+            return guess
+        aside = 0.5 * step * step * self.bend
+        size = float(np.sqrt(self.weights() @ aside**2))
+        return guess if size > _MOST_BENT * step else guess + aside
+
     def adapted(self, u: Array, tangent: Array) -> "tuple[Shooting, Array, Array]":
         """The problem for the next step: the phase fixed by u."""
-        return replace(self, reference=self.starts(u)[0].copy(),
-                       values=self.parameters(u)), u, tangent
+        bend = None
+        if self.before is not None:
+            start, direction = self.before
+            length = float(self.weights() * direction @ (u - start))
+            bend = (tangent - direction) / length if length > 0.0 else None
+        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
+                       before=(u, tangent), bend=bend), u, tangent
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
@@ -131,7 +157,7 @@ class Shooting(Problem):
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""
         stability = linearisation.floquet
-        states = np.concatenate([run.states for run in linearisation.runs])
+        states = linearisation.paths.reshape(-1, self.field.dimension)
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh,
@@ -191,29 +217,39 @@ class Shot:
         problem = self.problem
         values = problem.parameters(self.u)
 
-        def system_at(_: Any, value: float) -> Any:
+        @cache
+        def moved(value: float) -> ContactSystem:
             beside = values.copy()
             beside[problem.free] = value
             return problem.field.system(beside)
 
-        return [sensitivity(self._system, float(end), t_start=float(begin), initial=start,
-                            outputs=_SAMPLES, parameter=(system_at, float(self.u[-1])),
-                            rtol=problem.rtol)
-                for start, begin, end in zip(problem.starts(self.u), self._times[:-1],
-                                             self._times[1:], strict=True)]
+        def run(start: Array, begin: float, end: float) -> Sensitivity:
+            return sensitivity(self._system, float(end), t_start=float(begin), initial=start,
+                               parameter=(lambda _, value: moved(value), float(self.u[-1])),
+                               rtol=problem.rtol,
+                               derivative_rtol=min(_LOOSER * problem.rtol, _LOOSEST))
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return list(pool.map(run, problem.starts(self.u), self._times[:-1], self._times[1:]))
 
     @cached_property
-    def _ends(self) -> Array:
-        if "runs" in self.__dict__:
-            return np.array([run.states[-1] for run in self.runs])
-        found = ensemble(self._system, np.stack([self._times[:-1], self._times[1:]], axis=1),
-                         initial=self.problem.starts(self.u), rtol=self.problem.rtol)
+    def paths(self) -> Array:
+        """States (K, samples, d) of the segments, from start to end."""
+        times = np.linspace(self._times[:-1], self._times[1:], _SAMPLES, axis=1)
+        found = ensemble(self._system, times, initial=self.problem.starts(self.u),
+                         rtol=self.problem.rtol)
         if not found.finished.all():
             status = found.status[int(np.argmin(found.finished))]
             if status is Status.INTERRUPTED:
                 raise KeyboardInterrupt
             raise AnalysisError(f"The run of a segment did not reach its end: {status.value}")
-        return found.states[:, -1]
+        return found.states
+
+    @cached_property
+    def _ends(self) -> Array:
+        if "runs" in self.__dict__:
+            return np.array([run.states[-1] for run in self.runs])
+        return self.paths[:, -1]
 
     @cached_property
     def residual(self) -> Array:

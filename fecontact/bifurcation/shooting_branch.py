@@ -36,7 +36,8 @@ def orbits_by_shooting(
     parameter : str
         The one that is varied.
     times, states : (k,) and (k, d) array
-        The motion, over at least one period; its end counts.
+        The motion, over at least one period; its end counts. Orbits whose period is unknown begin
+        where it is fastest, if it is at least two periods long.
     segments : int
         Pieces of the period, each run for itself: more of them for unstable orbits.
     rtol : float
@@ -56,8 +57,13 @@ def orbits_by_shooting(
     chosen = settings_of(settings, bounds)
     amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
     sizes, _ = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
+    motion = np.asarray(times, dtype=float), np.asarray(states, dtype=float)
+    if (period is not None and isinstance(field, ContactField)
+            and motion[1].shape == (motion[0].size, field.dimension)
+            and field.forcing_period(given) is None):
+        motion = _to_fastest(*motion, sizes, period, field.system().basis.modes)
     problem, u = shooting_from(*from_samples(
-        field, given, free, times, states, period, 200, 4, periods,
+        field, given, free, *motion, period, 200, 4, periods,
         np.append(sizes, width_of(width, chosen, given[free]))), segments, rtol)
     attributes = {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
                   "parameter_values": given, "scales": problem.scales, "segments": segments,
@@ -69,3 +75,19 @@ def orbits_by_shooting(
         raise AnalysisError(f"No periodic orbit was found at {parameter} = {given[free]:.6g} near "
                             f"the motion: Newton's method does not converge; run it longer until "
                             f"it has settled, or take more than {segments} segments.") from error
+
+
+def _to_fastest(
+    times: Array, states: Array, sizes: Array, period: float, modes: int
+) -> tuple[Array, Array]:
+    """The motion up to where it was fastest, within a period before its end.
+
+    There the phase is fixed best; beside transitions of stick and slip an orbit that is guessed
+    is far off.
+    """
+    last = np.flatnonzero(times > times[-1] - period)
+    if len(last) == 0 or times[last[0]] - times[0] < period:
+        return times, states
+    speeds = np.linalg.norm(states[last, modes : 2 * modes] / sizes[:modes], axis=1)
+    end = last[np.argmax(speeds)] + 1
+    return times[:end], states[:end]

@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 _SLIP_PART = 0.01
 # Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
 _SLOW = 20.0
+# Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
+# or of this part of the largest that it has been.
+_LOOSER, _FADED = 10.0, 1e-3
 
 
 class Vary(NamedTuple):
@@ -126,6 +129,7 @@ def start(
     rtol: float,
     work: bool = True,
     vary: bool | tuple[ContactSystem, ContactSystem, float] = False,
+    vary_rtol: float | None = None,
     events: Sequence[Watched] = (),
 ) -> Run:
     """A run from ``times[0]``, before its first step.
@@ -151,6 +155,9 @@ def start(
         Whether to carry the derivatives to the initial state along; with those to a parameter if
         the system is given with the parameter moved up and down, ``width`` apart. Steps then end
         where normal forces begin, end or pass the depth of their law, at output times too.
+    vary_rtol : float, optional
+        Error of one step of the derivatives, relative to the largest they have been; ten times
+        ``rtol`` of their size by default, or of a thousandth of the largest.
     events : sequence of ContactEvents, Crossing and Event
         What to watch for.
     """
@@ -192,7 +199,9 @@ def start(
         system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), times, control,
         progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
         np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)),
-        Vary(above.arrays, below.arrays, width, variation_for(columns, m, n, states, width),
+        Vary(above.arrays, below.arrays, width, variation_for(
+            columns, m, n, states, width, float(vary_rtol or _LOOSER * rtol),
+            1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state)))),
         watch_for(system, events, bool(vary)))
 

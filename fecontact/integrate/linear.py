@@ -125,8 +125,38 @@ def eliminate_memory(G, s, g, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
-    """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
+def products(a, b, out):  # type: ignore[no-untyped-def]
+    """Fill out[i, k] with the products of the rows a_i and b_k, two by two at a time."""
+    rows, length = a.shape
+    columns = len(b)
+    for i in range(0, rows - 1, 2):
+        for k in range(0, columns - 1, 2):
+            a00, a01, a10, a11 = 0.0, 0.0, 0.0, 0.0
+            for j in range(length):
+                x, y = a[i, j], a[i + 1, j]
+                u, v = b[k, j], b[k + 1, j]
+                a00 += x * u
+                a01 += x * v
+                a10 += y * u
+                a11 += y * v
+            out[i, k], out[i, k + 1], out[i + 1, k], out[i + 1, k + 1] = a00, a01, a10, a11
+        if columns % 2:
+            a00, a10 = 0.0, 0.0
+            for j in range(length):
+                a00 += a[i, j] * b[columns - 1, j]
+                a10 += a[i + 1, j] * b[columns - 1, j]
+            out[i, columns - 1], out[i + 1, columns - 1] = a00, a10
+    if rows % 2:
+        for k in range(columns):
+            total = 0.0
+            for j in range(length):
+                total += a[rows - 1, j] * b[k, j]
+            out[rows - 1, k] = total
+
+
+@helper
+def set_answers(shapes, g, w):  # type: ignore[no-untyped-def]
+    """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n)."""
     m, rows = shapes.shape
     n = rows // 2
     states = w.weights.shape[1]
@@ -150,23 +180,14 @@ def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
             for j in range(n):
                 w.answers[m + k, first + j] = (c[2, first + j] * shapes[k, j]
                                                + c[3, first + j] * shapes[k, n + j])
-    for i in range(0, m - 1, 2):
-        for k in range(0, 2 * m, 2):
-            a00, a01, a10, a11 = 0.0, 0.0, 0.0, 0.0
-            for j in range(rows):
-                x, y = shapes[i, j], shapes[i + 1, j]
-                u, v = w.answers[k, j], w.answers[k + 1, j]
-                a00 += x * u
-                a01 += x * v
-                a10 += y * u
-                a11 += y * v
-            w.J[i, k], w.J[i, k + 1], w.J[i + 1, k], w.J[i + 1, k + 1] = a00, a01, a10, a11
-    if m % 2:
-        for k in range(2 * m):
-            total = 0.0
-            for j in range(rows):
-                total += shapes[m - 1, j] * w.answers[k, j]
-            w.J[m - 1, k] = total
+
+
+@helper
+def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
+    """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
+    m = len(shapes)
+    set_answers(shapes, g, w)
+    products(shapes, w.answers, w.J)
     for i in range(m):
         for k in range(m):
             w.J[i, k] -= s.stiffness[i, k]

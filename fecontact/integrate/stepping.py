@@ -31,8 +31,6 @@ RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
 _POWER = -1.0 / rodas.ORDER
-# Derivatives of the motion may be in error by so many times the tolerance in a step.
-_LOOSER = 10.0
 
 
 @helper
@@ -223,7 +221,7 @@ def advance(  # type: ignore[no-untyped-def]
             error = max(error, propagate(
                 t, h, latest, G, s, above, below, width, shapes, control.slip_scale, control.depth,
                 control.memory_scale, progress.state, progress.gradients, room.reduced,
-                room.stages, room.right, variation) / (_LOOSER * control.rtol))
+                room.stages, room.right, variation) / variation.tolerance)
 
         factor = _LARGEST_FACTOR
         if error > 1e-6:

@@ -21,13 +21,10 @@ from numpy.typing import NDArray
 
 from fecontact.compiled import borrowed, f8, helper, kernel, matrix, vector
 from fecontact.contact_kernels import SYSTEM
-from fecontact.integrate import curvature, linear, motion, rodas
+from fecontact.integrate import columns, curvature, linear, motion, rodas
 from fecontact.laws.contract import signal_at
 
 Array = NDArray[np.float64]
-
-# Columns that have fallen below this part of their largest size need no accuracy of their own.
-_FADED = 1e-3
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5
@@ -49,6 +46,15 @@ class Variation(NamedTuple):
         worth attention.
     stages : (8 k, size) array
         U_i of column c in row 8 c + i.
+    tolerance, faded : float
+        Error of a column in a step that is allowed, in units of its size; of the part ``faded``
+        of the largest size that it has had where it is smaller.
+    moved, right : (k, size) arrays
+        X_i and the right sides of a stage, column by column.
+    pushed, bent : (k, m) arrays
+        Accelerations by X_i and by H_i; solutions u_v.
+    inside_matrix, ahead_matrix, solver : (m, 2 m) arrays
+        What makes these of X_i, x and the right sides.
     """
 
     columns: Array
@@ -56,6 +62,15 @@ class Variation(NamedTuple):
     norms: Array
     least: Array
     stages: Array
+    tolerance: float
+    faded: float
+    moved: Array
+    pushed: Array
+    bent: Array
+    right: Array
+    inside_matrix: Array
+    ahead_matrix: Array
+    solver: Array
     vectors: Array
     nodes: Array
     sinking: Array
@@ -69,15 +84,17 @@ class Variation(NamedTuple):
 
 
 VARIATION = types.NamedTuple(
-    [matrix] * 3 + [vector] + [matrix] * 4 + [vector] * 3 + [motion.GRADIENTS] * 4, Variation)
+    [matrix] * 3 + [vector, matrix, f8, f8] + [matrix] * 10 + [vector] * 3
+    + [motion.GRADIENTS] * 4, Variation)
 
 
 def variation_for(
-    columns: int, modes: int, nodes: int, states: int, width: float = 0.0
+    columns: int, modes: int, nodes: int, states: int, width: float, tolerance: float,
+    faded: float,
 ) -> Variation:
     """Room for so many columns; the first ``size`` of them are the unit matrix.
 
-    ``width`` is that of the parameter whose column comes last: 2e-5 of its value.
+    ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
     """
     size = 2 * modes + nodes * states
     room = [motion.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
@@ -87,34 +104,15 @@ def variation_for(
     least = np.zeros(columns)
     if width:
         # A tenth of the state's own sizes, if the parameter changed by all of its value.
-        least[-1] = 0.1 * MOVE * 2.0 / (width * _FADED)
+        least[-1] = 0.1 * MOVE * 2.0 / (width * faded)
     return Variation(start, np.zeros((columns, size)), np.tile(least, (2, 1)), least,
-                     np.zeros((rodas.STAGES * columns, size)), np.zeros((7, size)),
+                     np.zeros((rodas.STAGES * columns, size)), tolerance, faded,
+                     np.zeros((columns, size)), np.zeros((columns, modes)),
+                     np.zeros((columns, modes)), np.zeros((columns, size)),
+                     np.zeros((modes, 2 * modes)), np.zeros((modes, 2 * modes)),
+                     np.zeros((modes, 2 * modes)), np.zeros((7, size)),
                      np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(motion.GIVEN),
                      np.zeros(modes), np.zeros(modes), *room)
-
-
-@helper
-def _push(g, s, shapes, x, w, sign, rate):  # type: ignore[no-untyped-def]
-    """Add to w[2] (2 n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
-    m, rows = shapes.shape
-    n = rows // 2
-    states = g.rates.shape[1]
-    motion.project(shapes, x, w[0], w[1])
-    for j in range(n):
-        a, b, c, d = w[0, j], w[0, n + j], w[1, j], w[1, n + j]
-        p = g.partial[j]
-        first = 2 * m + j * states
-        tangential = p[1, 0] * a + p[1, 1] * b + p[1, 2] * c + p[1, 3] * d
-        pressing = p[2, 0] * a + p[2, 1] * b + p[2, 2] * c + p[2, 3] * d
-        for k in range(s.memory[j]):
-            tangential += g.force[j, 3 + k] * x[first + k]
-            total = g.rates[j, k, 1] * c + g.rates[j, k, 2] * pressing
-            for other in range(s.memory[j]):
-                total += g.rates[j, k, 3 + other] * x[first + other]
-            rate[first + k] += sign * total
-        w[2, j] -= sign * tangential
-        w[2, n + j] += sign * (p[0, 0] * a + p[0, 1] * b + p[0, 2] * c + p[0, 3] * d)
 
 
 @helper
@@ -141,7 +139,7 @@ def _largest_error(scale, v):  # type: ignore[no-untyped-def]
         size = max(before, after)
         v.norms[1, c] = max(v.norms[0, c], size)
         if error > 0.0:
-            largest = max(largest, error / max(size, _FADED * v.norms[1, c]))
+            largest = max(largest, error / max(size, v.faded * v.norms[1, c]))
     return largest
 
 
@@ -153,9 +151,9 @@ def propagate(  # type: ignore[no-untyped-def]
 ):
     """Carry the columns over the step from t to t + h whose stages and factors are given.
 
-    Returns the largest error of a column in units of its size, or of a thousandth of the largest
-    it has been, with ``scale`` (size,) as the units of the state; columns of a parameter that are
-    still faint count as if they were not.
+    Returns the largest error of a column in units of its size, or of the part ``v.faded`` of the
+    largest it has been, with ``scale`` (size,) as the units of the state; columns of a parameter
+    that are still faint count as if they were not.
 
     ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
     with width = 0 no parameter varies.
@@ -166,12 +164,14 @@ def propagate(  # type: ignore[no-untyped-def]
                                        borrowed(held_memory))
     state, gradients = borrowed(held_state), borrowed(held_gradients)
     reduced, stages, scale = borrowed(held_reduced), borrowed(held_stages), borrowed(held_scale)
-    count, size = v.columns.shape
+    size = len(state)
     m = len(v.none)
     w = v.nodes
-    Y, right, X, forced, rate, other = (v.vectors[0], v.vectors[1], v.vectors[2], v.vectors[3],
-                                        v.vectors[4], v.vectors[5])
+    Y, right, forced, rate, other = (v.vectors[0], v.vectors[1], v.vectors[3], v.vectors[4],
+                                     v.vectors[5])
     ahead, behind = v.ahead, v.behind
+    if size == 2 * m:
+        columns.set_solver(G, reduced, v)
     curvature.set_sinking(t, state, s, shapes, v, v.sinking)
     for i in range(rodas.STAGES):
         now = t if i == 0 else min(t + rodas.NODES[i] * h, latest)
@@ -201,22 +201,10 @@ def propagate(  # type: ignore[no-untyped-def]
         curvature.differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
                      signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1] * advance,
                      v.sinking, shapes, w)
-        for c in range(count):
-            own = v.stages[rodas.STAGES * c : rodas.STAGES * (c + 1)]
-            rodas.combined(rodas.A[i], 1.0, v.columns[c], own, X)
-            w[2, :] = 0.0
-            rate[2 * m :] = 0.0
-            _push(ahead, s, shapes, v.columns[c], w, 1.0, rate)
-            _push(v.inside, s, shapes, X, w, 1.0, rate)
-            motion.gather(X, s, shapes, v.none, w[2], rate)
-            if width != 0.0 and c == count - 1:
-                for k in range(size):
-                    rate[k] += forced[k]
-            rodas.combined(rodas.C[i], 1.0 / h, rate, own, right)
-            linear.solve_stage(G, s, shapes, gradients, reduced, right, w, own[i])
-            if i == rodas.STAGES - 1:
-                for k in range(size):
-                    v.after[c, k] = X[k] + own[i, k]
+        if size > 2 * m:
+            columns.one_by_one(i, h, G, s, shapes, gradients, reduced, forced, width != 0.0, v)
+        else:
+            columns.all_at_once(i, h, G, s, shapes, reduced, forced, width != 0.0, v)
     return _largest_error(scale, v)
 
 

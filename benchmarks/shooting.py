@@ -1,0 +1,67 @@
+"""What derivatives of a run cost, and a point of a branch by shooting, on the beam that sticks.
+
+    python benchmarks/shooting.py [repetitions]
+
+A run over 50 ms, from the stuck state, and the same with derivatives to start and belt speed, for
+1, 5 and 20 modes; then points of the stick-slip branch of 20 modes. CPU time, the least of the
+repetitions.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+
+import beam_stick_slip as example
+
+from fecontact import ensemble, sensitivity
+
+SPEED, DURATION, RTOL = 0.05, 0.05, 1e-7
+
+
+def least(task: Callable[[], object], repetitions: int) -> float:
+    """Least CPU time of a task [s]; it has run once before."""
+    task()
+    times = []
+    for _ in range(repetitions):
+        begin = time.process_time()
+        task()
+        times.append(time.process_time() - begin)
+    return min(times)
+
+
+def measure(modes: int, repetitions: int) -> list[float]:
+    """Times of a run, with derivatives, and with derivatives to 1e-2 only [s]."""
+    system = example.beam(SPEED, modes=modes)
+    start = example.stuck(system)
+
+    def derivatives(rtol: float | None) -> object:
+        return sensitivity(system, DURATION, initial=start, parameter="ground.speed", rtol=RTOL,
+                           derivative_rtol=rtol)
+
+    return [least(task, repetitions) for task in (
+        lambda: ensemble(system, [0.0, DURATION], initial=start[None], rtol=RTOL),
+        lambda: derivatives(None), lambda: derivatives(1e-2))]
+
+
+def main(repetitions: int) -> None:
+    """Print the tables."""
+    print("modes     run   with derivatives   ratio   derivatives to 1e-2   ratio")
+    for modes in (1, 5, 20):
+        run, tight, loose = measure(modes, repetitions)
+        print(f"{modes:5}  {1e3 * run:6.1f} ms  {1e3 * tight:9.1f} ms  {tight / run:12.1f}"
+              f"  {1e3 * loose:12.1f} ms  {loose / run:12.1f}")
+    motion = example.stick_slip(SPEED)
+    begin = time.process_time()
+    branch = example.orbits(motion, SPEED, bounds=(SPEED, 0.27), both=False)
+    seconds = time.process_time() - begin
+    print(f"{len(branch)} points from {SPEED:g} to {np.max(branch.parameter):.4g} m/s: "
+          f"{seconds / len(branch):.2f} s a point")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
