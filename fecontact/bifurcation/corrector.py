@@ -15,7 +15,7 @@ from fecontact.errors import AnalysisError
 Array = NDArray[np.float64]
 
 # Steps of this relative size that grow again are rounding, as next to branch points.
-_ROUNDING = 1e-6
+_ROUNDING = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
