@@ -68,10 +68,7 @@ def continuation(
     FecontactError
         If there is no solution near the start.
     """
-    low, high = settings.bounds
-    if not low <= u[-1] <= high:
-        raise InputError(f"The start lies at {u[-1]:.6g}, outside the bounds of the parameter, "
-                         f"{low:g} to {high:g}.")
+    require_inside(float(u[-1]), settings)
     start = start_of(problem, u, settings, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
     here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
@@ -113,6 +110,14 @@ def continuation(
                 fixed_mesh, before = False, None
             here = Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
     return End(Status.POINTS)
+
+
+def require_inside(value: float, settings: Settings) -> None:
+    """Raise :class:`InputError` unless a value of the parameter lies within the bounds."""
+    low, high = settings.bounds
+    if not low <= value <= high:
+        raise InputError(f"The start lies at {value:.6g}, outside the bounds of the parameter, "
+                         f"{low:g} to {high:g}.")
 
 
 def start_of(
