@@ -29,9 +29,8 @@ Array = NDArray[np.float64]
 # Columns that have fallen below this part of their largest size need no accuracy of their own.
 _FADED = 1e-3
 
-# Parameters are moved by this part of their value for differences of the right-hand side. Friction
-# over 1 um/s is passed by a belt of 0.2 m/s that moves by a part of 1e-5.
-MOVE = 1e-7
+# Parameters are moved by this part of their value for differences of the right-hand side.
+MOVE = 1e-5
 
 
 class Variation(NamedTuple):
