@@ -15,6 +15,7 @@ from fecontact.bifurcation.branch import BranchPoint, Status
 from fecontact.bifurcation.corrector import Solution, corrected, finished, norm
 from fecontact.bifurcation.location import between, changed, located_between
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
+from fecontact.bifurcation.sharp_turns import rounded
 from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 # Part of the first step below which corners are taken for corners of the branch itself, as contact
 # laws with kinks make them.
 _SHORT = 1e-3
+# So many times a step is halved before a sharp turn is looked for, and each so many times again.
+_PATIENCE = 2
 
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
@@ -65,44 +68,56 @@ def continuation(
     FecontactError
         If there is no solution near the start.
     """
-    low, high = settings.bounds
-    if not low <= u[-1] <= high:
-        raise InputError(f"The start lies at {u[-1]:.6g}, outside the bounds of the parameter, "
-                         f"{low:g} to {high:g}.")
+    require_inside(float(u[-1]), settings)
     start = start_of(problem, u, settings, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
     here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
     stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
+    before: Solution | None = None
+    halved = 0
     while count < settings.points:
         try:
-            there = _step(problem, here, step, settings)
+            reached = _step(problem, here, step, settings)
         except FecontactError as error:
-            there, message = None, str(error)
-        if there is None or not _believable(problem, here, there, step, settings):
-            step *= 0.5
+            reached, message = None, str(error)
+        if reached is None:
+            step, halved = 0.5 * step, halved + 1
+            if before is not None and halved % _PATIENCE == 0:
+                reached = rounded(problem, before, here, step, settings)
+        if reached is None:
             if step < settings.smallest_step:
                 return End(Status.STALLED, message)
             continue
-        for located in located_between(problem, here, there, settings):
-            yield located
-            if located.kind in stops:
-                return End(Status.STOPPED)
-            if located.kind is None:
-                return End(Status.BOUND)
-        if fixed_mesh and count > 2 and _passes(problem, here, there, start):
-            yield BranchPoint(start.u, start.tangent, start.values)
-            return End(Status.CLOSED)
-        yield BranchPoint(there.u, there.tangent, there.values)
-        count += 1
-        step = _next_step(problem, here, there, step, settings)
-        here = there
+        for there, special in reached:
+            for located in special:
+                yield located
+                if located.kind in stops:
+                    return End(Status.STOPPED)
+                if located.kind is None:
+                    return End(Status.BOUND)
+            if fixed_mesh and count > 2 and _passes(problem, here, there, start):
+                yield BranchPoint(start.u, start.tangent, start.values)
+                return End(Status.CLOSED)
+            yield BranchPoint(there.u, there.tangent, there.values)
+            count += 1
+            before, here = here, there
+        step, halved = _next_step(problem, before, here, step, settings), 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
             problem, moved, turned = adapted
             turned = turned / norm(problem, turned)
-            fixed_mesh = fixed_mesh and np.array_equal(moved, here.u)
+            if not np.array_equal(moved, here.u):
+                fixed_mesh, before = False, None
             here = Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
     return End(Status.POINTS)
+
+
+def require_inside(value: float, settings: Settings) -> None:
+    """Raise :class:`InputError` unless a value of the parameter lies within the bounds."""
+    low, high = settings.bounds
+    if not low <= value <= high:
+        raise InputError(f"The start lies at {value:.6g}, outside the bounds of the parameter, "
+                         f"{low:g} to {high:g}.")
 
 
 def start_of(
@@ -122,19 +137,25 @@ def start_of(
     return finished(problem, *found, row, settings)
 
 
-def _step(problem: Problem, here: Solution, step: float, settings: Settings) -> Solution | None:
+def _step(
+    problem: Problem, here: Solution, step: float, settings: Settings
+) -> list[tuple[Solution, list[BranchPoint]]] | None:
+    """The solution at a step, with the special points before it; None to be tried with less."""
     row = problem.weights() * here.tangent
     found = corrected(problem, problem.predicted(here.u, here.tangent, step), row,
                       settings.tolerance, settings.iterations, known=here.linearisation)
-    return None if found is None else finished(problem, *found, row, settings)
+    if found is None:
+        return None
+    there = finished(problem, *found, row, settings)
+    short = step < _SHORT * settings.step
+    if not (short or _believable(problem, here, there, settings)):
+        return None
+    special = located_between(problem, here, there, settings, row, strict=not short)
+    return None if special is None else [(there, special)]
 
 
-def _believable(
-    problem: Problem, here: Solution, there: Solution, step: float, settings: Settings
-) -> bool:
+def _believable(problem: Problem, here: Solution, there: Solution, settings: Settings) -> bool:
     """Whether a step neither turns too much nor passes over more than its tests can tell."""
-    if step < _SHORT * settings.step:
-        return True
     turn = float(problem.weights() * here.tangent @ there.tangent)
     if turn < np.cos(settings.largest_turn):
         return False
@@ -162,5 +183,5 @@ def _passes(problem: Problem, here: Solution, there: Solution, start: Solution) 
     along = float(weights * here.tangent @ (start.u - here.u))
     if not 0.0 < along <= length:
         return False
-    aside = start.u - between(problem, here, there, along)
+    aside = start.u - between(here, there, along, problem.weights() * here.tangent)
     return norm(problem, aside) < 1e-2 * length

@@ -15,7 +15,7 @@ from fecontact.errors import AnalysisError, FecontactError
 Array = NDArray[np.float64]
 
 # Steps of this relative size that grow again are rounding, as next to branch points.
-_ROUNDING = 1e-6
+_ROUNDING = 1e-7
 # A matrix is kept as long as each step is shorter than this part of the one before.
 _SERVES = 0.2
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.branch import BranchPoint
-from fecontact.bifurcation.corrector import Solution, corrected, finished
+from fecontact.bifurcation.corrector import Solution, corrected, finished, norm
 from fecontact.bifurcation.problem import Problem, Settings
 from fecontact.errors import FecontactError
 
@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 # Newton's method for special points goes on to steps of this relative size.
 _EXACT = 1e-10
+# A branch leaves the cubic through two of its points by less than this part of what it bends.
+_OFF, _ROUGH = 0.2, 1e-7
 
 
 def changed(here: Solution, there: Solution) -> list[str]:
@@ -23,27 +25,34 @@ def changed(here: Solution, there: Solution) -> list[str]:
             or (after == 0.0 and before != 0.0)]
 
 
-def between(problem: Problem, here: Solution, there: Solution, along: float) -> Array:
-    """Cubic between two points of a branch, at a length along the first one's tangent."""
-    row = problem.weights() * here.tangent
+def between(here: Solution, there: Solution, along: float, row: Array) -> Array:
+    """Cubic between two points of a branch, at a length along a row that grows between them."""
     length = float(row @ (there.u - here.u))
     x = along / length
-    slope = there.tangent / float(row @ there.tangent)
+    first = here.tangent / float(row @ here.tangent)
+    last = there.tangent / float(row @ there.tangent)
     chord = there.u - here.u
     return np.asarray(
-        here.u + length * x * (1.0 - x) ** 2 * here.tangent + x * x * (3.0 - 2.0 * x) * chord
-        + length * x * x * (x - 1.0) * slope)
+        here.u + length * x * (1.0 - x) ** 2 * first + x * x * (3.0 - 2.0 * x) * chord
+        + length * x * x * (x - 1.0) * last)
 
 
 def located_between(
-    problem: Problem, here: Solution, there: Solution, settings: Settings
-) -> list[BranchPoint]:
-    """Special points between two regular ones, in order; one without a kind is on a bound."""
-    row = problem.weights() * here.tangent
+    problem: Problem, here: Solution, there: Solution, settings: Settings, row: Array,
+    strict: bool = True,
+) -> list[BranchPoint] | None:
+    """Special points between two regular ones, in order; one without a kind is on a bound.
+
+    ``row`` (N + 1,) is the direction along which the branch is parametrised between the two. With
+    ``strict`` the result is None where the second point lies on another sheet of solutions: the
+    equations change their orientation, but no branch point lies in between.
+    """
     found = []
     for name in changed(here, there):
         located = _zero(problem, here, there, settings, _test_value(name),
-                        here.tests[name], there.tests[name], problem.precision)
+                        here.tests[name], there.tests[name], problem.precision, row)
+        if name == "branch point" and strict and _jumped(problem, here, there, located, row):
+            return None
         if located is None:
             continue
         details = problem.examine(name, located.u, located.linearisation, located.tangent)
@@ -55,11 +64,24 @@ def located_between(
         before, after = here.u[-1] - bound, there.u[-1] - bound
         if before * after < 0.0 or (after == 0.0 and before != 0.0):
             located = _zero(problem, here, there, settings, _distance_to(bound), before, after,
-                            1e-12)
+                            1e-12, row)
             if located is not None:
                 found.append(BranchPoint(located.u, located.tangent, located.values))
     found = _without_turns(found, row, 1e-4 * float(row @ (there.u - here.u)))
     return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
+
+
+def _jumped(
+    problem: Problem, here: Solution, there: Solution, located: Solution | None, row: Array
+) -> bool:
+    """Whether two points lie on different sheets: what was found between is not on the cubic."""
+    if located is None:
+        return True
+    along = float(row @ (located.u - here.u))
+    off = norm(problem, located.u - between(here, there, along, row))
+    aside = norm(problem, there.u - here.u - float(row @ (there.u - here.u))
+                 / float(row @ here.tangent) * here.tangent)
+    return off > _OFF * aside + _ROUGH * (1.0 + norm(problem, here.u))
 
 
 def _without_turns(found: list[BranchPoint], row: Array, near: float) -> list[BranchPoint]:
@@ -80,13 +102,13 @@ def _distance_to(bound: float) -> Callable[[Solution], float]:
 def _zero(
     problem: Problem, here: Solution, there: Solution, settings: Settings,
     test: Callable[[Solution], float], before: float, after: float, precision: float,
+    row: Array,
 ) -> Solution | None:
     """The solution between two others at which a test function is zero; None at a pole or jump."""
     from scipy.optimize import brentq
 
     if after == 0.0:
         return there
-    row = problem.weights() * here.tangent
     length = float(row @ (there.u - here.u))
     best: list[tuple[float, Solution]] = []
     exact = max(_EXACT, 1e-2 * precision)
@@ -95,7 +117,7 @@ def _zero(
         if along <= 0.0 or along >= length:
             return before if along <= 0.0 else after
         # The test functions are those of this very point, not of the last Newton step.
-        found = corrected(problem, between(problem, here, there, along), row, exact,
+        found = corrected(problem, between(here, there, along, row), row, exact,
                           2 * settings.iterations, exact=True,
                           known=(best[-1][1] if best else there).linearisation)
         if found is None:

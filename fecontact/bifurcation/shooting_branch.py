@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.branch import Branch
 from fecontact.bifurcation.contact_field import ContactField
+from fecontact.bifurcation.continuation import require_inside
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.orbit_starts import from_samples
@@ -48,13 +49,15 @@ def orbits_by_shooting(
     Raises
     ------
     InputError
-        If the samples do not cover a period, or the field is not one of a contact system.
+        If the samples do not cover a period, the field is not one of a contact system, or the
+        bounds exclude the start.
     AnalysisError
         If Newton's method finds no orbit near them.
     """
     free = field.index(parameter)
     given = field.values if values is None else np.array(values, dtype=float)
     chosen = settings_of(settings, bounds)
+    require_inside(float(given[free]), chosen)
     amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
     sizes, _ = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
     motion = np.asarray(times, dtype=float), np.asarray(states, dtype=float)
