@@ -101,6 +101,7 @@ def continuation(
             yield BranchPoint(there.u, there.tangent, there.values)
             count += 1
             before, here = here, there
+        assert before is not None
         step, halved = _next_step(problem, before, here, step, settings), 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
