@@ -11,6 +11,7 @@ from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.linearised import Linearised
+from fecontact.bifurcation.orbit_normal_forms import Expansion
 from fecontact.bifurcation.orbit_options import settings_of
 from fecontact.bifurcation.orbits import restored
 from fecontact.bifurcation.problem import Problem, Settings
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 
 _KINDS = ("fold", "period doubling", "Neimark-Sacker")
 _DIFFERENCE = 1e-5  # step of the differences of the test function, in the inner product
+_EXPANSION = 1e-3  # step of the differences of normal forms, in ranges of the states
+_CUSP = 1e-3  # both parameters change by less than this part of a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +92,26 @@ class OrbitCurve(Problem):
         return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
 
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Points of codimension two."""
+        if self.kind == "fold":
+            along = self.rest(u)
+            return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}
+        if self.kind == "period doubling":
+            expansion = Expansion(self.orbit, u, linearisation.orbit)
+            return {"generalised period doubling": expansion.doubling(_EXPANSION)}
+        mean = _critical_mean(linearisation.orbit.floquet.others)
+        return {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
+                for order in (1, 2, 3, 4)}
+
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        """A fold of the curve is where its first parameter turns, nothing more."""
-        return {"kind": "turning point"}
+        """Nothing more is known of points of codimension two; at a cusp the curve turns as well."""
+        if kind != "fold":
+            return {}
+        both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
+        return {"kind": "turning point"} if both.max() > _CUSP else None
 
 
 class CurveLinearised:
@@ -121,9 +139,9 @@ class CurveLinearised:
                 found = found - (weights * other @ found) * other
             directions.append(found / np.sqrt(weights @ found**2))
         whole = self.orbit.with_rows([weights * one for one in directions])
-        return whole, directions, [self._slope(one) for one in directions]
+        return whole, directions, [self.slope(one) for one in directions]
 
-    def _slope(self, direction: Array) -> float:
+    def slope(self, direction: Array) -> float:
         """Derivative of the test function along a direction."""
         size = float(np.sqrt(self.problem.weights() @ direction**2))
         if size == 0.0:
@@ -138,7 +156,7 @@ class CurveLinearised:
         whole, directions, slopes = self._plane
         part = whole.solve(np.concatenate([rhs[:-2], [0.0, 0.0]]))
         matrix = np.array([slopes, [float(row @ one) for one in directions]])
-        side = np.array([rhs[-2] - self._slope(part), rhs[-1] - row @ part])
+        side = np.array([rhs[-2] - self.slope(part), rhs[-1] - row @ part])
         determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
         if determinant == 0.0:
             return np.full_like(part, np.nan)
@@ -172,7 +190,10 @@ def orbit_curve(
     Returns
     -------
     Branch
-        Each point stores both parameters by their names, and what orbits store.
+        Each point stores both parameters by their names, and what orbits store. Special points
+        are 'cusp' on curves of folds, 'generalised period doubling', where doublings turn from
+        super- to subcritical, and 'resonance 1:1' to 'resonance 1:4' on curves of tori, where
+        the multipliers pass 1, -1, or the angle 120 or 90 degrees; and 'turning point'.
 
     Raises
     ------
@@ -211,6 +232,13 @@ def _unit(size: int, place: int) -> Array:
     row = np.zeros(size)
     row[place] = 1.0
     return row
+
+
+def _critical_mean(multipliers: NDArray[np.complex128]) -> float:
+    """Mean of the two multipliers whose product is nearest to one: the cosine of their angle."""
+    first, second = np.triu_indices(len(multipliers), 1)
+    nearest = np.argmin(np.abs(multipliers[first] * multipliers[second] - 1.0))
+    return float((multipliers[first] + multipliers[second])[nearest].real / 2.0)
 
 
 def _even(matrix: Array) -> Array:

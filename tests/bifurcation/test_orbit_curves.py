@@ -69,6 +69,95 @@ def test_curve_of_tori():
     assert turning.values["a"] == pytest.approx(0.0, abs=1e-6)
 
 
+def circle_field(function, **parameters):
+    """Orbits of the period pi on the circle of radius one and beside it."""
+    field = VectorField.from_function(function, parameters, 3)
+    t = np.linspace(0.0, np.pi, 400)
+    return field, t, np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
+
+
+def cusp(t, x, p, out):
+    # s' = p + q s - s^3 with s = r - 1.
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    s = r - 1.0
+    radial = p[0] + p[1] * s - s * s * s
+    out[0] = radial * x[0] / r - 2.0 * x[1]
+    out[1] = radial * x[1] / r + 2.0 * x[0]
+
+
+def test_cusp_of_cycles():
+    """Folds at q = 3 s^2, p = -2 s^3."""
+    field = VectorField.from_function(cusp, {"p": 0.2, "q": 0.3}, 2)
+    t = np.linspace(0.0, np.pi, 400)
+    circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
+    s = np.roots([1.0, 0.0, -0.3, -0.2]).real.max()
+    branch = orbits_from_motion(field, "p", t, (1.0 + s) * circle, period=np.pi, direction=-1.0,
+                                bounds=(-0.3, 0.3), intervals=16, scales=np.ones(2))
+    folds = branch.of_kind("fold")
+    assert sorted(at.parameter for at in folds) == pytest.approx(
+        [-2.0 * 0.1**1.5, 2.0 * 0.1**1.5], rel=1e-8)
+    curve = orbit_curve(field, branch, folds[0], "q", both=True, bounds=(-0.2, 0.2), width=1.0,
+                        settings=Settings(largest_step=0.03, points=60))
+    p, q = curve.parameter, curve.column("q")
+    assert p**2 == pytest.approx(4.0 * (q / 3.0) ** 3, abs=1e-9)
+    assert p.min() < -0.1
+    assert p.max() > 0.1
+    found, = curve.special
+    assert found.kind == "cusp"
+    assert [found.parameter, found.values["q"]] == pytest.approx([0.0, 0.0], abs=1e-7)
+
+
+def doubling(t, x, p, out):
+    # Across the circle a' = a g, g = lam - 0.3 k + k a^2 - a^4, and b' = -b, where a + i b turns
+    # by half a turn in a period: w = (a + i b) exp(i phi / 2).
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, u, v = x[0] / r, x[1] / r, r - 1.0, x[2]
+    square = (u * u + v * v + (u * u - v * v) * C + 2.0 * u * v * S) / 2.0
+    g = p[0] - 0.3 * p[1] + p[1] * square - square * square
+    low, high = (g - 1.0) / 2.0, (g + 1.0) / 2.0
+    radial = low * u + high * (C * u + S * v) - v
+    out[0] = radial * C - 2.0 * r * S
+    out[1] = radial * S + 2.0 * r * C
+    out[2] = low * v + high * (S * u - C * v) + u
+
+
+def test_generalised_period_doubling():
+    """The multiplier is -exp(pi (lam - 0.3 k)), the cubic coefficient k."""
+    field, t, circle = circle_field(doubling, lam=-0.4, k=-0.5)
+    branch = orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.5, 0.5),
+                                intervals=16, scales=np.ones(3))
+    point, = branch.of_kind("period doubling")
+    assert point.parameter == pytest.approx(-0.15, abs=1e-9)
+    curve = orbit_curve(field, branch, point, "k", bounds=(-0.3, 0.15), width=1.0)
+    assert curve.parameter == pytest.approx(0.3 * curve.column("k"), abs=1e-9)
+    found, = curve.special
+    assert found.kind == "generalised period doubling"
+    assert found.values["k"] == pytest.approx(0.0, abs=1e-6)
+
+
+def twisted(t, x, p, out):
+    # As ``torus``, but w' = (lam - nu + i nu) w - w |w|^2.
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, a, z = x[0] / r, x[1] / r, r - 1.0, x[2]
+    growth = p[0] - p[1] - a * a - z * z
+    radial = growth * a - p[1] * z
+    out[0] = radial * C - 2.0 * r * S
+    out[1] = radial * S + 2.0 * r * C
+    out[2] = growth * z + p[1] * a
+
+
+def test_strong_resonances():
+    """The multipliers of the circle are exp(pi (lam - nu +- i nu))."""
+    field, t, circle = circle_field(twisted, lam=0.7, nu=0.8)
+    branch = orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(0.3, 0.9),
+                                intervals=16, scales=np.ones(3))
+    point, = branch.of_kind("Neimark-Sacker")
+    curve = orbit_curve(field, branch, point, "nu", direction=-1.0, bounds=(0.3, 0.9), width=1.0)
+    assert [(at.kind, at.values["nu"]) for at in curve.special] == [
+        ("resonance 1:3", pytest.approx(2.0 / 3.0, abs=1e-8)),
+        ("resonance 1:4", pytest.approx(0.5, abs=1e-8))]
+
+
 def test_kind_errors(masses):
     field, branch = masses
     with pytest.raises(InputError, match="'a regular point'; curves start at 'fold'"):
