@@ -98,7 +98,7 @@ def orbits(
 def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch | None:
     """The branch of twice the period that begins at a doubling, if it is found."""
     # Close to the single orbit the runs are not exact enough, far from it the guess is not.
-    for step in (5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4):
+    for step in (2e-3, 1e-3, 5e-4, 2.5e-4):
         try:
             return fc.doubled_by_shooting(
                 field_at(doubling.parameter), branch, doubling, bounds=(25.0, 80.0),
