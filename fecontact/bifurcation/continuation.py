@@ -88,6 +88,7 @@ def continuation(
             if step < settings.smallest_step:
                 return End(Status.STALLED, message)
             continue
+        last = here
         for there, special in reached:
             for located in special:
                 yield located
@@ -100,9 +101,9 @@ def continuation(
                 return End(Status.CLOSED)
             yield BranchPoint(there.u, there.tangent, there.values)
             count += 1
-            before, here = here, there
-        assert before is not None
-        step, halved = _next_step(problem, before, here, step, settings), 0
+            last, here = here, there
+        before = last
+        step, halved = _next_step(problem, last, here, step, settings), 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
             problem, moved, turned = adapted
