@@ -74,8 +74,8 @@ def orbits(motion: fc.SettledMotion, speed: float, bounds: tuple[float, float],
     """Stick-slip orbits by shooting from that of a run on, to slow and to fast belts."""
     return fc.orbits_by_shooting(
         fc.contact_field(beam(speed), {SPEED: speed}), SPEED, motion.times, motion.states,
-        period=motion.period, segments=1, rtol=1e-8, bounds=bounds, scales=scales(motion),
-        width=0.4, both=both, settings=settings(points))
+        period=motion.period, segments=1, rtol=1e-8, derivative_rtol=1e-2, bounds=bounds,
+        scales=scales(motion), width=0.4, both=both, settings=settings(points))
 
 
 def slipping(branch: fc.Branch, fastest: float) -> fc.Branch:

@@ -26,9 +26,6 @@ Array = NDArray[np.float64]
 
 # Times at which the states of a segment are kept, for their extremes.
 _SAMPLES = 33
-# Errors of one step of the derivatives, in those of the run, and at most. The derivatives of the
-# steps taken are exact; that they are those of the motion too matters to multipliers alone.
-_LOOSER, _LOOSEST = 1e6, 1e-2
 # A guess is not bent by more than this part of its step.
 _MOST_BENT = 0.2
 
@@ -65,6 +62,8 @@ class Shooting(Problem):
         Periods of the forcing in one of the orbit.
     rtol : float
         Relative tolerance of the runs.
+    derivative_rtol : float or None
+        That of their derivatives; see :func:`fecontact.sensitivity`.
     precision : float
         Part of a step to which special points are located on it. Beyond this, runs whose steps
         differ decide, and each further trial costs a run with derivatives.
@@ -80,6 +79,7 @@ class Shooting(Problem):
     scales: Array
     periods: int = 1
     rtol: float = 1e-9
+    derivative_rtol: float | None = None
     precision: float = 1e-7
     before: tuple[Array, Array] | None = None
     bend: Array | None = None
@@ -171,7 +171,8 @@ class Shooting(Problem):
 
 
 def shooting_from(
-    problem: Collocation, u: Array, segments: int = 4, rtol: float = 1e-9
+    problem: Collocation, u: Array, segments: int = 4, rtol: float = 1e-9,
+    derivative_rtol: float | None = None,
 ) -> tuple[Shooting, Array]:
     """The same orbit by shooting over so many segments of equal time, with its first guess.
 
@@ -189,7 +190,7 @@ def shooting_from(
     mesh = np.linspace(0.0, 1.0, segments + 1)
     starts = interpolate(problem.mesh, problem.nodes(u), mesh[:-1])
     result = Shooting(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
-                      problem.scales, problem.periods, rtol)
+                      problem.scales, problem.periods, rtol, derivative_rtol)
     return result, np.concatenate([starts.reshape(-1), u[problem.size :]])
 
 
@@ -226,8 +227,7 @@ class Shot:
         def run(start: Array, begin: float, end: float) -> Sensitivity:
             return sensitivity(self._system, float(end), t_start=float(begin), initial=start,
                                parameter=(lambda _, value: moved(value), float(self.u[-1])),
-                               rtol=problem.rtol,
-                               derivative_rtol=min(_LOOSER * problem.rtol, _LOOSEST))
+                               rtol=problem.rtol, derivative_rtol=problem.derivative_rtol)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             return list(pool.map(run, problem.starts(self.u), self._times[:-1], self._times[1:]))

@@ -20,8 +20,9 @@ def orbits_by_shooting(
     field: ContactField, parameter: str, times: ArrayLike, states: ArrayLike, *,
     values: ArrayLike | None = None, period: float | None = None, periods: int = 1,
     settings: Settings | None = None, bounds: tuple[float, float] | None = None,
-    segments: int = 4, rtol: float = 1e-9, scales: ArrayLike | None = None,
-    width: float | None = None, direction: float = 1.0, both: bool = False,
+    segments: int = 4, rtol: float = 1e-9, derivative_rtol: float | None = None,
+    scales: ArrayLike | None = None, width: float | None = None, direction: float = 1.0,
+    both: bool = False,
 ) -> Branch:
     """The branch through the orbit to which a motion of a contact system has settled.
 
@@ -43,6 +44,10 @@ def orbits_by_shooting(
         Pieces of the period, each run for itself: more of them for unstable orbits.
     rtol : float
         Relative tolerance of the runs.
+    derivative_rtol : float, optional
+        That of their derivatives, as for :func:`fecontact.sensitivity`. With many fast modes that
+        the motion hardly excites, 1e-2 saves most of the time, and changes their small multipliers
+        alone; with impacts it spoils all of them.
     values, period, periods, settings, bounds, scales, width, direction, both
         See :func:`fecontact.bifurcation.orbits.orbits_from_motion`.
 
@@ -65,12 +70,14 @@ def orbits_by_shooting(
             and motion[1].shape == (motion[0].size, field.dimension)
             and field.forcing_period(given) is None):
         motion = _to_fastest(*motion, sizes, period, field.system().basis.modes)
-    problem, u = shooting_from(*from_samples(
-        field, given, free, *motion, period, 200, 4, periods,
-        np.append(sizes, width_of(width, chosen, given[free]))), segments, rtol)
+    found = from_samples(field, given, free, *motion, period, 200, 4, periods,
+                         np.append(sizes, width_of(width, chosen, given[free])))
+    problem, u = shooting_from(*found, segments, rtol, derivative_rtol)
     attributes = {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
                   "parameter_values": given, "scales": problem.scales, "segments": segments,
                   "periods": periods, "rtol": rtol}
+    if derivative_rtol is not None:
+        attributes["derivative_rtol"] = derivative_rtol
     try:
         return follow(problem, u, chosen, name=parameter, direction=direction, both=both,
                       attributes=attributes)

@@ -46,7 +46,7 @@ def restored_shooting(
     problem = Shooting(field, values, free, np.asarray(point.values["mesh"], dtype=float),
                        point.u[: field.dimension].copy(),
                        np.asarray(known["scales"], dtype=float), int(known["periods"]),
-                       float(known.get("rtol", 1e-9)))
+                       float(known.get("rtol", 1e-9)), known.get("derivative_rtol"))
     return problem, point.u
 
 
@@ -232,6 +232,6 @@ def _doubled(problem: Shooting, u: Array) -> tuple[_Doubled, Array, Array]:
     start = np.concatenate([starts.reshape(-1), starts.reshape(-1), tail])
     shape = np.concatenate(carried)
     twice = _Doubled(problem.field, problem.values, problem.free, mesh, problem.reference, scales,
-                     2 * problem.periods, problem.rtol)
+                     2 * problem.periods, problem.rtol, problem.derivative_rtol)
     tangent = np.concatenate([shape, -shape, np.zeros(problem.common)])
     return twice, start, tangent / np.sqrt(twice.weights() @ tangent**2)
