@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 _SHORT = 1e-3
 # So many times a step is halved before a sharp turn is looked for, and each so many times again.
 _PATIENCE = 2
+# Steps go so far beyond a bound of the parameter, in what is left up to it: behind it there may be
+# no motion of the kind that is followed.
+_BEYOND = 1.2
 
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
@@ -76,6 +79,7 @@ def continuation(
     before: Solution | None = None
     halved = 0
     while count < settings.points:
+        step = min(step, _BEYOND * _room(here, settings))
         try:
             reached = _step(problem, here, step, settings)
         except FecontactError as error:
@@ -156,10 +160,19 @@ def _step(
     return None if special is None else [(there, special)]
 
 
+def _room(here: Solution, settings: Settings) -> float:
+    """Length along the tangent up to a bound of the parameter."""
+    slope = float(here.tangent[-1])
+    bound = settings.bounds[1] if slope > 0.0 else settings.bounds[0]
+    return (bound - float(here.u[-1])) / slope if slope != 0.0 else np.inf
+
+
 def _believable(problem: Problem, here: Solution, there: Solution, settings: Settings) -> bool:
     """Whether a step neither turns too much nor passes over more than its tests can tell."""
-    turn = float(problem.weights() * here.tangent @ there.tangent)
-    if turn < np.cos(settings.largest_turn):
+    row = problem.weights() * here.tangent
+    chord = there.u - here.u
+    if min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) < np.cos(
+            settings.largest_turn):
         return False
     jump = abs(int(there.values.get("unstable", 0)) - int(here.values.get("unstable", 0)))
     return not settings.locate or jump <= 2 * len(changed(here, there))

@@ -45,7 +45,8 @@ def located_between(
 
     ``row`` (N + 1,) is the direction along which the branch is parametrised between the two. With
     ``strict`` the result is None where the second point lies on another sheet of solutions: the
-    equations change their orientation, but no branch point lies in between.
+    equations change their orientation, but no branch point lies in between. So it is where a bound
+    of the parameter is passed that no solution between the two meets.
     """
     found = []
     for name in changed(here, there):
@@ -65,8 +66,9 @@ def located_between(
         if before * after < 0.0 or (after == 0.0 and before != 0.0):
             located = _zero(problem, here, there, settings, _distance_to(bound), before, after,
                             1e-12, row)
-            if located is not None:
-                found.append(BranchPoint(located.u, located.tangent, located.values))
+            if located is None:
+                return None
+            found.append(BranchPoint(located.u, located.tangent, located.values))
     found = _without_turns(found, row, 1e-4 * float(row @ (there.u - here.u)))
     return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
 

@@ -27,7 +27,9 @@ _TRIES = 60
 def rounded(
     problem: Problem, before: Solution, here: Solution, step: float, settings: Settings
 ) -> list[tuple[Solution, list[BranchPoint]]] | None:
-    """Points round a sharp turn ahead, up to where it is as far behind; None if there is none.
+    """Points round a sharp turn ahead, up to where it is as far behind, or to a bound.
+
+    None if there is no such turn.
 
     Parameters
     ----------
@@ -68,6 +70,8 @@ def rounded(
         if special is None:
             return None
         found.append((there, special))
+        if any(point.kind is None for point in special):
+            return found
         turn = float(weights * at.tangent @ there.tangent)
         turned = float(weights * here.tangent @ there.tangent) < np.cos(settings.largest_turn)
         if (turned and turn > np.cos(settings.largest_turn)

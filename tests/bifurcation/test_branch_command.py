@@ -1,8 +1,11 @@
 """The command `fecontact branch`: what it writes and says."""
 
+from pathlib import Path
+
 import pytest
 
-from fecontact.bifurcation.branch import Branch
+from fecontact import Study, load_branches, settled_motion
+from fecontact.bifurcation.branch import Branch, Status
 from fecontact.cli import execute
 
 STUDY = """
@@ -50,3 +53,27 @@ def test_errors_are_one_line(study, capsys, arguments, message):
     assert message in said
     assert "Traceback" not in said
     assert not (study.parent / "results").exists()
+
+
+def test_the_friction_oscillators_loop_is_one_branch(tmp_path, monkeypatch):
+    """From the Hopf point by slipping orbits to their fold, and back as stick-slip to 2 mm/s."""
+    study = tmp_path / "friction_branch.toml"
+    study.write_text((Path(__file__).parents[2] / "examples" / study.name).read_text())
+    monkeypatch.chdir(tmp_path)
+    assert execute(["branch", str(study)]) == 0
+    written, = tmp_path.rglob("*-branch.h5")
+    found = load_branches(written)
+    sliding, orbits = found.values()
+    hopf, = sliding.special
+    assert hopf.parameter == pytest.approx(8.336533e-3, rel=1e-7)
+    assert orbits.status is Status.BOUND
+    fold, = orbits.special
+    assert fold.kind == "fold"
+    # By integration of one degree of freedom, independently.
+    assert fold.parameter == pytest.approx(0.23348510, rel=1e-6)
+    at = orbits.points.index(fold)
+    assert (orbits.column("unstable")[:at] == 1).all()
+    assert orbits.column("stable")[at + 1:].all()
+    assert orbits.parameter[-1] == pytest.approx(2e-3, rel=1e-9)
+    run = settled_motion(Study.read(study).system(), transient=10.0, longest_period=2.0)
+    assert orbits.points[-1].values["period"] == pytest.approx(run.period, rel=1e-6)
