@@ -10,7 +10,9 @@ from test_continuation import Plane
 from fecontact import simulate
 from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.contact_field import contact_field
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
 from fecontact.bifurcation.follow import follow
+from fecontact.bifurcation.orbits import orbits_from_hopf
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.shooting_branch import orbits_by_shooting
 from fecontact.errors import InputError
@@ -154,3 +156,22 @@ def test_starts_outside_the_bounds():
     with pytest.raises(InputError, match=r"starts? lies at 0.012, outside the bounds .*, 1 to 2"):
         orbits_by_shooting(contact_field(belt(), {"ground.speed": None}), "ground.speed", t, states,
                            period=0.2, bounds=(1.0, 2.0))
+
+
+def test_collocation_goes_round_where_friction_is_less_steep():
+    """Slope 1e4 s/m: from the Hopf point to the fold and back, with nothing else on the way."""
+    field = contact_field(belt(1e4, 0.12), {"ground.speed": None})
+    sliding = equilibrium_branch(field, "ground.speed", bounds=(2e-3, 0.12), direction=-1.0)
+    hopf, = sliding.special
+    branch = orbits_from_hopf(field, sliding, hopf, bounds=(2e-3, 0.12), intervals=100,
+                              settings=Settings(step=5e-3, points=400))
+    assert branch.status is Status.BOUND
+    assert branch.parameter[-1] == pytest.approx(2e-3)
+    fold, = branch.special
+    assert fold.kind == "fold"
+    # Runs that begin stuck go on sticking and slipping below it, and come to rest above.
+    for speed, swings in ((0.99 * fold.parameter, True), (1.01 * fold.parameter, False)):
+        start = MASS**0.5 * np.array([8.4 / 5610.0, speed])
+        run = simulate(belt(1e4, speed), 60.0, initial=start, rtol=1e-8,
+                       outputs=np.append(0.0, np.linspace(59.0, 60.0, 200)))
+        assert (np.ptp(run.states[1:, 1]) > 0.5 * MASS**0.5 * speed) == swings
