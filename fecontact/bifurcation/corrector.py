@@ -14,8 +14,6 @@ from fecontact.errors import AnalysisError, FecontactError
 
 Array = NDArray[np.float64]
 
-# Steps of this relative size that grow again are rounding, as next to branch points.
-_ROUNDING = 1e-7
 # A matrix is kept as long as each step is shorter than this part of the one before.
 _SERVES = 0.2
 
@@ -69,7 +67,7 @@ def _iterated(
         steps[count_kept] = (kept or linearisation).solve(row, rhs)
         size = improve(weights, steps, count_kept)
         change = steps[count_kept]
-        if count > 2 and size > before and before <= _ROUNDING * scale:
+        if count > 2 and size > before and before <= problem.rounding * scale:
             return u, linearisation, count
         if not math.isfinite(size) or (count > 2 - more and size > before):
             return None

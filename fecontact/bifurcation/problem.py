@@ -74,6 +74,11 @@ class Problem(Protocol):
         """
         return {}
 
+    @property
+    def rounding(self) -> float:
+        """Newton steps of this relative size that grow again are rounding."""
+        return 1e-7
+
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Where Newton's method begins, a step from u."""
         return u + step * tangent

@@ -131,6 +131,11 @@ class Shooting(Problem):
         nodal = (np.diff(self.mesh)[:, None] / self.scales[:d] ** 2).reshape(-1)
         return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
 
+    @property
+    def rounding(self) -> float:
+        """Newton steps that grow again for the errors of the runs."""
+        return max(1e-7, 10.0 * self.rtol)
+
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Along the tangent, and bent like the step before."""
         guess = u + step * tangent
