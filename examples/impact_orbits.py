@@ -9,7 +9,7 @@ the folds between which motions coexist, and the doublings. Each doubled branch 
 Printed are all folds, doublings and torus bifurcations, and how many of the repeating runs lie on
 the branches; docs/impacts.md says what they mean.
 
-Usage: python examples/impact_orbits.py [FOLDER]      (prints and draws; some minutes)
+Usage: python examples/impact_orbits.py [FOLDER]      (prints and draws; five to ten minutes)
 """
 
 import sys
