@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fecontact.errors import InputError
+from fecontact.whole_files import replaced
 
 INTERRUPTED = 130  # exit code after Ctrl-C
 PATIENCE = 2.0  # nothing is shown of work that takes less [s]
@@ -118,16 +119,8 @@ def output_folder(folder: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all."""
-    with output_folder(path.parent):
-        part = path.with_name(path.name + ".part")
-        try:
-            part.write_text(text, encoding="utf-8")
-            os.replace(part, path)
-        except OSError as error:
-            raise InputError(f"{path} cannot be written "
-                             f"({(error.strerror or str(error)).lower()}).") from None
-        finally:
-            part.unlink(missing_ok=True)
+    with output_folder(path.parent), replaced(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def _remove_empty(folders: list[Path]) -> None:

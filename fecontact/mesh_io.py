@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import os
 import re
 import tempfile
 import warnings
@@ -20,6 +19,7 @@ from fecontact.formats.med import read_med
 from fecontact.formats.msh import read_msh, write_msh
 from fecontact.formats.raw import Ints, RawMesh, plane_mesh
 from fecontact.mesh import Mesh
+from fecontact.whole_files import replaced
 
 
 def read_mesh(
@@ -96,7 +96,7 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
     for name in (*mesh.boundaries, *mesh.points):
         if not name.strip() or '"' in name or "\n" in name:
             raise InputError(f"{path}: Gmsh cannot store a group named {name!r}; rename it.")
-    with _replaced(path) as part, part.open("w", encoding="utf-8", newline="\n") as stream:
+    with replaced(path) as part, part.open("w", encoding="utf-8", newline="\n") as stream:
         write_msh(mesh, stream)
 
 
@@ -149,7 +149,7 @@ def write_fields(
     kind = "triangle" if corners.shape[1] == 3 else "quad"
     import meshio
 
-    with _replaced(path) as part:
+    with replaced(path) as part:
         meshio.vtu.write(part, meshio.Mesh(_three(xyz), [(kind, corners.astype(np.int64))], data))
 
 
@@ -253,21 +253,6 @@ def _silence() -> Iterator[io.StringIO]:
           warnings.catch_warnings()):
         warnings.simplefilter("ignore")
         yield printed
-
-
-@contextlib.contextmanager
-def _replaced(path: Path) -> Iterator[Path]:
-    """``NAME.part``, which takes the place of the file when the block ends well."""
-    part = path.with_name(path.name + ".part")
-    try:
-        yield part
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose a folder "
-                         f"that exists and is writable.") from None
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
 
 
 def _three(columns: NDArray[Any]) -> NDArray[Any]:

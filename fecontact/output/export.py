@@ -1,6 +1,5 @@
 """Runs as tables and arrays for other programs: CSV, MATLAB, netCDF; and VTU for ParaView."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.dataset import columns, coordinates, to_xarray, variables
+from fecontact.whole_files import replaced
 
 SUFFIXES = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc"}
 
@@ -141,12 +141,6 @@ def _whole(path: str | Path, write: Callable[[Path], None]) -> Path:
     path = Path(path)
     if not path.parent.is_dir():
         raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
-    part = path.with_name(path.name + ".part")
-    try:
+    with replaced(path) as part:
         write(part)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error}).") from None
-    finally:
-        part.unlink(missing_ok=True)
     return path

@@ -1,12 +1,12 @@
 """Figures as files: PNG, PDF or SVG, written whole or not at all."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fecontact.errors import InputError
 from fecontact.output.figures import STYLE
+from fecontact.whole_files import replaced
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,13 +29,6 @@ def save_figure(path: str | Path, figure: Callable[[], "Figure"]) -> Path:
         raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
     from matplotlib import rc_context
 
-    part = path.with_name(path.name + ".part")
-    try:
-        with rc_context(STYLE):
-            figure().savefig(part, format=path.suffix[1:].lower())
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error}).") from None
-    finally:
-        part.unlink(missing_ok=True)
+    with replaced(path) as part, rc_context(STYLE):
+        figure().savefig(part, format=path.suffix[1:].lower())
     return path

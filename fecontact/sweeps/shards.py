@@ -11,11 +11,11 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from uuid import uuid4
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.sweeps.batch import Row, case_file
+from fecontact.whole_files import replaced
 
 
 @dataclass(frozen=True)
@@ -140,14 +140,6 @@ def write_whole(path: Path, text: str) -> None:
     InputError
         If it cannot be written.
     """
-    part = path.with_name(f"{path.name}.{uuid4().hex}.part")
-    try:
+    with replaced(path) as part:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written "
-                         f"({(error.strerror or str(error)).lower()}).") from None
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
