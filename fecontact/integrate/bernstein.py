@@ -1,0 +1,107 @@
+r"""Polynomials over a step in Bernstein form, whose coefficients bound them.
+
+.. math::
+
+    p(s) = \sum_k b_k \binom{n}{k} s^k (1 - s)^{n - k}, \qquad
+    \min_k b_k \le p(s) \le \max_k b_k \quad (0 \le s \le 1)
+
+The interpolant of a step is a polynomial of the part s of the step, and so is every sum of its
+states, such as the height of a node above flat ground. Whether such a sum changes its sign within
+the step is decided by its coefficients, and by those of its halves where they leave it open.
+
+References
+----------
+G. Farin, Curves and Surfaces for CAGD, 5th ed., chapters 4 and 5 (de Casteljau's algorithm,
+the convex hull, multiplication by s and 1 - s).
+"""
+
+from fecontact.compiled import helper
+
+# Parts of a step are told apart down to this, after so many halvings less two.
+FINEST = 2.0**-46
+DEPTH = 48
+NOWHERE = 2.0
+
+
+@helper
+def times_s(b, degree):  # type: ignore[no-untyped-def]
+    """Multiply p by s: b[: degree + 2] becomes that of the degree one higher."""
+    up = 1.0 / (degree + 1)
+    for i in range(degree + 1, 0, -1):
+        b[i] = i * up * b[i - 1]
+    b[0] = 0.0
+
+
+@helper
+def times_rest(b, degree):  # type: ignore[no-untyped-def]
+    """Multiply p by 1 - s: b[: degree + 2] becomes that of the degree one higher."""
+    up = 1.0 / (degree + 1)
+    for i in range(degree + 1):
+        b[i] = (degree + 1 - i) * up * b[i]
+    b[degree + 1] = 0.0
+
+
+@helper
+def smallest(b):  # type: ignore[no-untyped-def]
+    """A bound below p, that of its coefficients."""
+    least = b[0]
+    for i in range(1, len(b)):
+        least = min(least, b[i])
+    return least
+
+
+@helper
+def value(b, s, row):  # type: ignore[no-untyped-def]
+    """p(s) by de Casteljau's algorithm; ``row`` (n + 1,) is room to work in."""
+    n = len(b)
+    for i in range(n):
+        row[i] = b[i]
+    for k in range(n - 1, 0, -1):
+        for i in range(k):
+            row[i] += s * (row[i + 1] - row[i])
+    return row[0]
+
+
+@helper
+def split(b, left):  # type: ignore[no-untyped-def]
+    """Put the coefficients of p over [0, 1/2] into ``left``, and those over [1/2, 1] into b."""
+    n = len(b)
+    for k in range(n):
+        left[k] = b[0]
+        for i in range(n - 1 - k):
+            b[i] = 0.5 * (b[i] + b[i + 1])
+
+
+@helper
+def first_below(b, room):  # type: ignore[no-untyped-def]
+    """Where p first falls below zero, to the part FINEST of the step; NOWHERE if it does not.
+
+    Zero itself is not below, and a dip that lasts less than FINEST may be left out. ``room``
+    (DEPTH, n + 1) is room to work in; b is kept.
+
+    The step is halved, the left half first, until the coefficients of a part are of one sign or
+    the part is as short as FINEST.
+    """
+    if smallest(b) >= 0.0:
+        return NOWHERE
+    n = len(b)
+    # The parts that are left, the earliest on top, with their widths in the last column.
+    for i in range(n):
+        room[0, i] = b[i]
+    room[0, n] = 1.0
+    waiting, begin = 1, 0.0
+    while waiting > 0:
+        part, width = room[waiting - 1, :n], room[waiting - 1, n]
+        if part[0] < 0.0:
+            return begin
+        bound = smallest(part)
+        if bound < 0.0 and width > FINEST:
+            split(part, room[waiting, :n])
+            room[waiting - 1, n] = room[waiting, n] = 0.5 * width
+            waiting += 1
+            continue
+        begin += width
+        if bound < 0.0 and part[n - 1] < 0.0:
+            return begin
+        waiting -= 1
+    return NOWHERE
