@@ -29,6 +29,10 @@ class AnalysisError(FecontactError, ArithmeticError):
     """A computation has no answer (no equilibrium, no convergence), and the message says why."""
 
 
+class ModelWarning(UserWarning):
+    """A result lies outside what the model holds for, and the message says where."""
+
+
 def choices(names: Iterable[str]) -> str:
     """The given names, sorted and quoted, for a message: ``'a', 'b'``, or ``none``."""
     return ", ".join(f"'{name}'" for name in sorted(names)) or "none"

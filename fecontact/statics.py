@@ -9,9 +9,13 @@ from fecontact.errors import AnalysisError
 from fecontact.laws.contract import friction_law, signal
 from fecontact.laws.signals import Constant
 from fecontact.memory_states import settled
+from fecontact.model_limits import warn_of_limits
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
+
+# Part of the load that may be out of balance, however large the rounding of other forces is.
+_UNBALANCED = 1e-6
 
 
 @friction_law
@@ -47,7 +51,21 @@ def static_equilibrium(
     AnalysisError
         If there is no equilibrium: it names the direction in which nothing holds the body, or
         says that the load lifts or tips it; and for steady sliding on wavy ground.
+
+    Warns
+    -----
+    ModelWarning
+        If the body moves by more than its own size, or is pressed into the ground by more than a
+        hundred times the height of its roughness.
     """
+    q = equilibrium(system, friction, time)
+    warn_of_limits(system, time, np.concatenate([q, np.zeros(system.size - len(q))]),
+                   "In equilibrium")
+    return q
+
+
+def equilibrium(system: ContactSystem, friction: bool, time: float) -> Array:
+    """As :func:`static_equilibrium`, for callers that look at the limits of the model later."""
     ground = system.ground
     if friction and ground.wavy:
         raise AnalysisError("There is no steady sliding on wavy ground; start from rest or "
@@ -232,10 +250,17 @@ class _Balance:
         return float(np.linalg.norm(force / np.sqrt(self.scale)))
 
     def _noise(self, q: Array, load: float) -> float:
+        """Size of the out-of-balance force that counts as rounding.
+
+        A body that runs away under a load that nothing balances has larger and larger forces with
+        their rounding; the load itself may not disappear in it.
+        """
         arrays = self.arrays
         terms = np.abs(arrays.stiffness) @ np.abs(q) + np.abs(load * self.load)
         contact = self.force(q, load) - load * self.load + arrays.stiffness @ q
-        return 1e-11 * self._size(terms + np.abs(contact))
+        rounding = 1e-11 * self._size(terms + np.abs(contact))
+        applied = self._size(load * self.load)
+        return min(rounding, _UNBALANCED * applied) if applied > 0.0 else rounding
 
 
 def _at_mean(system: ContactSystem) -> kernels.SystemArrays:

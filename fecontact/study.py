@@ -19,7 +19,6 @@ from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.names import with_folder
-from fecontact.laws.normal import RoughSurface
 from fecontact.mesh import Mesh
 from fecontact.study_branch import BranchSettings
 from fecontact.study_geometry import Geometry, MeshFile, geometry_from_table, geometry_table
@@ -74,7 +73,8 @@ class Study:
     basis_settings : BasisSettings
         ``[basis]``
     normal, friction, ground, drive, load
-        ``[normal]``, ... : laws, ground, drive and load; see
+        ``[normal]``, ... : laws, ground, drive and load (what is in contact needs a normal law,
+        for which there is no default); see
         :class:`~fecontact.system.ContactSystem`.
     contact : mapping of contact group to ContactLaws
         ``[contact.NAME.normal]``, ``[contact.NAME.friction]``: laws of single contact groups; the
@@ -99,7 +99,7 @@ class Study:
     geometry: Geometry
     body_settings: BodySettings = field(default_factory=BodySettings)
     basis_settings: BasisSettings = field(default_factory=BasisSettings)
-    normal: NormalLaw = field(default_factory=RoughSurface)
+    normal: NormalLaw | None = None
     friction: FrictionLaw = field(default_factory=ExponentialFriction)
     contact: Mapping[str, ContactLaws] = field(default_factory=dict)
     ground: Ground = field(default_factory=Ground)
@@ -169,7 +169,7 @@ class Study:
             if "sweep" in tables else None,
             path=path,
             **{_ATTRIBUTES[name]: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
-               for name, kind in _SECTIONS.items()},
+               for name, kind in _SECTIONS.items() if name in tables or name != "normal"},
         )
 
     @property
@@ -198,7 +198,8 @@ class Study:
     def tables(self, *, defaults: bool = True) -> dict[str, Any]:
         """All sections as tables for TOML, with or without values equal to the defaults."""
         sections = {name: to_table(getattr(self, attribute), defaults=defaults)
-                    for name, attribute in _ATTRIBUTES.items()}
+                    for name, attribute in _ATTRIBUTES.items()
+                    if getattr(self, attribute) is not None}
         contact = {"contact": plain(self.contact)} if self.contact else {}
         if self.sweep is not None:
             sections["sweep"] = to_table(self.sweep, defaults=defaults)

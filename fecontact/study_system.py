@@ -9,7 +9,7 @@ from fecontact.basis import ModalBasis
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Crown, gap_values
 from fecontact.laws.soundness import require_sound
-from fecontact.system import ContactSystem
+from fecontact.system import NO_NORMAL_LAW, ContactSystem
 from fecontact.tables import PART_CLASSES, located
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ def contact_system(study: "Study", basis: ModalBasis, title: str) -> ContactSyst
         if name not in groups:
             raise InputError(f"{title}: [contact.{name}]: the basis has no contact group '{name}'"
                              f"{nearest(name, groups)}; its groups are: {choices(groups)}.")
+    if study.normal is None and len(_own(study, "normal")) < len(groups):
+        raise InputError(NO_NORMAL_LAW.format(f"{title} lacks the section [normal]"))
     for section, law, count in _laws(study, groups):
         with located(f"{title}: [{section}]:", type(law).__name__):
             law.table(np.full(count, 1.0 / count))

@@ -17,12 +17,15 @@ from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
 from fecontact.laws.soundness import require_sound
 from fecontact.parameters import parameters_of, with_parameters
 from fecontact.system_arrays import require_motion, system_arrays
 
 Array = NDArray[np.float64]
+
+NO_NORMAL_LAW = ("{}, the law of the normal force, which no default can replace; give a rough "
+                 "surface with its stiffness and roughness_height, or another law: `fecontact "
+                 "laws` lists them, `fecontact laws rough-surface` says how to choose.")
 
 PARTS = ("normal", "friction", "ground", "drive", "load")
 
@@ -57,13 +60,14 @@ class ContactSystem:
     Raises
     ------
     InputError
-        For a part of another kind, laws for groups that the basis lacks, parameters or gaps of
+        Without a normal law; for a part of another kind, laws for groups that the basis lacks, parameters or gaps of
         another number than there are contact nodes, laws that :func:`require_sound` refuses, and
         drives and loads at places that no mode moves in their direction.
     """
 
     basis: ModalBasis
-    normal: NormalLaw | Mapping[str, NormalLaw] = field(default_factory=RoughSurface)
+    # Required, with a sentence that says more than Python's own.
+    normal: NormalLaw | Mapping[str, NormalLaw] = cast(Any, None)
     friction: FrictionLaw | Mapping[str, FrictionLaw] = field(default_factory=ExponentialFriction)
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
@@ -71,6 +75,8 @@ class ContactSystem:
     gap: Gap = 0.0
 
     def __post_init__(self) -> None:
+        if self.normal is None:
+            raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
         for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} cannot serve as "

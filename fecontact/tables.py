@@ -116,11 +116,11 @@ def system_from_tables(
     """The contact system of a basis and tables ``normal``, ``friction``, ... , ``gap``."""
     parts: dict[str, Any] = {
         part: from_table(cls, tables.get(part, {}), f"{where}: [{part}]")
-        for part, cls in PART_CLASSES.items()
+        for part, cls in PART_CLASSES.items() if part in tables or part != "normal"
     }
     for group, laws in tables.get("contact", {}).items():
         for part, table in laws.items():
-            if not isinstance(parts[part], dict):
+            if not isinstance(parts.get(part), dict):
                 parts[part] = {}
             parts[part][group] = from_table(PART_CLASSES[part], table,
                                             f"{where}: [contact.{group}.{part}]")

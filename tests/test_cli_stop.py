@@ -8,6 +8,7 @@ FALLING = """
 geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.01 }
 body = { material = "steel", thickness = 0.02 }
 basis = { modes = 3, contact_nodes = 4 }
+normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
 load = { normal = 10.0 }
 output = { frames = 0 }
 

@@ -148,6 +148,7 @@ def test_groups_have_laws_of_their_own():
 
 def test_a_group_without_a_law_is_named():
     with pytest.raises(ValueError, match="lacks a law for the contact group 'right'"):
-        ContactSystem(basis(("left", "right")), friction={"left": JenkinsFriction(1e5, 0.4)})
+        ContactSystem(basis(("left", "right")), RoughSurface(1e6, 1e-5),
+                      friction={"left": JenkinsFriction(1e5, 0.4)})
     with pytest.raises(ValueError, match="contact group 'centre'"):
-        ContactSystem(basis(), friction={"centre": JenkinsFriction(1e5, 0.4)})
+        ContactSystem(basis(), RoughSurface(1e6, 1e-5), friction={"centre": JenkinsFriction(1e5, 0.4)})

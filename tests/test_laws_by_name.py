@@ -18,7 +18,7 @@ from fecontact.tables import from_table, to_table
 
 # Values for parameters that have no defaults.
 GIVEN = {
-    "stiffness": 1e6, "restitution": 0.7, "reference_velocity": 0.1, "force": 14.0,
+    "stiffness": 1e6, "roughness_height": 1e-5, "restitution": 0.7, "reference_velocity": 0.1, "force": 14.0,
     "decay_length": 1e-6, "nominal_area": 1e-4, "coefficient": 1e-9, "asperities": 1e4,
     "asperity_radius": 1e-5, "composite_modulus": 1e11, "height_deviation": 1e-6,
     "clearance": 1e-4, "wavelength": 1e-2, "amplitude": 1e-6, "amplitudes": (1e-6, 2e-6),
@@ -30,7 +30,13 @@ GIVEN = {
     "start": 0.1, "cut_off_wavelength": 1e-4, "roll_off_wavelength": 5e-3, "kind": "half-sine",
 }
 ALL = [(kind, name) for kind, names in law_names().items() for name in names]
-HEAD = """
+SURFACE = """
+[normal]
+stiffness = 0.3e6
+roughness_height = 5.2e-6
+damping = 6.0
+"""
+HEAD = SURFACE + """
 [geometry]
 shape = "beam"
 length = 0.2
@@ -47,6 +53,8 @@ def instance(kind, name):
     cls = law_names()[kind][name]
     needed = {entry.name: GIVEN[entry.name] for entry in fields(cls)
               if entry.default is MISSING and entry.default_factory is MISSING}
+    if name == "measured-surface":
+        needed["roughness_height"] = GIVEN["roughness_height"]
     if name in ("trace", "tabulated"):
         keys = {"trace": ("abscissa", "heights"), "tabulated": ("times", "values")}[name]
         needed |= {key: GIVEN[key] for key in keys if key in {e.name for e in fields(cls)}}
@@ -83,7 +91,8 @@ def test_every_law_runs_from_a_study(kind, name, tmp_path):
         pytest.skip("a free body has no equilibrium under a prescribed normal force")
     lines = "\n".join(f"{key} = {value!r}".replace("(", "[").replace(")", "]").replace("'", '"')
                       for key, value in to_table(law).items())
-    study = Study.from_toml(f"{HEAD}\n[{part}]\n{lines}\n[load]\nnormal = 20.0\n[ground]\n"
+    head = HEAD.replace(SURFACE, "") if part == "normal" else HEAD
+    study = Study.from_toml(f"{head}\n[{part}]\n{lines}\n[load]\nnormal = 20.0\n[ground]\n"
                             f"speed = 0.01\n[drive]\nstiffness_x = 1e4\n")
     assert getattr(study, part) == law
     assert Study.from_toml(study.to_toml()) == study
@@ -243,6 +252,8 @@ contact = ["left", "right"]
 contact_nodes = [3, 4]
 [normal]
 stiffness = 2e6
+roughness_height = 5.2e-6
+damping = 6.0
 [contact.left.friction]
 law = "jenkins"
 stiffness = 1e6
@@ -389,4 +400,4 @@ def test_lists_per_node_are_counted_rightly():
         fc.RoughSurface((1e6,) * 3, (1e-6,) * 2).node_count()
     basis = Study.from_toml(HEAD).basis()
     with pytest.raises(fc.FecontactError, match="3 values for 5 contact nodes"):
-        fc.ContactSystem(basis, normal=fc.RoughSurface((1e6,) * 3))
+        fc.ContactSystem(basis, normal=fc.RoughSurface((1e6,) * 3, 1e-6))

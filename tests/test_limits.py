@@ -6,12 +6,20 @@ from oscillators import friction_oscillator, impact_oscillator
 from test_events import START, drop
 
 from fecontact import (
+    ConstantFriction,
+    ContactSystem,
     InputError,
+    Load,
+    ModalBasis,
+    ModelWarning,
     NormalLaw,
+    RigidStart,
+    RoughSurface,
     Status,
     normal_law,
     simulate,
     smoothing_cost,
+    static_equilibrium,
 )
 
 
@@ -106,6 +114,57 @@ def test_energy_from_nowhere_has_a_status():
     assert run.status is Status.ENERGY_GREW
     assert run.energies.growth > 0.01
     assert simulate(drop(), 0.5, initial=START).status is Status.FINISHED
+
+
+@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+@pytest.mark.parametrize("change", ["velocity", "speed"])
+def test_energies_beyond_all_numbers_have_a_status(change):
+    """(1e300)^2 overflows, a motion at 1e300 m/s does not."""
+    rows = np.zeros((3, 2))
+    rows[0, 0] = rows[1, 1] = 1.0
+    basis = ModalBasis.from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
+                                     {"contact": rows[None], "C": rows})
+    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), load=Load(14.0))
+    start = "rest"
+    if change == "velocity":
+        start = RigidStart(velocity=(1e300, 0.0, 0.0))
+    else:
+        system = system.with_(**{"ground.speed": 1e308})
+    run = simulate(system, 0.1, initial=start, outputs=11)
+    assert run.status is Status.ENERGY_NOT_FINITE
+    assert not np.isfinite(run.energies.imbalance)
+
+
+def test_runs_warn_where_they_leave_the_limits_of_the_model():
+    """A mass on two nodes, 20 mm apart: thrown up farther than that, pressed in deeper than it."""
+    rows = np.zeros((2, 3, 1))
+    rows[:, 1, 0] = 1.0
+    basis = ModalBasis.from_matrices([[1.0]], [[0.0]], {"contact": rows, "C": rows[0]},
+                                     contact_x=[0.0, 0.02])
+    system = ContactSystem(basis, RoughSurface(1e6, 1e-5))
+    with pytest.warns(ModelWarning, match=r"In this run points of the body move by 0\.021 m, more "
+                                          r"than its own size of 0\.02 m"):
+        run = simulate(system, 0.21, initial=np.array([0.0, 0.1]))
+    assert len(run.limits_exceeded) == 1
+    assert simulate(system, 0.19, initial=np.array([0.0, 0.1])).limits_exceeded == ()
+    # v (m / c)^(1/2) deep: 1.1 mm are 110 roughness heights, 0.9 mm are 90.
+    with pytest.warns(ModelWarning, match=r"contact node 0 is 0\.0011 m deep .* 1\.1e\+02 times"):
+        simulate(system, 5e-3, initial=np.array([0.0, -1.1]))
+    assert simulate(system, 5e-3, initial=np.array([0.0, -0.9])).limits_exceeded == ()
+
+
+def test_sliding_far_along_the_ground_is_within_the_limits():
+    """Two metres over level ground, on a face of 20 mm: a rigid translation is exact."""
+    rows = np.zeros((2, 3, 2))
+    rows[:, 0, 0] = rows[:, 1, 1] = 1.0
+    basis = ModalBasis.from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows, "C": rows[0]},
+                                     contact_x=[0.0, 0.02])
+    system = ContactSystem(basis, RoughSurface(1e6, 1e-5), ConstantFriction(0.1), load=Load(10.0))
+    start = np.concatenate([static_equilibrium(system), [2.0, 0.0]])
+    run = simulate(system, 3.0, initial=start)
+    # v^2 / (2 mu N / m)
+    assert run.displacement(0)[-1, 0] == pytest.approx(2.0, rel=1e-3)
+    assert run.limits_exceeded == ()
 
 
 def test_wear_follows_from_friction_work():

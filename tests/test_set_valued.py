@@ -232,7 +232,7 @@ def test_mass_lifted_off_a_rigid_stop():
     """A load a sin(w t) - F lifts it where a sin(w t) = F; until then the stop holds it."""
     row = np.array([[0.0], [1.0], [0.0]])
     basis = ModalBasis.from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
-    system = ContactSystem(basis, load=Load(1.0), drive=Drive(
+    system = ContactSystem(basis, RoughSurface(1e5, 1e-4), load=Load(1.0), drive=Drive(
         stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5))
     times = np.linspace(0.0, 2.0, 201)
     run = integrate_set_valued(system, np.zeros(2), times, rtol=1e-10, restitution=0.5)

@@ -21,6 +21,7 @@ from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
 RTOL = 1e-6
+SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 BALANCE = 20.0 * RTOL
 
 
@@ -28,7 +29,7 @@ def mass_in_y(mass=1.0, spring=0.0, **parts):
     """A mass that moves up and down only."""
     rows = np.array([[0.0], [1.0], [0.0]])
     basis = ModalBasis.from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
-    return ContactSystem(basis, **parts)
+    return ContactSystem(basis, **{"normal": SURFACE, **parts})
 
 
 def mass_in_plane(mass=1.0, spring=0.0, **parts):
@@ -37,7 +38,7 @@ def mass_in_plane(mass=1.0, spring=0.0, **parts):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = ModalBasis.from_matrices(mass * np.eye(2), np.diag([spring, 0.0]),
                                      {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **parts)
+    return ContactSystem(basis, **{"normal": SURFACE, **parts})
 
 
 def at(system, x=0.0, y=0.0, x_rate=0.0, y_rate=0.0):
@@ -437,7 +438,7 @@ def test_start_at_rest_on_wavy_ground():
 def test_rigid_start_about_a_hinge():
     body = ElasticBody(rectangle(0.2, 0.02, 12, 2), Material(), 0.01, fixed={"left": "hinge"})
     basis = body.modal_basis(4, contact="bottom", contact_nodes=2, C=(0.2, 0.02))
-    system = ContactSystem(basis)
+    system = ContactSystem(basis, SURFACE)
     # The hinge at (0, 0.01) stays: the origin moves by (0.01 phi, 0).
     y = initial_state(system, RigidStart((1e-5, 0.0, 1e-3)), 0.0)
     assert basis.T[1] @ y[:4] == pytest.approx([-1e-5, 2e-4, 1e-3], rel=1e-9)
@@ -569,7 +570,7 @@ def test_other_errors_in_progress_are_passed_on():
 def test_a_motion_that_grows_beyond_all_numbers(method):
     rows = np.array([[[0.0], [1.0], [0.0]]])
     basis = ModalBasis.from_matrices([[1.0]], [[1.0]], {"contact": rows}, damping=[[-1e4]])
-    run = simulate(ContactSystem(basis), 1.0, initial=np.array([1.0, 0.0]), outputs=10001,
+    run = simulate(ContactSystem(basis, SURFACE), 1.0, initial=np.array([1.0, 0.0]), outputs=10001,
                    method=method)
     assert run.status is Status.FAILED
     assert "message" in run.statistics

@@ -8,7 +8,7 @@ from scipy.optimize import brentq, minimize
 
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
-from fecontact.errors import AnalysisError
+from fecontact.errors import AnalysisError, ModelWarning
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
@@ -19,6 +19,9 @@ from fecontact.system import ContactSystem
 STIFFNESS, R = 10e6, 10e-6
 NORMAL = RoughSurface(STIFFNESS, R, 40.0)
 LENGTH, HEIGHT, THICKNESS = 0.2, 0.02, 0.01
+
+# Presses far through the roughness, where the law is a plain spring.
+deep = pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
 
 
 def mass_point(**parts):
@@ -53,6 +56,7 @@ def penetration_of(force):
 
 # One mass ----------------------------------------------------------------------------------------
 
+@deep
 @pytest.mark.parametrize("force", [1e-6, 0.14, 14.0, 49.9, 50.1, 140.0, 1e5])
 @pytest.mark.parametrize("gap", [0.0, 3e-6])
 def test_mass_on_the_ground(force, gap):
@@ -160,6 +164,7 @@ def test_pressed_beam_against_energy_minimum(load, C_at):
     assert np.abs(rate).max() < 1e-8 * load / np.sqrt(mass)
 
 
+@deep
 def test_stiff_body_pressed_off_its_middle():
     """Rigid body on linear springs c / L: p = N / L (1 + 12 e s / L^2), s from the middle."""
     basis = ElasticBody(rectangle(LENGTH, 0.1, 16, 8), Material(), THICKNESS).modal_basis(
@@ -172,6 +177,7 @@ def test_stiff_body_pressed_off_its_middle():
     assert force == pytest.approx(400.0 / 8 * (1.0 + factor * 0.02 * s / LENGTH**2), rel=1e-3)
 
 
+@deep
 def test_stiff_body_lifts_off_on_one_side():
     """Load outside the middle third: a triangle of pressure over 3 (L / 2 - e)."""
     n = 40
@@ -334,6 +340,7 @@ def test_ground_far_from_the_reference_place(height):
     assert q[1] == pytest.approx(height - penetration_of(14.0), rel=1e-9)
 
 
+@deep
 @pytest.mark.parametrize("seed", range(6))
 def test_light_bodies_on_waves_and_gaps(seed):
     """Penetrations far below waves and gaps: which nodes touch is not known beforehand."""
@@ -351,3 +358,48 @@ def test_light_bodies_on_waves_and_gaps(seed):
         assert F.sum() == pytest.approx(load, rel=1e-6)
         assert F @ (basis.contact_x - at) == pytest.approx(0.0, abs=1e-6 * load * LENGTH)
         assert ((F > 0.0) == (u > 0.0)).all()
+
+
+# Runaways, and what leaves the limits of the model ------------------------------------------------
+
+def bracket(reduction="residual", B=(LENGTH, HEIGHT), **parts):
+    """Feet under the left half, the load beyond them, a spring that cannot hold the rotation."""
+    mesh = rectangle(LENGTH, HEIGHT, 16, 2, split=((0.0, 0.1),))
+    basis = ElasticBody(mesh, Material(), THICKNESS).modal_basis(
+        8, reduction=reduction, contact="feet", contact_nodes=4, C=(0.19, HEIGHT), B=B)
+    return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-6, 0.0), "load": Load(100.0),
+                                   "drive": Drive(stiffness_x=1e5), **parts})
+
+
+@pytest.mark.parametrize("friction", [False, True])
+@pytest.mark.parametrize("reduction", ["vibration", "residual"])
+@pytest.mark.parametrize("stiffness", [1e5, 1e7, 1e9])
+def test_rounding_of_a_runaway_is_no_balance(friction, reduction, stiffness):
+    """The spring pulls along the ground at the height of the tilt's own axis."""
+    system = bracket(reduction, normal=RoughSurface(stiffness, 1e-6, 0.0),
+                     ground=Ground(speed=0.1 if friction else 0.0))
+    with pytest.raises(AnalysisError, match="tips over"):
+        static_equilibrium(system, friction=friction)
+
+
+def test_a_spring_that_holds_the_bracket_far_off_is_reported():
+    """Tilt about the feet's outer edge: c_y (0.2 - X)^2 phi = N (0.19 - X), X the last node."""
+    system = bracket("vibration", drive=Drive(stiffness_x=1e5, stiffness_y=100.0),
+                     normal=RoughSurface(1e9, 1e-6, 0.0))
+    edge = system.basis.contact_x.max()
+    with pytest.warns(ModelWarning, match=r"In equilibrium: points of the body move by"):
+        q = static_equilibrium(system)
+    tilt = -(100.0 * (0.19 - edge)) / (100.0 * (LENGTH - edge) ** 2)
+    assert system.basis.contact_T[0, 2] @ q == pytest.approx(tilt, rel=1e-2)
+    stiff = system.with_(**{"drive.stiffness_y": 1e6})
+    static_equilibrium(stiff)
+
+
+def test_pressed_deeper_than_a_hundred_roughness_heights():
+    soft = mass_point(normal=RoughSurface(1e3, 1e-5, 0.0))
+    with pytest.warns(ModelWarning, match="contact node 0 is 0.014 m deep .* 1.4e.03 times"):
+        static_equilibrium(soft)
+    # 14 N on 14.2e3 N/m: 99.1 heights.
+    static_equilibrium(mass_point(normal=RoughSurface(14.0 / (98.6 * 1e-5), 1e-5, 0.0)))
+    with pytest.warns(ModelWarning, match="101 times|1e.02 times"):
+        static_equilibrium(mass_point(normal=RoughSurface(14.0 / (100.6 * 1e-5), 1e-5, 0.0)))

@@ -13,6 +13,7 @@ from fecontact.integrate.initial import RigidStart
 from fecontact.laws.drive import Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
+from fecontact.laws.normal import RoughSurface
 from fecontact.mesh_io import write_mesh
 from fecontact.points import Patch
 from fecontact.shapes import Beam, Block, Pendulum
@@ -39,6 +40,11 @@ contact_nodes = 4
 damping = 0.01
 C = { at = "C", radius = 0.01 }
 points = { tip = [0.1, 0.01], face = "right" }
+
+[normal]
+stiffness = 0.3e6
+roughness_height = 5.2e-6
+damping = 6.0
 
 [friction]
 static_coefficient = [0.5, 0.6, 0.7, 0.8]
@@ -67,8 +73,9 @@ def test_study_is_the_system_written_by_hand(tiny):
     basis = body.modal_basis(5, contact_nodes=4, damping=0.01, C=Patch("C", 0.01),
                              points={"tip": (0.1, 0.01), "face": "right"})
     by_hand = ContactSystem(
-        basis, friction=ExponentialFriction(static_coefficient=(0.5, 0.6, 0.7, 0.8),
-                                            kinetic_coefficient=0.0),
+        basis, RoughSurface(0.3e6, 5.2e-6, 6.0),
+        friction=ExponentialFriction(static_coefficient=(0.5, 0.6, 0.7, 0.8),
+                                     kinetic_coefficient=0.0),
         ground=Ground(speed=1.0), load=Load(normal=10.0), gap=1e-6)
     system = tiny.system()
     assert system.parameters() == by_hand.parameters()

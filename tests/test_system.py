@@ -194,7 +194,7 @@ def mass_point(mass=2.0, **parts):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = ModalBasis.from_matrices(mass * np.eye(2), np.zeros((2, 2)),
                                      {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **parts)
+    return ContactSystem(basis, **{"normal": RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 
 def acceleration(system, t=0.0, place=(0.0, 0.0), velocity=(0.0, 0.0)):
@@ -415,7 +415,7 @@ def test_systems_cannot_be_changed():
     ("ground", 0.1, "ground = 0.1 cannot serve as ground"), ("basis", None, "basis = None"),
     ("normal", Ground(), "cannot serve as normal"), ("load", Drive(), "cannot serve as load"),
     ("normal", ExponentialFriction(), "cannot serve as normal"),
-    ("friction", RoughSurface(), "cannot serve as friction"), ("drive", Load(), "as drive"),
+    ("friction", RoughSurface(1e6, R), "cannot serve as friction"), ("drive", Load(), "as drive"),
 ])
 def test_changes_are_checked(name, value, message):
     with pytest.raises(InputError, match=message):

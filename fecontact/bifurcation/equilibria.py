@@ -221,11 +221,11 @@ def _simplified(J: Array, f: Array) -> float:
 def steady_sliding(field: ContactField, values: Array) -> Array:
     """State [q, 0, z] of steady sliding of a contact system, the start for Newton's method."""
     from fecontact.memory_states import settled
-    from fecontact.statics import static_equilibrium
+    from fecontact.statics import equilibrium
 
     system = field.system(values)
     state = np.zeros(field.dimension)
-    state[: system.basis.modes] = static_equilibrium(system, friction=True)
+    state[: system.basis.modes] = equilibrium(system, True, 0.0)
     return settled(0.0, state, system.arrays)
 
 

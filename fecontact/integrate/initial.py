@@ -10,7 +10,7 @@ from fecontact.basis import ModalBasis
 from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.memory_states import settled
-from fecontact.statics import static_equilibrium
+from fecontact.statics import equilibrium
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
             names = ("rest", "sliding")
             raise InputError(f"initial = '{initial}' must be one of {choices(names)}"
                              f"{nearest(initial, names)}, or a rigid displacement and velocity.")
-        q = static_equilibrium(system, friction=initial == "sliding", time=time)
+        q = equilibrium(system, initial == "sliding", time)
         state = np.concatenate([q, np.zeros(system.size - m)])
         return settled(time, state, system.arrays) if initial == "sliding" else state
     if isinstance(initial, RigidStart):

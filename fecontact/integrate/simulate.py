@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.contact_energy import POWERS
 from fecontact.contact_kernels import PENETRATION
-from fecontact.errors import InputError, choices, nearest
+from fecontact.errors import InputError, ModelWarning, choices, nearest
 from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
@@ -93,6 +94,11 @@ def simulate(
         For values out of range, and a checkpoint of another run.
     AnalysisError
         If there is no equilibrium to start from.
+
+    Warns
+    -----
+    ModelWarning
+        For each of :attr:`Trajectory.limits_exceeded`.
     """
     if not isinstance(system, ContactSystem):
         raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")
@@ -150,20 +156,32 @@ def simulate(
 
         times, states, work, status, statistics = scipy_solvers.integrate(
             system, state, times, method=method, rtol=rtol, progress=progress)
-    if status is Status.FINISHED and method != "set-valued" and _grows(
-            system, times, states, work, rtol):
-        status = Status.ENERGY_GREW
-    return Trajectory(system, times, states[:, :m], states[:, m : 2 * m], work, status, statistics,
-                      memory=states[:, 2 * m :] if system.memory else None, **rest)
+    trajectory = Trajectory(
+        system, times, states[:, :m], states[:, m : 2 * m], work, status, statistics,
+        memory=states[:, 2 * m :] if system.memory else None, **rest)
+    if status in (Status.FINISHED, Status.EVENT):
+        trajectory = replace(trajectory, status=_checked(trajectory, method, rtol))
+    for sentence in trajectory.limits_exceeded:
+        warnings.warn(f"In this run {sentence}", ModelWarning, stacklevel=2)
+    return trajectory
 
 
-def _grows(system: ContactSystem, times: Array, states: Array, work: Array, rtol: float) -> bool:
-    """Whether energy came from nowhere, by some of the output times."""
-    some = np.unique(np.linspace(0, len(times) - 1, min(len(times), _LOOKS)).astype(int))
-    m = system.basis.modes
-    run = Trajectory(system, times[some], states[some, :m], states[some, m : 2 * m], work[some],
-                     memory=states[some, 2 * m :] if system.memory else None)
-    return run.energies.growth > max(_GROWTH, 1e3 * rtol)
+def _checked(run: Trajectory, method: str, rtol: float) -> Status:
+    """The status of a run that has come to its end, by its energies at some output times."""
+    some = np.unique(np.linspace(0, len(run.time) - 1, min(len(run.time), _LOOKS)).astype(int))
+    histories = ("time", "modal_coordinates", "modal_velocities", "work", "memory",
+                 "held_normal_force", "held_friction_force")
+    part = replace(run, **{name: value[some] for name in histories
+                           if (value := getattr(run, name)) is not None})
+    with np.errstate(over="ignore", invalid="ignore"):
+        energies = part.energies
+        amounts = np.array([getattr(energies, entry.name) for entry in fields(energies)])
+        forces = np.array([part.normal_force, part.friction_force])
+        if not (np.isfinite(amounts).all() and np.isfinite(forces).all()
+                and np.isfinite(run.states).all() and np.isfinite(run.work).all()):
+            return Status.ENERGY_NOT_FINITE
+        grown = method != "set-valued" and energies.growth > max(_GROWTH, 1e3 * rtol)
+    return Status.ENERGY_GREW if grown and run.status is Status.FINISHED else run.status
 
 
 def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:

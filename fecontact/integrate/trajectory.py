@@ -28,6 +28,9 @@ class Status(Enum):
     ENERGY_GREW = ("The stored energy grew by more than all work put in: a law or the tolerance is "
                    "at fault; see the energy balance.")
     NOT_FINITE = "The motion grew beyond all numbers; what was computed until then is kept."
+    ENERGY_NOT_FINITE = ("Energies or forces of the run are beyond all numbers, so that nothing "
+                         "can be said of their balance: a speed, a load or a stiffness is far out "
+                         "of range.")
     FAILED = "The integrator could not go on; what was computed until then is kept."
 
 
@@ -99,7 +102,9 @@ class Energies:
 
     @property
     def _unexplained(self) -> Array:
-        return self.stored - self.stored[0] - self.work + self.lost
+        # Energies beyond all numbers give NaN here, and the run a status that says so.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.stored - self.stored[0] - self.work + self.lost
 
     @property
     def _scale(self) -> float:
@@ -273,8 +278,24 @@ class Trajectory:
         return np.where(self.normal_force != 0.0, state, ContactState.OPEN).astype(np.int8)
 
     @cached_property
+    def limits_exceeded(self) -> tuple[str, ...]:
+        """Sentences on where the run leaves what the model holds for.
+
+        Displacements beyond the body's own size, penetrations beyond a hundred times the height
+        of the roughness; :func:`fecontact.simulate` gives them as a ModelWarning each.
+        """
+        from fecontact.model_limits import limits_exceeded
+
+        return limits_exceeded(self.system, self.time, self.states)
+
+    @cached_property
     def energies(self) -> Energies:
-        """Energies, work and losses of the run."""
+        """Energies, work and losses of the run; infinite or NaN where they are beyond all numbers.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._energies()
+
+    def _energies(self) -> Energies:
         system, basis = self.system, self.system.basis
         drive, t = system.drive, self.time
         q, rate = self.modal_coordinates, self.modal_velocities

@@ -28,6 +28,13 @@ class RoughSurface(NormalLaw):
     Surfaces with another density p(z) of the relative depth z of their peaks below the highest
     one have f(s), the integral of (s - z) p(z) from 0 to s, and h = f', the bearing-area curve.
 
+    How to choose. R_Z is what a profilometer measures: 1 to 10 um ground, 10 to 100 um milled.
+    The stiffness is the load over the approach of the two faces in a press; joints of machined
+    metal have 1e12 to 1e14 N/m for each m2 of nominal area, growing with the pressure. Where it
+    is not known, take a value at which the face yields little against the body itself (the report
+    of a modal basis gives the body's compliance), halve and double it, and see what changes.
+    Damping: beta between 1e-6 and 1e-4 s, or from the restitution of an impact.
+
     Parameters
     ----------
     stiffness : float or (n,) sequence
@@ -36,7 +43,7 @@ class RoughSurface(NormalLaw):
         R_Z: peak-to-valley height of the surface [m].
     damping : float or (n,) sequence
         beta c: damping of the whole face when all asperities are in contact, or of each
-        node [N s/m].
+        node [N s/m]; none by default.
 
     Raises
     ------
@@ -52,9 +59,9 @@ class RoughSurface(NormalLaw):
     kernel: ClassVar = surface_kernels.uniform
     extensive: ClassVar = frozenset({"stiffness", "damping"})
 
-    stiffness: Positive = 0.3e6
-    roughness_height: Positive = 5.2e-6
-    damping: NotNegative = 6.0
+    stiffness: Positive
+    roughness_height: Positive
+    damping: NotNegative = 0.0
 
     @property
     def penetration_scale(self) -> float:

@@ -88,6 +88,8 @@ class MeasuredSurface(RoughSurface):
     kernel: ClassVar = _measured
     shared_fields: ClassVar = frozenset({"bearing", "depths", "file"})
 
+    # From the file where there is one.
+    roughness_height: Any = None
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
     file: str | None = None
@@ -100,6 +102,9 @@ class MeasuredSurface(RoughSurface):
         elif self.scale != 1.0:
             raise InputError(f"MeasuredSurface: scale = {self.scale!r} has no effect without "
                              f"file; leave it out.")
+        if self.roughness_height is None:
+            raise InputError("MeasuredSurface lacks roughness_height, the peak-to-valley height "
+                             "of the surface [m]; give it, or the file of a profile.")
         for name, value in vars(self._bed).items():
             object.__setattr__(self, name, value)
         h = _numbers(self.bearing, "bearing")
@@ -121,7 +126,7 @@ class MeasuredSurface(RoughSurface):
             if not np.array_equal(getattr(self, name), defaults[name]):  # type: ignore[arg-type]
                 raise InputError(f"MeasuredSurface: file = {file!r} cannot stand beside {name}, "
                                  f"which it gives; leave one of them out.")
-        measured = MeasuredSurface.from_file(file, scale=self.scale)
+        measured = MeasuredSurface.from_file(file, scale=self.scale, stiffness=self.stiffness)
         for name in given:
             object.__setattr__(self, name, getattr(measured, name))
         object.__setattr__(self, "file", None)
@@ -138,8 +143,8 @@ class MeasuredSurface(RoughSurface):
         heights: Sequence[float] | NDArray[np.float64],
         abscissa: Sequence[float] | NDArray[np.float64] | None = None,
         *,
-        stiffness: PerNode = RoughSurface.stiffness,
-        damping: PerNode = RoughSurface.damping,
+        stiffness: PerNode,
+        damping: PerNode = 0.0,
     ) -> Self:
         """The surface of a profile trace, taken as straight between its points.
 
@@ -184,7 +189,9 @@ class MeasuredSurface(RoughSurface):
                    tuple(np.maximum.accumulate(bearing).tolist()), tuple(_DEPTHS.tolist()))
 
     @classmethod
-    def from_file(cls, file: str | Path, *, scale: float = 1.0, **options: Any) -> Self:
+    def from_file(
+        cls, file: str | Path, *, stiffness: PerNode, scale: float = 1.0, **options: Any
+    ) -> Self:
         """The surface of a trace in a text file.
 
         Parameters
@@ -193,6 +200,8 @@ class MeasuredSurface(RoughSurface):
             Text or CSV with one column of heights, or two of abscissae and heights, separated by
             semicolons, tabs, commas or blanks; lines before the first of just these numbers are a
             header, ``#`` starts a comment. A decimal comma needs semicolons, tabs or quotes.
+        stiffness : float or (n,) sequence
+            c [N/m].
         scale : float
             Factor from the file's heights to m; the unit of the abscissae does not matter.
         **options
@@ -208,7 +217,8 @@ class MeasuredSurface(RoughSurface):
                                first_optional=True)
         heights = scale * columns[-1]
         try:
-            return cls.from_heights(heights, None if len(columns) == 1 else columns[0], **options)
+            return cls.from_heights(heights, None if len(columns) == 1 else columns[0],
+                                    stiffness=stiffness, **options)
         except InputError as error:
             raise InputError(f"MeasuredSurface: file = '{file}': "
                              f"{str(error).removeprefix('MeasuredSurface: ')}") from None

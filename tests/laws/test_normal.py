@@ -138,15 +138,15 @@ def test_extensive_parameters_are_shared_and_lists_are_not():
 
 
 def test_table_can_be_written_and_is_contiguous():
-    table = RoughSurface().table(np.array([0.5, 0.5]))
+    table = RoughSurface(1e6, R).table(np.array([0.5, 0.5]))
     assert table.flags.c_contiguous
     assert table.flags.writeable
 
 
 def test_a_law_can_be_compared_and_hashed():
-    assert RoughSurface([1.0, 2.0]) == RoughSurface((1.0, 2.0))
-    assert hash(RoughSurface([1.0, 2.0])) == hash(RoughSurface(np.array([1.0, 2.0])))
-    assert RoughSurface(damping=1.0) != RoughSurface(damping=2.0)
+    assert RoughSurface([1.0, 2.0], R) == RoughSurface((1.0, 2.0), R)
+    assert hash(RoughSurface([1.0, 2.0], R)) == hash(RoughSurface(np.array([1.0, 2.0]), R))
+    assert RoughSurface(1e6, R, 1.0) != RoughSurface(1e6, R, 2.0)
 
 
 @pytest.mark.parametrize(("values", "message"), [
@@ -167,13 +167,13 @@ def test_a_law_can_be_compared_and_hashed():
 ])
 def test_values_are_checked(values, message):
     if message is None:
-        assert RoughSurface(**values).table(np.ones(1))[0, 0] == 3.0
+        assert RoughSurface(**{"stiffness": 1e6, "roughness_height": R, **values}).table(np.ones(1))[0, 0] == 3.0
         return
     with pytest.raises(InputError, match=message):
-        RoughSurface(**values)
+        RoughSurface(**{"stiffness": 1e6, "roughness_height": R, **values})
 
 
 def test_number_of_values_per_node_is_checked():
-    law = RoughSurface((1.0, 2.0, 3.0))
+    law = RoughSurface((1.0, 2.0, 3.0), R)
     with pytest.raises(InputError, match="stiffness has 3 values for 2 contact nodes"):
         law.table(np.array([0.5, 0.5]))

@@ -125,10 +125,10 @@ def test_files(tmp_path):
     one.write_text("# heights\n\n" + "\n".join(f"{z:.17g}" for z in TRACE))
     two.write_text("\n".join(f"{a:.17g}; {z * 1e6:.17g} # um"
                              for a, z in zip(x, TRACE, strict=True)))
-    expected = MeasuredSurface.from_heights(TRACE)
-    assert MeasuredSurface.from_file(one) == expected
-    assert MeasuredSurface(file=str(one)) == expected
-    scaled = MeasuredSurface.from_file(two, scale=1e-6)
+    expected = MeasuredSurface.from_heights(TRACE, stiffness=1e6)
+    assert MeasuredSurface.from_file(one, stiffness=1e6) == expected
+    assert MeasuredSurface(1e6, file=str(one)) == expected
+    scaled = MeasuredSurface.from_file(two, scale=1e-6, stiffness=1e6)
     assert scaled.bearing == pytest.approx(expected.bearing, rel=1e-9, abs=1e-12)
     assert scaled.roughness_height == pytest.approx(expected.roughness_height, rel=1e-12)
     given = MeasuredSurface(2e6, file=str(two), scale=1e-6)
@@ -145,8 +145,8 @@ def test_files(tmp_path):
 def test_files_of_other_programs(tmp_path, content, encoding):
     file = tmp_path / "trace.csv"
     file.write_bytes(content.encode(encoding))
-    expected = MeasuredSurface.from_heights([1e-6, 3.5e-6, 0.0], [0.0, 1.0, 3.0])
-    found = MeasuredSurface(file=str(file), scale=1e-6)
+    expected = MeasuredSurface.from_heights([1e-6, 3.5e-6, 0.0], [0.0, 1.0, 3.0], stiffness=1e6)
+    found = MeasuredSurface(1e6, file=str(file), scale=1e-6)
     assert found.bearing == pytest.approx(expected.bearing, rel=1e-12)
     assert found.roughness_height == pytest.approx(3.5e-6, rel=1e-12)
 
@@ -154,8 +154,9 @@ def test_files_of_other_programs(tmp_path, content, encoding):
 def test_header_of_one_column(tmp_path):
     file = tmp_path / "trace.txt"
     file.write_text("height / um of 2024\n1\n3.5\n0\n")
-    assert MeasuredSurface.from_file(file, scale=1e-6) == MeasuredSurface.from_heights(
-        1e-6 * np.array([1.0, 3.5, 0.0]))
+    assert MeasuredSurface.from_file(
+        file, scale=1e-6, stiffness=1e6) == MeasuredSurface.from_heights(
+        1e-6 * np.array([1.0, 3.5, 0.0]), stiffness=1e6)
 
 
 @pytest.mark.parametrize(("values", "message"), [
@@ -170,13 +171,13 @@ def test_header_of_one_column(tmp_path):
 ])
 def test_what_a_file_does_not_stand_beside(values, message):
     with pytest.raises(InputError, match=message):
-        MeasuredSurface(**{"file": "x.txt", **values})
+        MeasuredSurface(**{"stiffness": 1e6, "file": "x.txt", **values})
 
 
 def test_number_of_nodes_is_not_that_of_the_curve():
     curve = {"bearing": (0.0, 0.2, 0.4, 1.0), "depths": (0.0, 0.3, 0.4, 1.0)}
-    assert MeasuredSurface(**curve).node_count() is None
-    assert MeasuredSurface((1e6, 2e6), **curve).node_count() == 2
+    assert MeasuredSurface(1e6, R, **curve).node_count() is None
+    assert MeasuredSurface((1e6, 2e6), R, **curve).node_count() == 2
 
 
 @pytest.mark.parametrize(("text", "message"), [
@@ -192,9 +193,9 @@ def test_files_that_are_no_profile(tmp_path, text, message):
     file = tmp_path / "trace.txt"
     file.write_text(text)
     with pytest.raises(InputError, match=rf"^MeasuredSurface: file = '.*trace\.txt'.*{message}"):
-        MeasuredSurface(file=str(file))
+        MeasuredSurface(1e6, file=str(file))
 
 
 def test_missing_file(tmp_path):
     with pytest.raises(InputError, match=r"none\.txt' cannot be read: No such file"):
-        MeasuredSurface.from_file(tmp_path / "none.txt")
+        MeasuredSurface.from_file(tmp_path / "none.txt", stiffness=1e6)
