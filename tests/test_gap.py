@@ -28,6 +28,7 @@ def test_crown_is_the_circle_to_the_last_digit():
     np.testing.assert_allclose(crown(x), 2.0 * 0.5 * np.sin(angle / 2) ** 2, rtol=1e-14)
 
 
+@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
 def test_pressed_cylinder_on_independent_springs():
     """F = 2/3 sqrt(8 R) k u^(3/2) for stiffness k per length under a parabola; R large."""
     radius, length, stiffness, load = 2.0, 0.02, 1e9, 50.0

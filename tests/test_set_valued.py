@@ -202,7 +202,8 @@ def test_order_while_nothing_changes(scheme, longest, order):
 def ball(**parts):
     row = np.array([[0.0], [1.0], [0.0]])
     return ContactSystem(ModalBasis.from_matrices([[1.0]], [[0.0]],
-                                                  {"contact": row[None], "C": row}), **parts)
+                                                  {"contact": row[None], "C": row}),
+                         RoughSurface(1e5, 1e-4), **parts)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.6, 0.9])

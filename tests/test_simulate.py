@@ -70,6 +70,7 @@ def test_contact_time_of_uniform_roughness(method, tolerance):
     assert run.energies.imbalance < (BALANCE if method != "BDF" else 10.0 * BALANCE)
 
 
+@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
 def test_contact_time_of_a_linear_contact():
     width = 1e-9
     system = mass_in_y(MASS, normal=RoughSurface(C, width, 0.0))
@@ -94,6 +95,7 @@ def test_restitution_of_uniform_roughness(b, restitution):
     assert run.energies.contact_damping[-1] == pytest.approx(lost, rel=2e-5)
 
 
+@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
 @pytest.mark.parametrize(("zeta", "restitution"), [
     (0.05, 0.8587581018), (0.1, 0.7440793977), (0.2, 0.5717400276)])
 def test_restitution_of_a_linear_contact(zeta, restitution):
@@ -104,6 +106,7 @@ def test_restitution_of_a_linear_contact(zeta, restitution):
     assert run.energies.imbalance < BALANCE
 
 
+@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
 def test_mass_on_an_elastic_stop():
     """Code_Aster SDND101; the load moves the spring's rest to where the stop's force begins."""
     width = 1e-8
@@ -566,6 +569,7 @@ def test_other_errors_in_progress_are_passed_on():
         simulate(oscillator(), 1.0, outputs=3, progress=fail)
 
 
+@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_a_motion_that_grows_beyond_all_numbers(method):
     rows = np.array([[[0.0], [1.0], [0.0]]])

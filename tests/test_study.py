@@ -261,7 +261,7 @@ MISTAKES = [
     ({"output.frames": -1}, r"\[output\]: frames = -1 must be zero or above"),
     ({"output.points": ["D"]}, r"\[output\]: There is no point 'D'"),
     ({"output.points": [4]}, r"\[output\]: Contact node 4 does not exist"),
-    ({"contact.contact.normal.stiffness": [1.0, 2.0]},
+    ({"contact.contact.normal": {"stiffness": [1.0, 2.0], "roughness_height": 1e-6}},
      r"\[contact\.contact\.normal\]: stiffness has 2 values for 4 contact nodes"),
     ({"contact.contct.friction.decay": 1.0},
      r"\[contact\.contct\]: the basis has no contact group 'contct' \(did you mean 'contact'\?\)"),

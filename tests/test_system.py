@@ -391,7 +391,7 @@ def test_a_part_and_one_of_its_parameters(order):
 
 
 def test_another_basis_and_values_for_its_nodes():
-    system = random_system(normal=RoughSurface((1e6, 2e6, 3e6)), gap=(0.0, 1e-6, 2e-6))
+    system = random_system(normal=RoughSurface((1e6, 2e6, 3e6), R), gap=(0.0, 1e-6, 2e-6))
     copy = system.with_(**{"basis": random_basis(2, 4), "normal.stiffness": (1e6, 2e6), "gap": 0.0})
     assert copy.arrays.normal_parameters[:, 0].tolist() == [1e6, 2e6]
 

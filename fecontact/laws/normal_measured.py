@@ -89,7 +89,7 @@ class MeasuredSurface(RoughSurface):
     shared_fields: ClassVar = frozenset({"bearing", "depths", "file"})
 
     # From the file where there is one.
-    roughness_height: Any = None
+    roughness_height: PerNode | None = None  # type: ignore[assignment]
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
     file: str | None = None
