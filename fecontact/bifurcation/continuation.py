@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.branch import BranchPoint, Status
 from fecontact.bifurcation.corrector import Solution, corrected, finished, norm
-from fecontact.bifurcation.location import between, changed, located_between
+from fecontact.bifurcation.location import between, located_between
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
 from fecontact.bifurcation.sharp_turns import rounded
 from fecontact.errors import FecontactError, InputError
@@ -28,6 +28,8 @@ _PATIENCE = 2
 # Steps go so far beyond a bound of the parameter, in what is left up to it: behind it there may be
 # no motion of the kind that is followed.
 _BEYOND = 1.2
+# Relative distance from a bound at which a start lies on it.
+_ON_BOUND = 1e-13
 
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
@@ -74,6 +76,8 @@ def continuation(
     require_inside(float(u[-1]), settings)
     start = start_of(problem, u, settings, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
+    if _leaves(start, settings):
+        return End(Status.BOUND)
     here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
     stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
     before: Solution | None = None
@@ -126,6 +130,14 @@ def require_inside(value: float, settings: Settings) -> None:
                          f"{low:g} to {high:g}.")
 
 
+def _leaves(start: Solution, settings: Settings) -> bool:
+    """Whether the branch leaves the bounds of the parameter right where it starts."""
+    slope, value = float(start.tangent[-1]), float(start.u[-1])
+    bound = settings.bounds[1] if slope > 0.0 else settings.bounds[0]
+    ahead = np.copysign(1.0, slope) * (bound - value)
+    return slope != 0.0 and bool(ahead <= _ON_BOUND * max(abs(value), abs(slope)))
+
+
 def start_of(
     problem: Problem, u: Array, settings: Settings, tangent: Array | None, direction: float
 ) -> Solution:
@@ -156,8 +168,8 @@ def _step(
     short = step < _SHORT * settings.step
     if not (short or _believable(problem, here, there, settings)):
         return None
-    special = located_between(problem, here, there, settings, row, strict=not short)
-    return None if special is None else [(there, special)]
+    reached = located_between(problem, here, there, settings, row, strict=not short)
+    return None if reached is None else [reached]
 
 
 def _room(here: Solution, settings: Settings) -> float:
@@ -168,14 +180,11 @@ def _room(here: Solution, settings: Settings) -> float:
 
 
 def _believable(problem: Problem, here: Solution, there: Solution, settings: Settings) -> bool:
-    """Whether a step neither turns too much nor passes over more than its tests can tell."""
+    """Whether a step does not turn too much."""
     row = problem.weights() * here.tangent
     chord = there.u - here.u
-    if min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) < np.cos(
-            settings.largest_turn):
-        return False
-    jump = abs(int(there.values.get("unstable", 0)) - int(here.values.get("unstable", 0)))
-    return not settings.locate or jump <= 2 * len(changed(here, there))
+    return min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) >= np.cos(
+        settings.largest_turn)
 
 
 def _next_step(

@@ -33,10 +33,13 @@ class Problem(Protocol):
         problems whose factorisation costs far more than a residual and a solution.
     precision : float
         Part of a step to which special points are located on it.
+    event_precision : float
+        The same for events.
     """
 
     keeps_matrix: ClassVar[bool] = False
     precision: float = 1e-12
+    event_precision: ClassVar[float] = 1e-12
 
     def linearise(self, u: Array) -> Linearisation:
         """The equations about u.
@@ -56,10 +59,17 @@ class Problem(Protocol):
     def point(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, Any]:
         """What is stored of a solution: numbers, arrays; the same names for each.
 
-        Where it holds 'unstable', a number of unstable directions, a step is halved whose changes
-        of it are more than two for each test function that changes sign.
+        Where it holds 'unstable', a number of unstable directions, a step is halved whose special
+        points do not explain the change of it.
         """
         ...
+
+    def unstable_range(
+        self, linearisation: Linearisation, values: Mapping[str, Any]
+    ) -> tuple[int, int]:
+        """Least and largest number of unstable directions that rounding leaves open."""
+        count = int(values.get("unstable", 0))
+        return count, count
 
     def tests(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, float]:
         """Functions whose zeros are special points, by kind; folds are found without."""
