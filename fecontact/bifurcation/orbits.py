@@ -212,8 +212,6 @@ def _followed(
 
 def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
     """A special point located once more, on the mesh that suits its own orbit."""
-    point, regular = branch.points[index], [one for one in branch.points if one.kind is None]
-    before = next((one for one in branch.points[index::-1] if one.kind is None), regular[-1])
-    after = next((one for one in branch.points[index:] if one.kind is None), before)
-    rough = ROUGHLY * max(abs(one.parameter - point.parameter) for one in (before, after))
-    return sharpened(point, restored(field, branch, point), restored(field, branch, before), rough)
+    point = branch.points[index]
+    before = next((one for one in branch.points[index::-1] if one.kind is None), branch.points[-1])
+    return sharpened(point, restored(field, branch, point), restored(field, branch, before))

@@ -29,7 +29,7 @@ _JUDGED = ("period doubling", "Neimark-Sacker")
 # Parts of a step to which a branch locates special points, and to which they are sharpened.
 ROUGHLY, _SHARPLY = 1e-3, 1e-9
 # Distances from the rough place at which the search begins, one after the other.
-_NEAR = (1e-3, 1e-2, 1e-4)
+_NEAR = (1e-3, 1e-2, 1e-4, 3e-2)
 # Points of a search, whose steps may have to be shorter than the whole way.
 _POINTS = 30
 # The intervals of a branch are multiplied by this at the most, to judge a coefficient.
@@ -38,7 +38,7 @@ _FINEST = 16
 _AT_ONCE = 1e-3
 
 
-def sharpened(point: BranchPoint, own: Place, neighbour: Place, rough: float) -> BranchPoint:
+def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     """A special point located once more, with its criticality where it has one.
 
     Parameters
@@ -48,15 +48,14 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place, rough: float) ->
     own, neighbour : (Collocation, array, array)
         Problem, unknowns and tangent of the point and of a regular one before it. At branch points
         the tangent is not defined; that of the neighbour serves for all kinds.
-    rough : float
-        Error of the parameter at the point.
 
     Returns
     -------
     BranchPoint
         'parameter_error' in the details of a doubling or Neimark-Sacker point is the change of the
         parameter on finer meshes. A point that is not found again stays where it was; 'located' in
-        its details is False then, and 'parameter_error' is ``rough``.
+        its details is False then, and 'parameter_error' what the parameter changes by over the
+        stretch that was searched.
     """
     kind = str(point.kind)
     problem, u, _ = own
@@ -67,7 +66,8 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place, rough: float) ->
     place = _unit(*problem.on_mesh(mesh, u, tangent))
     found = _found(place, kind) or _found_from(place, start, kind)
     if found is None:
-        details: dict[str, Any] = {"located": False, "parameter_error": rough}
+        details: dict[str, Any] = {"located": False,
+                                   "parameter_error": max(_NEAR) * abs(float(place[2][-1]))}
         if kind in _JUDGED:
             details |= verdict(float("nan"), float("nan"))
         return replace(point, details={**point.details, **details})
