@@ -90,6 +90,7 @@ class Collocation(Problem):
     before: tuple[Array, ...] = ()
 
     keeps_matrix: ClassVar[bool] = True
+    confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
 
     @cached_property
     def autonomous(self) -> bool:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.branch import BranchPoint, Status
 from fecontact.bifurcation.corrector import Solution, corrected, finished, norm
+from fecontact.bifurcation.crossings import UNRESOLVED
 from fecontact.bifurcation.location import between, located_between
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
 from fecontact.bifurcation.sharp_turns import rounded
@@ -81,7 +82,7 @@ def continuation(
     here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
     stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
     before: Solution | None = None
-    halved = 0
+    halved, whole = 0, step
     while count < settings.points:
         step = min(step, _BEYOND * _room(here, settings))
         try:
@@ -89,6 +90,7 @@ def continuation(
         except FecontactError as error:
             reached, message = None, str(error)
         if reached is None:
+            whole = step if halved == 0 else whole
             step, halved = 0.5 * step, halved + 1
             if before is not None and halved % _PATIENCE == 0:
                 reached = rounded(problem, before, here, step, settings)
@@ -111,7 +113,10 @@ def continuation(
             count += 1
             last, here = here, there
         before = last
-        step, halved = _next_step(problem, last, here, step, settings), 0
+        # Short steps across a change that has no special point are of no use beyond it.
+        unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
+        step = whole if unresolved else _next_step(problem, last, here, step, settings)
+        halved = 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
             problem, moved, turned = adapted

@@ -62,7 +62,7 @@ def located_between(
         event = name in settings.events
         zero = _zero(problem, here, there, settings, _test_value(name), here.tests[name],
                      there.tests[name], problem.event_precision if event else problem.precision,
-                     row)
+                     row, remeshed=name in problem.confirms)
         located = None if zero is None else zero[0]
         if name == "branch point" and strict and _jumped(problem, here, there, located, row):
             return None
@@ -167,11 +167,13 @@ def _distance_to(bound: float) -> Callable[[Solution], float]:
 def _zero(
     problem: Problem, here: Solution, there: Solution, settings: Settings,
     test: Callable[[Solution], float], before: float, after: float, precision: float,
-    row: Array,
+    row: Array, *, remeshed: bool = False,
 ) -> tuple[Solution, float] | None:
     """The solution between two others at which a test function is zero; None at a pole or jump.
 
     With it comes the length within which it was searched for in vain, zero where it was found.
+    With ``remeshed`` a jump at the first solution is a zero as well: on the mesh of the second one
+    the function had changed its sign there already.
     """
     from scipy.optimize import brentq
 
@@ -207,6 +209,9 @@ def _zero(
     except _LostError:
         if not known:
             return None
+    first = min(known, key=lambda each: each[0])
+    if remeshed and first[1] * after > 0.0 and first[0] <= 3.0 * precision * length:
+        return first[2], first[0]
     along, size, at = min(known, key=lambda each: abs(each[1]))
     # At a pole or a jump the values do not get small; how small they get else, the precision says.
     if abs(size) > max(1e-3, 50.0 * precision) * max(abs(before), abs(after)):

@@ -35,11 +35,15 @@ class Problem(Protocol):
         Part of a step to which special points are located on it.
     event_precision : float
         The same for events.
+    confirms : frozenset of str
+        Test functions that jump a little where the mesh is renewed, and whose zeros
+        :meth:`examine` confirms.
     """
 
     keeps_matrix: ClassVar[bool] = False
     precision: float = 1e-12
     event_precision: ClassVar[float] = 1e-12
+    confirms: ClassVar[frozenset[str]] = frozenset()
 
     def linearise(self, u: Array) -> Linearisation:
         """The equations about u.

@@ -53,9 +53,9 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     -------
     BranchPoint
         'parameter_error' in the details of a doubling or Neimark-Sacker point is the change of the
-        parameter on finer meshes. A point that is not found again stays where it was; 'located' in
-        its details is False then, and 'parameter_error' what the parameter changes by over the
-        stretch that was searched.
+        parameter on finer meshes. A point that is not found again stays where it was, and 'located'
+        in its details is False; 'parameter_error' is there for all kinds, what the parameter
+        changes by over the stretch that was searched if nothing better is known.
     """
     kind = str(point.kind)
     problem, u, _ = own
@@ -65,15 +65,12 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     _, start, _ = problem.on_mesh(mesh, start, tangent)
     place = _unit(*problem.on_mesh(mesh, u, tangent))
     found = _found(place, kind) or _found_from(place, start, kind)
+    details = {**point.details, "located": False} if found is None else {**found.details}
+    if kind in _JUDGED:
+        details |= _on_finer_meshes(point, found, place)
     if found is None:
-        details: dict[str, Any] = {"located": False,
-                                   "parameter_error": max(_NEAR) * abs(float(place[2][-1]))}
-        if kind in _JUDGED:
-            details |= verdict(float("nan"), float("nan"))
-        return replace(point, details={**point.details, **details})
-    if kind not in _JUDGED:
-        return found
-    return replace(found, details={**found.details, **_on_finer_meshes(found, place)})
+        details.setdefault("parameter_error", _reach(place))
+    return replace(found or point, details=details)
 
 
 def _unit(problem: Collocation, u: Array, tangent: Array) -> Place:
@@ -117,33 +114,45 @@ def _searched(place: Place, start: Array, length: float, kind: str) -> BranchPoi
     return min(points, key=lambda point: float(weights @ (point.u - u) ** 2), default=None)
 
 
-def _on_finer_meshes(point: BranchPoint, place: Place) -> dict[str, Any]:
+def _reach(place: Place) -> float:
+    """Change of the parameter over the stretch that is searched."""
+    return max(_NEAR) * abs(float(place[2][-1]))
+
+
+def _on_finer_meshes(
+    rough: BranchPoint, found: BranchPoint | None, place: Place
+) -> dict[str, Any]:
     """Coefficient and criticality of a special point, and by how much its parameter changes.
 
     The error of the coefficient is its change from the last mesh but one, or half of that before:
     two meshes may agree by accident.
     """
-    problem, _, tangent = place
-    most = _FINEST * problem.intervals
-    coefficients, changes = [float(point.details["coefficient"])], [float("inf")]
-    error, found = float("nan"), point
+    problem, u, tangent = place
+    kind, parameter, most = str(rough.kind), (found or rough).parameter, _FINEST * problem.intervals
+    coefficients = [] if found is None else [float(found.details["coefficient"])]
+    u, error, before = u if found is None else found.u, float("nan"), float("inf")
     while 2 * problem.intervals <= most:
-        mesh = equidistributed(problem.mesh, problem.nodes(found.u), problem.degree,
+        mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree,
                                2 * problem.intervals)
-        place = _unit(*problem.on_mesh(mesh, found.u, tangent))
-        problem, _, tangent = place
-        finer = _found(place, str(point.kind))
+        place = _unit(*problem.on_mesh(mesh, u, tangent))
+        problem, u, tangent = place
+        finer = _found(place, kind)
         if finer is None:
             error = float("nan")
-            break
-        found = finer
+            continue
+        found, u = finer, finer.u
         coefficients.append(float(found.details["coefficient"]))
-        changes.append(abs(coefficients[-1] - coefficients[-2]))
-        at_once = changes[-1] <= _AT_ONCE * abs(coefficients[-1])
-        error = max(float(found.details["coefficient_error"]), changes[-1],
-                    0.0 if at_once else 0.5 * changes[-2])
-        judged = verdict(coefficients[-1], error)
-        if judged["criticality"] != "undecided":
+        if len(coefficients) == 1:
+            continue
+        change = abs(coefficients[-1] - coefficients[-2])
+        at_once = change <= _AT_ONCE * abs(coefficients[-1])
+        error = max(float(found.details["coefficient_error"]), change,
+                    0.0 if at_once else 0.5 * before)
+        before = change
+        if verdict(coefficients[-1], error)["criticality"] != "undecided":
             break
+    if not coefficients or found is None:
+        return verdict(float("nan"), float("nan"))
+    known = len(coefficients) > 1 or parameter != found.parameter
     return {**verdict(coefficients[-1], error),
-            "parameter_error": abs(found.parameter - point.parameter)}
+            "parameter_error": abs(found.parameter - parameter) if known else _reach(place)}
