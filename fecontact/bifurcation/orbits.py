@@ -57,9 +57,12 @@ def orbits_from_hopf(
         one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
 
         - 'fold',
-        - 'period doubling' and 'Neimark-Sacker': with coefficient and criticality, see
-          :mod:`fecontact.bifurcation.orbit_normal_forms`,
-        - 'branch point': where two branches of orbits cross.
+        - 'period doubling' and 'Neimark-Sacker': with coefficient, coefficient_error,
+          criticality ('supercritical', 'subcritical' or 'undecided') and parameter_error, see
+          :mod:`fecontact.bifurcation.orbit_normal_forms` and
+          :func:`fecontact.bifurcation.sharpening.sharpened`,
+        - 'branch point': where two branches of orbits cross,
+        - 'unresolved': where 'unstable' changes though nothing of the kind was found.
 
     Raises
     ------

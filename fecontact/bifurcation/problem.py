@@ -119,13 +119,13 @@ class Settings:
         Least and largest value of the parameter; the last point lies on the bound.
     tolerance : float
         Newton's method ends with a step of this size, relative to 1 + the size of u; what is left
-        then is of the order of its square. Special points are located to 1e-10.
+        then is of the order of its square. Special points and events are located to 1e-10.
     iterations : int
         Newton steps before a step counts as failed.
     largest_turn : float
         Largest angle between tangents of neighbouring points [rad].
     locate : bool
-        Whether special points are located, besides the events.
+        Whether special points are located, besides the events, and changes of stability explained.
     stop_at : sequence of str
         Kinds of special points, or events, at which the branch ends.
     events : mapping
