@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _BORN = {"supercritical": "stable orbits", "subcritical": "unstable orbits",
          "undecided": "orbits, stability undecided"}
 _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "period",
-            "frequency_hz", "minimum", "maximum", "amplitude", "criticality")
+            "frequency_hz", "minimum", "maximum", "amplitude", "criticality", "parameter_error")
 
 
 def write_branches(
@@ -76,7 +76,9 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
                 "" if period is None else repr(1.0 / period),
                 *(repr(float(values[f"observed_{what}"]))
                   for what in ("minimum", "maximum", "amplitude")),
-                point.details.get("criticality", "")])
+                point.details.get("criticality", ""),
+                repr(float(error)) if (error := point.details.get("parameter_error")) is not None
+                else ""])
     return text.getvalue()
 
 
@@ -101,16 +103,29 @@ def _period(point: BranchPoint) -> float | None:
 
 
 def _remark(point: BranchPoint) -> str:
-    if point.kind == "Hopf":
-        return _BORN.get(str(point.details.get("criticality", "")), "")
     if point.kind is not None:
-        return str(point.details.get("criticality", ""))
+        return ", ".join(filter(None, (_what_changes(point), _how_sure(point))))
     unstable = int(point.values["unstable"])
     if not unstable:
         return "stable"
     if "period" in point.values:
         return f"{unstable} unstable multiplier{'s' if unstable > 1 else ''}"
     return f"unstable in {unstable} direction{'s' if unstable > 1 else ''}"
+
+
+def _what_changes(point: BranchPoint) -> str:
+    """What begins at a special point, or by how many the unstable directions change."""
+    details = point.details
+    if "unstable_before" in details:
+        return f"{details['unstable_before']} to {details['unstable_after']} unstable directions"
+    criticality = str(details.get("criticality", ""))
+    return _BORN.get(criticality, "") if point.kind == "Hopf" else criticality
+
+
+def _how_sure(point: BranchPoint) -> str:
+    """By how much the parameter may be off, where that is more than the table shows."""
+    error = float(point.details.get("parameter_error", 0.0))
+    return f"known to {error:.1g} only" if error > 5e-7 * abs(point.parameter) else ""
 
 
 def _label(show: str, point: str | int, axis: str) -> str:

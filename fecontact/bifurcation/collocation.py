@@ -90,6 +90,7 @@ class Collocation(Problem):
     before: tuple[Array, ...] = ()
 
     keeps_matrix: ClassVar[bool] = True
+    confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
 
     @cached_property
     def autonomous(self) -> bool:
@@ -204,6 +205,11 @@ class Collocation(Problem):
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
                 "maximum": high}
+
+    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
+        """Multipliers as close to the unit circle as their error may lie on either side."""
+        found: tuple[int, int] = linearisation.floquet.unstable_range
+        return found
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.branch import BranchPoint, Status
 from fecontact.bifurcation.corrector import Solution, corrected, finished, norm
-from fecontact.bifurcation.location import between, changed, located_between
+from fecontact.bifurcation.crossings import UNRESOLVED
+from fecontact.bifurcation.location import between, located_between
 from fecontact.bifurcation.problem import Linearisation, Problem, Settings
 from fecontact.bifurcation.sharp_turns import rounded
 from fecontact.errors import FecontactError, InputError
@@ -28,6 +29,8 @@ _PATIENCE = 2
 # Steps go so far beyond a bound of the parameter, in what is left up to it: behind it there may be
 # no motion of the kind that is followed.
 _BEYOND = 1.2
+# Relative distance from a bound at which a start lies on it.
+_ON_BOUND = 1e-13
 
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
@@ -74,10 +77,12 @@ def continuation(
     require_inside(float(u[-1]), settings)
     start = start_of(problem, u, settings, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
+    if _leaves(start, settings):
+        return End(Status.BOUND)
     here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
     stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
     before: Solution | None = None
-    halved = 0
+    halved, whole = 0, step
     while count < settings.points:
         step = min(step, _BEYOND * _room(here, settings))
         try:
@@ -85,6 +90,7 @@ def continuation(
         except FecontactError as error:
             reached, message = None, str(error)
         if reached is None:
+            whole = step if halved == 0 else whole
             step, halved = 0.5 * step, halved + 1
             if before is not None and halved % _PATIENCE == 0:
                 reached = rounded(problem, before, here, step, settings)
@@ -107,7 +113,10 @@ def continuation(
             count += 1
             last, here = here, there
         before = last
-        step, halved = _next_step(problem, last, here, step, settings), 0
+        # Short steps across a change that has no special point are of no use beyond it.
+        unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
+        step = whole if unresolved else _next_step(problem, last, here, step, settings)
+        halved = 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
             problem, moved, turned = adapted
@@ -124,6 +133,14 @@ def require_inside(value: float, settings: Settings) -> None:
     if not low <= value <= high:
         raise InputError(f"The start lies at {value:.6g}, outside the bounds of the parameter, "
                          f"{low:g} to {high:g}.")
+
+
+def _leaves(start: Solution, settings: Settings) -> bool:
+    """Whether the branch leaves the bounds of the parameter right where it starts."""
+    slope, value = float(start.tangent[-1]), float(start.u[-1])
+    bound = settings.bounds[1] if slope > 0.0 else settings.bounds[0]
+    ahead = np.copysign(1.0, slope) * (bound - value)
+    return slope != 0.0 and bool(ahead <= _ON_BOUND * max(abs(value), abs(slope)))
 
 
 def start_of(
@@ -156,8 +173,8 @@ def _step(
     short = step < _SHORT * settings.step
     if not (short or _believable(problem, here, there, settings)):
         return None
-    special = located_between(problem, here, there, settings, row, strict=not short)
-    return None if special is None else [(there, special)]
+    reached = located_between(problem, here, there, settings, row, strict=not short)
+    return None if reached is None else [reached]
 
 
 def _room(here: Solution, settings: Settings) -> float:
@@ -168,14 +185,11 @@ def _room(here: Solution, settings: Settings) -> float:
 
 
 def _believable(problem: Problem, here: Solution, there: Solution, settings: Settings) -> bool:
-    """Whether a step neither turns too much nor passes over more than its tests can tell."""
+    """Whether a step does not turn too much."""
     row = problem.weights() * here.tangent
     chord = there.u - here.u
-    if min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) < np.cos(
-            settings.largest_turn):
-        return False
-    jump = abs(int(there.values.get("unstable", 0)) - int(here.values.get("unstable", 0)))
-    return not settings.locate or jump <= 2 * len(changed(here, there))
+    return min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) >= np.cos(
+        settings.largest_turn)
 
 
 def _next_step(

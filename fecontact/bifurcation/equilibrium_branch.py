@@ -43,7 +43,9 @@ def equilibrium_branch(
       part with the parameter), first_lyapunov and criticality
       ('supercritical', 'subcritical' or 'undecided', see
       :func:`fecontact.bifurcation.normal_forms.hopf`),
-    - 'branch point': null_vector, and other_tangent for :func:`switched_branch`.
+    - 'branch point': null_vector, and other_tangent for :func:`switched_branch`,
+    - 'unresolved': where 'unstable' changes from unstable_before to unstable_after, though none of
+      the others was found.
 
     Parameters
     ----------

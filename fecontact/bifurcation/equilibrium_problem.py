@@ -99,6 +99,13 @@ class EquilibriumProblem(Problem):
         return {"state": u[:-1].copy(), "unstable": unstable, "stable": unstable == 0,
                 "eigenvalues": eigenvalues}
 
+    def unstable_range(
+        self, linearisation: Any, values: Mapping[str, Any]
+    ) -> tuple[int, int]:
+        """Eigenvalues on the imaginary axis, to rounding, may lie on either side."""
+        eigenvalues = linearisation.eigenvalues
+        return int(values["unstable"]), len(eigenvalues) - int(unstable_count(-eigenvalues))
+
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
         """Branch points and Hopf points; see :func:`pair_test`."""
         scaled = np.vstack([linearisation.matrix, tangent * self._weights])

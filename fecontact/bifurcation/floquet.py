@@ -15,6 +15,9 @@ from fecontact.errors import AnalysisError
 
 Array = NDArray[np.float64]
 
+# Distances from the unit circle at which a multiplier may lie on either side of it, at least and at
+# the most.
+_ROUNDING, _WORST = 1e-8, 0.1
 _NEAR = 1e-2  # distance of a critical multiplier from the circle, at a point located coarsely
 
 
@@ -55,6 +58,17 @@ class Floquet:
         """Number of multipliers outside the unit circle."""
         return sum(place != self.trivial and abs(multiplier) > 1.0
                    for place, multiplier in enumerate(self.multipliers.tolist()))
+
+    @cached_property
+    def unstable_range(self) -> tuple[int, int]:
+        """Least and largest number of multipliers outside the unit circle, within their error.
+
+        That of the trivial one is known. Next to a fold, where another one is close to it, both
+        are off by as much.
+        """
+        error = min(max(_ROUNDING, 2.0 * self.trivial_error), _WORST)
+        sizes = np.abs(self.others)
+        return int((sizes > 1.0 + error).sum()), int((sizes > 1.0 - error).sum())
 
     @property
     def stable(self) -> bool:

@@ -34,7 +34,8 @@ def follow(
     name : str
         Name of the parameter.
     both : bool
-        Follow it to both sides; the points then go from the one end to the other.
+        Follow it to both sides; the points then go from the one end to the other. From a start on
+        a bound it goes inwards alone.
     attributes : dict, optional
         Kept with the branch.
 

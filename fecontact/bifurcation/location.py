@@ -1,12 +1,13 @@
 """Locating special points between two points of a branch."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.branch import BranchPoint
 from fecontact.bifurcation.corrector import Solution, corrected, finished, norm
+from fecontact.bifurcation.crossings import UNRESOLVED, counted, with_count
 from fecontact.bifurcation.problem import Problem, Settings
 from fecontact.errors import FecontactError
 
@@ -16,6 +17,10 @@ Array = NDArray[np.float64]
 _EXACT = 1e-10
 # A branch leaves the cubic through two of its points by less than this part of what it bends.
 _OFF, _ROUGH = 0.2, 1e-7
+# Part of a step to which a place is located at which the stability changes by a jump.
+_JUMP = 1e-3
+# Solutions from which Newton's method begins where it fails from the cubic between two points.
+_GUESSES = 3
 
 
 def changed(here: Solution, there: Solution) -> list[str]:
@@ -40,37 +45,95 @@ def between(here: Solution, there: Solution, along: float, row: Array) -> Array:
 def located_between(
     problem: Problem, here: Solution, there: Solution, settings: Settings, row: Array,
     strict: bool = True,
-) -> list[BranchPoint] | None:
-    """Special points between two regular ones, in order; one without a kind is on a bound.
+) -> tuple[Solution, list[BranchPoint]] | None:
+    """The second of two regular points, and the special ones before it, in order.
 
-    ``row`` (N + 1,) is the direction along which the branch is parametrised between the two. With
-    ``strict`` the result is None where the second point lies on another sheet of solutions: the
-    equations change their orientation, but no branch point lies in between. So it is where a bound
-    of the parameter is passed that no solution between the two meets.
+    A special point without a kind is on a bound. ``row`` (N + 1,) is the direction along which the
+    branch is parametrised between the two.
+
+    With ``strict`` the result is None where the second point lies on another sheet of solutions:
+    the equations change their orientation, but no branch point lies in between; and where the
+    special points do not explain by how many the unstable directions change. Without, a point
+    'unresolved' stands where they change. The result is None too where a bound of the parameter
+    is passed that no solution between the two meets.
     """
     found = []
     for name in changed(here, there):
-        located = _zero(problem, here, there, settings, _test_value(name),
-                        here.tests[name], there.tests[name], problem.precision, row)
+        event = name in settings.events
+        zero = _zero(problem, here, there, settings, _test_value(name), here.tests[name],
+                     there.tests[name], problem.event_precision if event else problem.precision,
+                     row, remeshed=name in problem.confirms)
+        located = None if zero is None else zero[0]
         if name == "branch point" and strict and _jumped(problem, here, there, located, row):
             return None
-        if located is None:
+        if zero is None:
             continue
-        details = problem.examine(name, located.u, located.linearisation, located.tangent)
+        at, off = zero
+        details = {} if event else problem.examine(name, at.u, at.linearisation, at.tangent)
         if details is not None:
             kind = str(details.get("kind", name))
             rest = {key: value for key, value in details.items() if key != "kind"}
-            found.append(BranchPoint(located.u, located.tangent, located.values, kind, rest))
-    for bound in settings.bounds:
-        before, after = here.u[-1] - bound, there.u[-1] - bound
-        if before * after < 0.0 or (after == 0.0 and before != 0.0):
-            located = _zero(problem, here, there, settings, _distance_to(bound), before, after,
-                            1e-12, row)
-            if located is None:
-                return None
-            found.append(BranchPoint(located.u, located.tangent, located.values))
-    found = _without_turns(found, row, 1e-4 * float(row @ (there.u - here.u)))
-    return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
+            if off > 0.0:
+                rest |= {"located": False, "parameter_error": off * _rate(problem, here, there)}
+            found.append(BranchPoint(at.u, at.tangent, at.values, kind, rest))
+    met: Solution | None = None
+    for sign, bound in zip((-1.0, 1.0), settings.bounds, strict=True):
+        before, after = sign * (here.u[-1] - bound), sign * (there.u[-1] - bound)
+        if after < 0.0 or before > 0.0 or before == after:
+            continue
+        zero = None if before == 0.0 else _zero(problem, here, there, settings, _distance_to(bound),
+                                                sign * before, sign * after, 1e-12, row)
+        if zero is None:
+            return None
+        met = zero[0]
+    end = met or there
+    length = float(row @ (end.u - here.u))
+    found = _without_turns([point for point in found if float(row @ (point.u - here.u)) <= length],
+                           row, 1e-4 * float(row @ (there.u - here.u)))
+    if settings.locate:
+        count = counted(problem, here, end, found, settings.events)
+        if count is None and strict:
+            return None
+        if count is None:
+            found.append(_change(problem, here, end, settings, row))
+        else:
+            end = with_count(end, count)
+    found.sort(key=lambda point: float(row @ (point.u - here.u)))
+    if met is not None:
+        found.append(BranchPoint(end.u, end.tangent, end.values))
+    return end, found
+
+
+def _rate(problem: Problem, here: Solution, there: Solution) -> float:
+    """Change of the parameter over a length along the branch, at the most."""
+    return max(abs(float(here.tangent[-1])), abs(float(there.tangent[-1])))
+
+
+def _change(
+    problem: Problem, here: Solution, there: Solution, settings: Settings, row: Array
+) -> BranchPoint:
+    """Where the number of unstable directions jumps, though no test function has a zero there."""
+    low, high = 0.0, float(row @ (there.u - here.u))
+    counts = [int(each.values["unstable"]) for each in (here, there)]
+    at, precision = there, _JUMP * high
+    while high - low > precision:
+        middle = 0.5 * (low + high)
+        try:
+            found = corrected(problem, between(here, there, middle, row), row, settings.tolerance,
+                              2 * settings.iterations)
+            reached = None if found is None else finished(problem, *found, row, settings)
+        except FecontactError:
+            reached = None
+        if reached is None:
+            break
+        count = int(reached.values["unstable"])
+        if abs(count - counts[0]) < abs(count - counts[1]):
+            low = middle
+        else:
+            high, at = middle, reached
+    return BranchPoint(at.u, at.tangent, at.values, UNRESOLVED, {
+        "unstable_before": counts[0], "unstable_after": counts[1],
+        "parameter_error": (high - low) * _rate(problem, here, there)})
 
 
 def _jumped(
@@ -104,40 +167,75 @@ def _distance_to(bound: float) -> Callable[[Solution], float]:
 def _zero(
     problem: Problem, here: Solution, there: Solution, settings: Settings,
     test: Callable[[Solution], float], before: float, after: float, precision: float,
-    row: Array,
-) -> Solution | None:
-    """The solution between two others at which a test function is zero; None at a pole or jump."""
+    row: Array, *, remeshed: bool = False,
+) -> tuple[Solution, float] | None:
+    """The solution between two others at which a test function is zero; None at a pole or jump.
+
+    With it comes the length within which it was searched for in vain, zero where it was found.
+    With ``remeshed`` a jump at the first solution is a zero as well: on the mesh of the second one
+    the function had changed its sign there already.
+    """
     from scipy.optimize import brentq
 
     if after == 0.0:
-        return there
+        return there, 0.0
     length = float(row @ (there.u - here.u))
-    best: list[tuple[float, Solution]] = []
+    known: list[tuple[float, float, Solution]] = []
     exact = max(_EXACT, 1e-2 * precision)
 
     def value(along: float) -> float:
         if along <= 0.0 or along >= length:
             return before if along <= 0.0 else after
         # The test functions are those of this very point, not of the last Newton step.
-        found = corrected(problem, between(here, there, along, row), row, exact,
-                          2 * settings.iterations, exact=True,
-                          known=(best[-1][1] if best else there).linearisation)
-        if found is None:
+        for guess, beside in _guesses(here, there, along, row, known):
+            try:
+                found = corrected(problem, guess, row, exact, 2 * settings.iterations, exact=True,
+                                  known=beside.linearisation)
+                if found is not None:
+                    at = finished(problem, *found, row, settings)
+                    break
+            except FecontactError:
+                continue
+        else:
             raise _LostError
-        at = finished(problem, *found, row, settings)
         result = test(at)
-        best.append((abs(result), at))
+        known.append((along, result, at))
         return result
 
+    done = False
     try:
-        brentq(value, 0.0, length, xtol=precision * length, rtol=1e-14, maxiter=60,
-               disp=False)
-    except (_LostError, FecontactError):
-        if not best:
+        done = brentq(value, 0.0, length, xtol=precision * length, rtol=1e-14, maxiter=60,
+                      full_output=True, disp=False)[1].converged
+    except _LostError:
+        if not known:
             return None
-    size, at = min(best, key=lambda pair: pair[0])
+    first = min(known, key=lambda each: each[0])
+    if remeshed and first[1] * after > 0.0 and first[0] <= 3.0 * precision * length:
+        return first[2], first[0]
+    along, size, at = min(known, key=lambda each: abs(each[1]))
     # At a pole or a jump the values do not get small; how small they get else, the precision says.
-    return at if size <= max(1e-3, 50.0 * precision) * max(abs(before), abs(after)) else None
+    if abs(size) > max(1e-3, 50.0 * precision) * max(abs(before), abs(after)):
+        return None
+    if done or size == 0.0:
+        return at, 0.0
+    ends = [(0.0, before, here), (length, after, there), *known]
+    return at, min(abs(place - along) for place, other, _ in ends if other * size < 0.0)
+
+
+def _guesses(
+    here: Solution, there: Solution, along: float, row: Array,
+    known: list[tuple[float, float, Solution]],
+) -> Iterator[tuple[Array, Solution]]:
+    """Where Newton's method begins at a length along the branch, each with a solution nearby.
+
+    On the cubic through both ends, then along the tangents of solutions, the nearest first.
+    """
+    yield between(here, there, along, row), known[-1][2] if known else there
+    solutions = sorted([here, there, *(at for *_, at in known)],
+                       key=lambda at: abs(float(row @ (at.u - here.u)) - along))
+    for at in solutions[:_GUESSES]:
+        ahead = along - float(row @ (at.u - here.u))
+        yield at.u + ahead / float(row @ at.tangent) * at.tangent, at
 
 
 class _LostError(Exception):

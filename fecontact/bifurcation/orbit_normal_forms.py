@@ -31,6 +31,8 @@ Array = NDArray[Any]
 # Steps of the differences, in ranges of the states over the orbit: the first two that agree count.
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
 _AGREEMENT = 0.02
+# Error of a coefficient, in parts of it, up to which its sign counts.
+_SURE = 0.25
 
 
 def examined(
@@ -39,8 +41,8 @@ def examined(
     """Details of a special point of a branch of orbits; None if it is none.
 
     'coefficient' is c or Re D for eigenfunctions of mean square one in the scaled states,
-    'criticality' its meaning: 'supercritical', 'subcritical', or 'uncertain' where differences
-    over smaller and smaller steps do not agree. Without ``details`` these are left out.
+    'coefficient_error' by how much differences over two steps differ, 'criticality' the meaning of
+    both, see :func:`verdict`. Without ``details`` these are left out.
     """
     found = linearised.floquet.confirmed(kind)
     if found is None or not details:
@@ -53,15 +55,29 @@ def examined(
     return found
 
 
+def verdict(coefficient: float, error: float) -> dict[str, Any]:
+    """A coefficient, its error, and 'supercritical', 'subcritical' or 'undecided'.
+
+    Undecided are those whose error is above a quarter of themselves, or unknown (NaN).
+    """
+    criticality = "undecided"
+    if error <= _SURE * abs(coefficient) and coefficient != 0.0:
+        criticality = "supercritical" if coefficient < 0.0 else "subcritical"
+    return {"coefficient": coefficient, "coefficient_error": error, "criticality": criticality}
+
+
 def _judged(coefficient: Any) -> dict[str, Any]:
-    before = None
+    """The coefficient from the first two steps that agree, or from those that agree best."""
+    values: list[float] = []
+    pairs: list[tuple[float, float]] = []
     for step in _STEPS:
-        value = float(coefficient(step))
-        if before is not None and abs(value - before) <= _AGREEMENT * abs(value):
-            return {"coefficient": value,
-                    "criticality": "supercritical" if value < 0.0 else "subcritical"}
-        before = value
-    return {"coefficient": float("nan"), "criticality": "uncertain"}
+        values.append(float(coefficient(step)))
+        if len(values) > 1:
+            pairs.append((abs(values[-1] - values[-2]), values[-1]))
+            if pairs[-1][0] <= _AGREEMENT * abs(values[-1]):
+                return verdict(values[-1], pairs[-1][0])
+    error, value = min(pairs)
+    return verdict(value, error)
 
 
 class Expansion:

@@ -9,22 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.bifurcation import orbit_starts
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.collocation import Collocation
-from fecontact.bifurcation.continuation import Settings, continuation
+from fecontact.bifurcation.continuation import Settings
 from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
-from fecontact.bifurcation.interpolation import equidistributed
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
+from fecontact.bifurcation.sharpening import ROUGHLY, SHARPENED, sharpened
 from fecontact.bifurcation.vector_field import VectorField, require_field
-from fecontact.errors import FecontactError, InputError
+from fecontact.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Special points of a branch, and the distance to both sides over which they are located again.
-_KINDS = ("fold", "period doubling", "Neimark-Sacker", "branch point")
 # Parts of the first step that are tried one after the other to leave a special point.
 _FIRST = (1.0, 0.2, 0.04)
-_NEAR = (1e-3, 1e-2)
 
 
 def orbits_from_hopf(
@@ -60,9 +57,12 @@ def orbits_from_hopf(
         one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
 
         - 'fold',
-        - 'period doubling' and 'Neimark-Sacker': with coefficient and criticality, see
-          :mod:`fecontact.bifurcation.orbit_normal_forms`,
-        - 'branch point': where two branches of orbits cross.
+        - 'period doubling' and 'Neimark-Sacker': with coefficient, coefficient_error,
+          criticality ('supercritical', 'subcritical' or 'undecided') and parameter_error, see
+          :mod:`fecontact.bifurcation.orbit_normal_forms` and
+          :func:`fecontact.bifurcation.sharpening.sharpened`,
+        - 'branch point': where two branches of orbits cross,
+        - 'unresolved': where 'unstable' changes though nothing of the kind was found.
 
     Raises
     ------
@@ -201,12 +201,12 @@ def _followed(
         "periods": problem.periods}
     name = list(field.parameters)[problem.free]
     # What is special is located once more below, on a mesh of its own.
-    branch = follow(replace(problem, limits=limits, precision=1e-3), u, settings, name=name,
+    branch = follow(replace(problem, limits=limits, precision=ROUGHLY), u, settings, name=name,
                     tangent=tangent, attributes=attributes, **options)
     points = list(branch.points)
     try:
         for index, point in enumerate(branch.points):
-            if point.kind in _KINDS:
+            if point.kind in SHARPENED:
                 points[index] = _sharpened(field, branch, index)
     except KeyboardInterrupt:
         branch = replace(branch, status=Status.INTERRUPTED)
@@ -216,25 +216,5 @@ def _followed(
 def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
     """A special point located once more, on the mesh that suits its own orbit."""
     point = branch.points[index]
-    problem, u, _ = restored(field, branch, point)
-    # At branch points the tangent is not defined; that of a neighbour serves for all kinds.
-    neighbour = next((other for other in branch.points[index::-1] if other.kind is None),
-                     branch.points[-1])
-    before, start, direction = restored(field, branch, neighbour)
-    tangent = before.on_mesh(problem.mesh, start, direction)[2]
-    mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, problem.intervals)
-    problem, u, tangent = problem.on_mesh(mesh, u, tangent)
-    problem = replace(problem, renewal=0, precision=1e-9)
-    # The scales may have grown along the branch.
-    tangent = tangent / np.sqrt(problem.weights() @ tangent**2)
-    for near in _NEAR:
-        settings = Settings(step=2.0 * near, largest_step=2.0 * near, points=2)
-        try:
-            for found in continuation(problem, u - near * tangent, settings, tangent=tangent):
-                if found.kind == point.kind:
-                    return replace(found, tangent=tangent)
-        except FecontactError:
-            continue
-    kind = "torus" if point.kind == "Neimark-Sacker" else str(point.kind)
-    details = problem.examine(kind, u, problem.linearise(u), tangent)
-    return point if details is None else replace(point, details={**point.details, **details})
+    before = next((one for one in branch.points[index::-1] if one.kind is None), branch.points[-1])
+    return sharpened(point, restored(field, branch, point), restored(field, branch, before))

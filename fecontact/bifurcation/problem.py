@@ -33,10 +33,17 @@ class Problem(Protocol):
         problems whose factorisation costs far more than a residual and a solution.
     precision : float
         Part of a step to which special points are located on it.
+    event_precision : float
+        The same for events.
+    confirms : frozenset of str
+        Test functions that jump a little where the mesh is renewed, and whose zeros
+        :meth:`examine` confirms.
     """
 
     keeps_matrix: ClassVar[bool] = False
     precision: float = 1e-12
+    event_precision: ClassVar[float] = 1e-12
+    confirms: ClassVar[frozenset[str]] = frozenset()
 
     def linearise(self, u: Array) -> Linearisation:
         """The equations about u.
@@ -56,10 +63,17 @@ class Problem(Protocol):
     def point(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, Any]:
         """What is stored of a solution: numbers, arrays; the same names for each.
 
-        Where it holds 'unstable', a number of unstable directions, a step is halved whose changes
-        of it are more than two for each test function that changes sign.
+        Where it holds 'unstable', a number of unstable directions, a step is halved whose special
+        points do not explain the change of it.
         """
         ...
+
+    def unstable_range(
+        self, linearisation: Linearisation, values: Mapping[str, Any]
+    ) -> tuple[int, int]:
+        """Least and largest number of unstable directions that rounding leaves open."""
+        count = int(values.get("unstable", 0))
+        return count, count
 
     def tests(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, float]:
         """Functions whose zeros are special points, by kind; folds are found without."""
@@ -105,13 +119,13 @@ class Settings:
         Least and largest value of the parameter; the last point lies on the bound.
     tolerance : float
         Newton's method ends with a step of this size, relative to 1 + the size of u; what is left
-        then is of the order of its square. Special points are located to 1e-10.
+        then is of the order of its square. Special points and events are located to 1e-10.
     iterations : int
         Newton steps before a step counts as failed.
     largest_turn : float
         Largest angle between tangents of neighbouring points [rad].
     locate : bool
-        Whether special points are located, besides the events.
+        Whether special points are located, besides the events, and changes of stability explained.
     stop_at : sequence of str
         Kinds of special points, or events, at which the branch ends.
     events : mapping

@@ -61,15 +61,16 @@ def rounded(
         there = _next(problem, at, row, length, settings)
         change = np.inf if there is None else float(along @ there.tangent / (row @ there.tangent))
         change = abs(change - slope) / abs(first)
-        if there is None or change > _CHANGE:
+        reached = None
+        if there is not None and change <= _CHANGE:
+            reached = located_between(problem, at, there, settings, row)
+        if reached is None:
             length *= 0.5
             if length * first < 0.05 * step:
                 return None
             continue
-        special = located_between(problem, at, there, settings, row)
-        if special is None:
-            return None
-        found.append((there, special))
+        there, special = reached
+        found.append(reached)
         if any(point.kind is None for point in special):
             return found
         turn = float(weights * at.tangent @ there.tangent)

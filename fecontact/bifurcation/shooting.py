@@ -85,6 +85,7 @@ class Shooting(Problem):
     bend: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
+    event_precision: ClassVar[float] = 1e-9
 
     @cached_property
     def autonomous(self) -> bool:
@@ -167,6 +168,11 @@ class Shooting(Problem):
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh,
                 "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
+
+    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
+        """Multipliers as close to the unit circle as their error may lie on either side."""
+        found: tuple[int, int] = linearisation.floquet.unstable_range
+        return found
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array

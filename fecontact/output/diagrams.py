@@ -30,7 +30,7 @@ _SPECIAL = {
     "Hopf": ("H", "o"), "fold": ("F", "s"), "branch point": ("BP", "D"),
     "period doubling": ("PD", "^"), "Neimark-Sacker": ("NS", "v"), "cusp": ("CP", "P"),
     "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
-    "double Hopf": ("HH", ">"),
+    "double Hopf": ("HH", ">"), "unresolved": ("?", "x"),
 }
 _DASHES = (0, (4, 2.5))
 

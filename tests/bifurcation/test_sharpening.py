@@ -1,0 +1,152 @@
+"""Special points and events on branches of orbits: their places, coefficients, and their errors."""
+
+import csv
+
+import numpy as np
+import pytest
+from collocation_fields import settled, two_masses_field
+from test_orbit_bifurcations import moebius, torus
+
+from fecontact.bifurcation import sharpening
+from fecontact.bifurcation.branch import Branch
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.orbit_normal_forms import verdict
+from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
+from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.vector_field import VectorField
+from fecontact.branch_results import branches_csv, special_table
+
+
+def circle_branch(function, c, intervals):
+    field = VectorField.from_function(function, {"lam": -0.2, "c": c}, 3)
+    t = np.linspace(0.0, np.pi, 400)
+    circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
+    return orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.3, 0.3),
+                              intervals=intervals, scales=np.ones(3))
+
+
+@pytest.mark.parametrize("intervals", [2, 3, 5])
+@pytest.mark.parametrize(("function", "coefficient"), [
+    (moebius, 0.4 * np.pi / 1.08), (torus, 0.8 * np.pi / (1.0 + (0.5 / 0.7) ** 2 / 2.0))])
+def test_error_of_a_coefficient_in_closed_form(function, coefficient, intervals):
+    """On two intervals of a circle already the errors stated hold, of coefficient and place."""
+    point, = circle_branch(function, 0.4, intervals).special
+    details = point.details
+    assert details["criticality"] == "subcritical"
+    assert abs(details["coefficient"] - coefficient) <= 1.5 * details["coefficient_error"]
+    assert details["coefficient_error"] < 0.02 * coefficient
+    assert abs(point.parameter) <= 1.5 * details["parameter_error"] + 1e-10
+
+
+@pytest.mark.parametrize(("coefficient", "error", "expected"), [
+    (0.59, 0.1, "subcritical"), (-0.59, 0.1, "supercritical"), (0.59, 0.3, "undecided"),
+    (-45.0, 100.0, "undecided"), (4e-18, 4e-18, "undecided"), (0.0, 0.0, "undecided"),
+    (0.59, np.nan, "undecided"), (np.nan, np.nan, "undecided")])
+def test_verdicts(coefficient, error, expected):
+    assert verdict(coefficient, error)["criticality"] == expected
+
+
+@pytest.fixture(scope="module")
+def slow_doubling():
+    """Stick-slip at B = 20, D = 0.045, followed down to its doubling, on different meshes."""
+    field = two_masses_field(B=20.0, D=0.045)
+    times, states = settled(field, 400.0, [1.0, 0.0, 8.0, 0.0], 15.0)
+
+    def found(intervals):
+        branch = orbits_from_motion(
+            field, "D", times, states, bounds=(0.03, 0.05), width=2.0, direction=-1.0,
+            intervals=intervals, scales=np.full(4, 8.0),
+            settings=Settings(step=0.002, largest_step=0.01, points=40,
+                              stop_at=["period doubling"]))
+        return branch.of_kind("period doubling")[0]
+
+    return found
+
+
+@pytest.mark.parametrize("intervals", [40, 50, 60, 100])
+def test_criticality_is_that_of_finer_meshes_or_undecided(slow_doubling, intervals):
+    """From 400 intervals on the coefficient is 0.382 to 0.387; on 60 it is 43, on 100 1.2."""
+    point = slow_doubling(intervals)
+    details = point.details
+    assert abs(point.parameter - 0.04009165) <= 1.2 * details["parameter_error"] + 1e-8
+    assert details["criticality"] in ("undecided", "subcritical")
+    if intervals >= 60:
+        assert details["criticality"] == "subcritical"
+        assert details["coefficient"] == pytest.approx(0.3822, abs=details["coefficient_error"])
+        assert details["coefficient_error"] < 0.06
+
+
+@pytest.fixture(scope="module")
+def second():
+    """The second branch over v_0 at B = 20, from its Hopf point over the fold and two doublings."""
+    field = two_masses_field(B=20.0, v0=8.0)
+    sliding = equilibrium_branch(field, "v0", np.zeros(4), bounds=(0.05, 8.0), direction=-1.0)
+    return orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[1], bounds=(0.05, 8.0),
+                            intervals=50, scales=np.full(4, 8.0),
+                            settings=Settings(step=0.005, largest_step=0.04, points=80))
+
+
+def test_points_on_sharp_turns_are_found_again(second):
+    """Beside a sharp turn one search misses the point; from 100 to 800 intervals it is this."""
+    fold, = second.of_kind("fold")
+    assert fold.parameter == pytest.approx(2.5394064336, abs=1e-9)
+    doublings = second.of_kind("period doubling")
+    assert [point.parameter for point in doublings] == pytest.approx(
+        [2.5385714591, 2.3468776149], abs=4e-9)
+    for point in doublings:
+        error = point.details["parameter_error"]
+        assert error < 1e-8
+        assert point.details["criticality"] == "subcritical"
+    assert all(point.details.get("located", True) for point in second.special)
+
+
+def test_points_that_are_not_found_again_say_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(sharpening, "_searched", lambda *_: None)
+    field = two_masses_field(B=0.3)
+    sliding = equilibrium_branch(field, "B", np.zeros(4), bounds=(0.3, 9.6))
+    branch = orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], bounds=(0.3, 9.6),
+                              settings=Settings(step=0.005))
+    for point, exact in zip(branch.special, (0.890686833, 8.0921923845), strict=True):
+        assert not point.details["located"]
+        assert abs(point.parameter - exact) < point.details["parameter_error"]
+    assert branch.special[1].details["criticality"] == "undecided"
+    loaded = Branch.load(branch.save(tmp_path / "branch.h5"))
+    for mine, theirs in zip(branch.special, loaded.special, strict=True):
+        assert theirs.details["located"] is False
+        assert theirs.details["parameter_error"] == mine.details["parameter_error"]
+    observed = [type(point)(point.u, point.tangent, {**point.values, "observed_minimum": 0.0,
+                "observed_maximum": 0.0, "observed_amplitude": 0.0}, point.kind, point.details)
+                for point in branch.special]
+    shown = Branch("B", tuple(observed))
+    rows = list(csv.DictReader(branches_csv({"orbits": shown}).splitlines()))
+    assert [float(row["parameter_error"]) for row in rows] == [
+        point.details["parameter_error"] for point in branch.special]
+    columns = [list(column.cells) for column in special_table(shown).columns]
+    assert f"known to {branch.special[0].details['parameter_error']:.1g} only" in columns[-1][0]
+    assert "undecided, known to" in columns[-1][1]
+
+
+def swirl(t, x, p, out):
+    # Radius sqrt(r), angular frequency 1 + r.
+    square = x[0] * x[0] + x[1] * x[1]
+    out[0] = (p[0] - square) * x[0] - (1.0 + square) * x[1]
+    out[1] = (p[0] - square) * x[1] + (1.0 + square) * x[0]
+
+
+def test_events_on_orbits_are_as_sharp_as_on_equilibria():
+    field = VectorField.from_function(swirl, {"r": -0.1}, 2)
+    rest = equilibrium_branch(field, "r", bounds=(-0.1, 1.0))
+    events = {"period of 4.5 s": lambda values: values["period"] - 4.5,
+              "radius of 0.7": lambda values: values["maximum"][0] - 0.7,
+              "multiplier of 0.1": lambda values: np.log(np.abs(values["multipliers"]).min() / 0.1)}
+    branch = orbits_from_hopf(field, rest, rest.special[0], bounds=(-0.1, 1.0), intervals=60,
+                              settings=Settings(events=events))
+
+    def place(kind):
+        return branch.of_kind(kind)[0].parameter
+
+    assert place("period of 4.5 s") == pytest.approx(2.0 * np.pi / 4.5 - 1.0, abs=1e-10)
+    assert place("radius of 0.7") == pytest.approx(0.49, abs=1e-9)
+    # The exponent is -2 r.
+    exact = place("multiplier of 0.1")
+    assert exact == pytest.approx(np.log(10.0) * (1.0 + exact) / (4.0 * np.pi), abs=1e-10)
