@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from fecontact.analysis.periods import strobed_states
 from fecontact.analysis.quantities import Point, history, point_name
 from fecontact.analysis.receptance import FrequencyResponse
+from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.figures import COLOURS, new_figure
+from fecontact.output.figures import COLOURS, add_note, new_figure, thinned
 from fecontact.output.units import suitable_unit
 from fecontact.report import count
 
@@ -83,7 +84,11 @@ def spectrogram_figure(
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
     time_unit, time_symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
     unit, symbol = suitable_unit(float(np.abs(shown.values).max()), shown.unit)
-    upper.plot(trajectory.time / time_unit, shown.values / unit, color=COLOURS[0], linewidth=0.8)
+    drawn = resolved(trajectory)
+    add_note(figure, drawn)
+    line = history(drawn.trajectory, quantity, point, axis).values
+    upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
+               linewidth=0.8)
     upper.set_ylabel(f"[{symbol}]")
     upper.set_title(shown.title)
     factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
@@ -115,10 +120,13 @@ def poincare_figure(
     row = _AXES.index(axis)
     found = strobed_states(trajectory, period=period, phase=phase, start=float(trajectory.time[0]))
     basis = trajectory.system.basis
-    x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
+    drawn = resolved(trajectory)
+    x, v = (values(point)[:, row] for values in (
+        drawn.trajectory.displacement, drawn.trajectory.velocity))
     rows = trajectory._rows(point)[row]
     m = basis.modes
     figure = new_figure(6.4, 5.2)
+    add_note(figure, drawn)
     plane = figure.subplots()
     unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
     factor, rate_symbol = suitable_unit(float(np.abs(v).max()), "m/s")
@@ -138,6 +146,8 @@ def friction_work_figure(trajectory: Trajectory) -> "Figure":
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
     constant coefficient is the friction work over that coefficient.
     """
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
     basis = trajectory.system.basis
     x, length = basis.contact_x, basis.tributary
     work = trajectory.friction_work[-1] / length
@@ -145,6 +155,7 @@ def friction_work_figure(trajectory: Trajectory) -> "Figure":
     speed = np.abs(trajectory.slip_velocity) * touching
     slip = np.trapezoid(speed, trajectory.time, axis=0)
     figure = new_figure(9.0, 5.6)
+    add_note(figure, drawn)
     upper, lower = figure.subplots(2, 1, sharex=True)
     unit, symbol = suitable_unit(float(np.abs(x).max() or length.max()), "m")
     for panel, values, name, base in ((upper, work, "friction work per length", "N"),
