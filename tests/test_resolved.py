@@ -20,7 +20,8 @@ def point_mass(axis, **parts):
     """One mass, free to move along x or y."""
     rows = np.zeros((3, 1))
     rows["xy".index(axis)] = 1.0
-    basis = fc.ModalBasis.from_matrices([[MASS]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
+    basis = fc.ModalBasis.from_matrices(
+        [[MASS]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
     return fc.ContactSystem(basis, **parts)
 
 
@@ -112,7 +113,7 @@ def test_slip_is_measured_along_the_motion():
 
 
 def test_set_valued_runs_are_repeated_with_what_they_were_told():
-    """A ball on a rigid stop: rebounds of e, e^2 ... between outputs further apart than they are."""
+    """A ball on a rigid stop: rebounds of e, e^2 ... that are shorter than the times between."""
     system = point_mass("y", load=fc.Load(9.81 * MASS))
     run = fc.simulate(system, 0.55, initial=np.sqrt(MASS) * np.array([0.1, 0.0]), outputs=12,
                       method="set-valued", restitution=0.5)

@@ -13,7 +13,14 @@ from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.figures import COLOURS, add_note, new_figure, thinned
+from fecontact.output.figures import (
+    COLOURS,
+    DASHES,
+    add_note,
+    distinct_colours,
+    new_figure,
+    thinned,
+)
 from fecontact.output.units import suitable_unit
 from fecontact.report import count
 
@@ -173,7 +180,11 @@ def friction_work_figure(trajectory: Trajectory) -> "Figure":
 def response_figure(
     responses: Sequence[FrequencyResponse], labels: Sequence[str] = ()
 ) -> "Figure":
-    """Magnitude and phase of frequency responses over frequency."""
+    """Magnitude and phase of frequency responses over frequency; those of unstable states dashed.
+
+    What is linearised about an unstable state is not what a measurement would show: the legend
+    says so.
+    """
     if not any(response.values.any() for response in responses):
         raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
                          f"{_place(responses[0].excitations[0])}; choose another point or "
@@ -182,21 +193,27 @@ def response_figure(
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
     number = 0
     many = len(responses) > 1 or responses[0].values[0].size > 1
+    colours = distinct_colours(sum(response.values[0].size for response in responses))
     for index, response in enumerate(responses):
         for r, seen in enumerate(response.responses):
             for e, pushed in enumerate(response.excitations):
-                colour = COLOURS[number % len(COLOURS)]
+                colour = colours[number]
                 number += 1
                 name = f"{_place(seen)} by {_place(pushed)}"
                 if index < len(labels):
                     name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
                         labels[index])
+                style = "-" if response.stable else DASHES
+                if not response.stable:
+                    name += f"\nUNSTABLE, not to be measured:\n{response.growth_in_words}"
                 f = response.frequency_hz
-                upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name)
-                lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0)
+                upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name,
+                               linestyle=style)
+                lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0,
+                           linestyle=style)
     first = responses[0]
     upper.set_ylabel(f"{first.kind} [{first.unit()}]")
-    if many:
+    if many or not first.stable:
         upper.legend(loc="best")
     else:
         upper.set_title(f"{_place(first.responses[0])} by a force at "

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 
 # Colours that people with colour-blindness tell apart (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
+# Further ones, for the many branches of a diagram; no two of all are nearer to each other.
+_MORE_COLOURS = ("#882200", "#99dd88", "#7766ff", "#000044", "#0000ff")
+DASHES: Any = (0, (4, 2.5))
 # Of energies and powers, by the place where they are stored, come in or are lost.
 ENERGY_COLOURS = {
     "kinetic": "#0072b2", "elastic": "#56b4e9", "modal_damping": "#56b4e9",
@@ -55,6 +58,21 @@ def new_figure(width: float, height: float) -> "Figure":
     return figure
 
 
+def distinct_colours(count: int) -> list[str]:
+    """So many colours, no two alike; up to twelve are told apart by colour-blind people too."""
+    if count <= len(COLOURS) + len(_MORE_COLOURS):
+        return [*COLOURS, *_MORE_COLOURS][:count]
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    # Neighbours, which follow one another, are as far apart in lightness as they can be.
+    shades = [to_hex(colour) for colour in colormaps["cividis"](np.linspace(0.0, 0.95, count))]
+    half = (count + 1) // 2
+    mixed = [""] * count
+    mixed[::2], mixed[1::2] = shades[:half], shades[half:]
+    return mixed
+
+
 def add_note(figure: "Figure", drawn: Resolved) -> None:
     """Say below a figure where its curves are coarser than the motion."""
     if not drawn.note:
@@ -74,6 +92,7 @@ def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Fig
     points = tuple(points) or _usual_points(trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
+    colours = distinct_colours(len(points))
     figure = new_figure(10.0, 7.5)
     add_note(figure, drawn)
     axes = figure.subplots(3, 2, sharex=True)
@@ -88,7 +107,7 @@ def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Fig
                                *(value[:, row] for value in values))
             for number, (point, value) in enumerate(zip(points, values, strict=True)):
                 axes[row, column].plot(*thinned(time, value[:, row] / factor),
-                                       color=COLOURS[number % len(COLOURS)],
+                                       color=colours[number],
                                        linewidth=1.2 if number else 2.0, label=point_name(point))
     for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
                                (axes[2, 1], "friction force", trajectory.friction_force)):
