@@ -169,7 +169,7 @@ def main(path: Path = Path("beam_stick_slip.png"), quick: bool = False) -> None:
           f"{hopf.details['frequency_hz']:.2f} Hz begins, {hopf.details['criticality']}.")
     first = stick_slip(0.05)
     branch = seen(orbits(first, 0.05, bounds=(0.025, 0.3), points=points, both=not quick))
-    free = seen(slipping(steady, fastest=0.3, points=min(points + 17, 200)))
+    free = seen(slipping(steady, fastest=0.3, points=2 * points))
     runs = [(speed, stick_slip(speed)) for speed in speeds]
     runs += [(0.05, first), *((0.04, run) for run in side_by_side(branch, 0.04))]
     for name, each in (("Stick-slip", branch), ("Without stick", free)):

@@ -188,7 +188,7 @@ def figure(runs: dict[str, fc.Trajectory]) -> Any:
 
 def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> None:
     """Run all cases; print slips, periods and vibrations, and draw them."""
-    skip, periods, end = (12, 20, 0.1) if quick else (40, 100, 1.4)
+    skip, periods, end = (12, 24, 0.1) if quick else (40, 100, 1.4)
     from fecontact.output.saving import save_figure
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -266,9 +266,11 @@ def main(folder: Path = Path("impact-orbits"), quick: bool = False) -> None:
         print(f"{count:7d}  {point.kind or '':16s} {point.parameter:8.4f}")
     count, others = covered(found, branches)
     print(f"\n{count} runs that repeat every 1, 2 or 4 periods are on these branches; others are "
-          f"at {', '.join(f'{w:.1f}' for w in others)} rad/s.")
+          f"at {', '.join(f'{w:.1f}' for w in others) or 'no'} rad/s.")
     draw(folder / "impact_orbits.png", branches, found, 5.0, 80.0,
          [(1, 26.0), (2, 36.0), (1, 45.0), (1, 64.32)])
+    if quick:
+        return
     draw(folder / "impact_doublings.png", branches, found, 34.0, 41.5,
          [(2, 36.0), (1, 37.4), (4, 39.0), (1, 39.5)], marked=True)
 

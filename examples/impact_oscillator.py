@@ -154,7 +154,7 @@ def main(quick: bool = False) -> None:
     """Print what each frequency gives on the mesh and with two modes; quickly the first alone."""
     print("| w_E [rad/s] | source | modes | found | misfit | impacts a period | largest "
           "exponent [1/s] |\n|---|---|---|---|---|---|---|")
-    options: dict[str, Any] = {"transient": 100, "periods": 20, "per_period": 400} if quick else {}
+    options: dict[str, Any] = {"transient": 100, "periods": 24, "per_period": 400} if quick else {}
     for frequency, reported in list(FREQUENCIES.items())[: 1 if quick else None]:
         for system in (two_mode_system(), mesh_system()):
             driven = system.with_(**{"drive.angular_frequency": frequency})

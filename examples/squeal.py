@@ -32,6 +32,7 @@ def system(friction: float = 0.0, load: float = 14.0) -> fc.ContactSystem:
 
 def main(folder: Path = Path(), quick: bool = False) -> tuple[fc.Branch, fc.Branch]:
     """Pictures in the folder; gives the branch over friction and the border of flutter."""
+    folder.mkdir(parents=True, exist_ok=True)
     columns, rows = (7, 5) if quick else (31, 29)
     field = fc.contact_field(system(), [FRICTION, "load.normal"])
     branch = fc.equilibrium_branch(field, FRICTION, bounds=(0.0, 0.6))
