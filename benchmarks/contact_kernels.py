@@ -1,8 +1,9 @@
 """Right-hand side and Jacobian of a contact system: compiled kernels against vectorised numpy.
 
-Usage: python benchmarks/contact_kernels.py
+Usage: python benchmarks/contact_kernels.py [--quick]
 """
 
+import sys
 import timeit
 
 import numpy as np
@@ -46,8 +47,9 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     return np.concatenate([v, force])
 
 
-def main() -> None:
+def main(quick: bool = False) -> None:
     """Print the table."""
+    number, repeat = (20, 2) if quick else (200, 7)
     print(f"{'nodes':>6s} {'modes':>6s} {'numpy rhs [us]':>15s} {'rhs [us]':>9s} {'ratio':>6s} "
           f"{'Jacobian [us]':>14s}")
     for nodes, modes in ((1, 3), (40, 20), (400, 40)):
@@ -56,7 +58,7 @@ def main() -> None:
         difference = np.abs(numpy_rhs(tried, 0.3, y) - tried.rhs(0.3, y)).max()
         assert difference < 1e-9 * np.abs(tried.rhs(0.3, y)).max()
         theirs, ours, jacobian = (
-            min(timeit.repeat(call, number=200, repeat=7)) / 200 * 1e6
+            min(timeit.repeat(call, number=number, repeat=repeat)) / number * 1e6
             for call in (lambda s=tried, y=y: numpy_rhs(s, 0.3, y),
                          lambda s=tried, y=y: s.rhs(0.3, y),
                          lambda s=tried, y=y: s.jacobian(0.3, y)))
@@ -65,4 +67,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main("--quick" in sys.argv)

@@ -1,6 +1,6 @@
 """Time to follow periodic orbits of the two-mass oscillator of section 4.4, beside AUTO-07p.
 
-    python benchmarks/continuation.py [repetitions]
+    python benchmarks/continuation.py [repetitions] [--quick]
 
 The branch from the first Hopf point to B = 12, multipliers at each point, special points located.
 AUTO-07p 0.9.3, compiled with gfortran -O, one thread, took on two shared cores of the same machine
@@ -65,20 +65,23 @@ def timed(task: Callable[[], Branch], repetitions: int) -> tuple[float, Branch]:
     return statistics.median(times), branch
 
 
-def main(repetitions: int) -> None:
-    """Print the table."""
+def main(repetitions: int = 5, quick: bool = False) -> None:
+    """Print the table; quickly its first row once, and few points of the chain."""
+    if quick:
+        repetitions = 1
     field = two_masses()
     sliding = equilibrium_branch(field, "B", bounds=(0.3, 12.0))
     hopf = sliding.of_kind("Hopf")[0]
     print("intervals  points  CPU time  per point   AUTO per point   error of fold, doubling")
-    for intervals in (50, 70, 100, 200):
+    for intervals in (50,) if quick else (50, 70, 100, 200):
         settings = Settings(step=0.002, largest_step=0.065, points=1000)
 
         def task(intervals: int = intervals, settings: Settings = settings) -> Branch:
             return orbits_from_hopf(field, sliding, hopf, settings=settings, bounds=(0.3, 12.0),
                                     intervals=intervals, scales=np.ones(4))
 
-        task()
+        if not quick:
+            task()
         seconds, branch = timed(task, repetitions)
         fold = branch.of_kind("fold")[0].parameter / FOLD - 1.0
         doubling = branch.of_kind("period doubling")[0].parameter / DOUBLING - 1.0
@@ -90,11 +93,12 @@ def main(repetitions: int) -> None:
     large = chain(20)
     sliding = equilibrium_branch(large, "B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]
-    settings = Settings(step=0.002, largest_step=0.02, points=20)
+    settings = Settings(step=0.002, largest_step=0.02, points=3 if quick else 20)
     seconds, branch = timed(lambda: orbits_from_hopf(
         large, sliding, hopf, settings=settings, bounds=(0.1, 3.0), intervals=100), 1)
     print(f"40 states, 100 intervals: {len(branch)} points, {seconds / len(branch):.3f} s a point")
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
+    main(*(int(given) for given in sys.argv[1:] if given != "--quick"),
+         quick="--quick" in sys.argv)

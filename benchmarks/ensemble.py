@@ -1,6 +1,6 @@
 """Problem (f): a bifurcation diagram by brute force, on one core and on all.
 
-Usage: python benchmarks/ensemble.py [values] [periods]
+Usage: python benchmarks/ensemble.py [values] [periods] [--quick]
 
 1000 values of the drive's frequency, 300 periods each, states once a period, if not told
 otherwise; the peer is numbalsoda, called in a compiled loop over the same values with the
@@ -80,9 +80,11 @@ def own(values: Array, workers: int) -> Callable[[float, int], Array]:
     return solve
 
 
-def main() -> None:
-    """Print the table."""
-    count, periods = (int(given) for given in [*sys.argv[1:3], "1000", "300"][:2])
+def main(count: int = 1000, periods: int = 300, quick: bool = False) -> None:
+    """Print the table; quickly of a few values and two tolerances."""
+    tolerances = (1e-4, 1e-5, 1e-6, 1e-7)
+    if quick:
+        count, periods, tolerances = 4, 5, tolerances[1:3]
     values = np.linspace(5.0, 80.0, count)
     wanted = own(values, 1)(1e-11, 3)[:, -1, :2]
     size = np.abs(wanted).max(axis=1, keepdims=True)
@@ -94,7 +96,7 @@ def main() -> None:
     except ImportError:
         print("numbalsoda is not installed")
     rows: dict[str, list[tuple[float, float]]] = {name: [] for name in solvers}
-    for rtol in (1e-4, 1e-5, 1e-6, 1e-7):
+    for rtol in tolerances:
         for name, solve in solvers.items():
             found = solve(rtol, 3)[:, -1, :2]
             error = float(np.median(np.abs(found - wanted).max(axis=1, keepdims=True) / size))
@@ -112,4 +114,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*(int(given) for given in sys.argv[1:] if given != "--quick"),
+         quick="--quick" in sys.argv)

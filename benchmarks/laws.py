@@ -3,7 +3,7 @@
 Every law of the package and one of a user's own (examples/own_law.py), all in one run. Every
 node is in contact and slides or sticks, none is skipped.
 
-Usage: python benchmarks/laws.py
+Usage: python benchmarks/laws.py [--quick]
 """
 
 import sys
@@ -32,7 +32,7 @@ GIVEN: dict[str, dict[str, float]] = {
 }
 
 
-def microseconds(normal: NormalLaw, friction: FrictionLaw) -> float:
+def microseconds(normal: NormalLaw, friction: FrictionLaw, repetitions: int = 30) -> float:
     """Shortest time of a right-hand side [us]."""
     rng = np.random.default_rng(0)
     T = rng.standard_normal((2 + NODES, 3, MODES))
@@ -45,7 +45,7 @@ def microseconds(normal: NormalLaw, friction: FrictionLaw) -> float:
     arrays = system.arrays._replace(gap=-np.abs(T[2:, 1] @ y[:MODES]) - 3e-6)
     out = np.empty(system.size)
     best = np.inf
-    for _ in range(30):
+    for _ in range(repetitions):
         begin = time.perf_counter()
         for _ in range(100):
             right_hand_side(0.0, y, arrays, out)
@@ -53,8 +53,9 @@ def microseconds(normal: NormalLaw, friction: FrictionLaw) -> float:
     return 1e6 * best
 
 
-def main() -> None:
+def main(quick: bool = False) -> None:
     """Print the tables."""
+    repetitions = 2 if quick else 30
     own = f"{Path(__file__).parents[1] / 'examples' / 'own_law.py'}:LogarithmicFriction"
     for kind, other in ((NormalLaw, ConstantFriction()), (FrictionLaw, LinearContact(1e7))):
         names = [*law_names()[kind], *([own] if kind is FrictionLaw else [])]
@@ -63,7 +64,7 @@ def main() -> None:
             law: NodeLaw = law_class(kind, name, "")(**GIVEN.get(name, {})
                                                      if kind is NormalLaw else {})
             parts = (law, other) if kind is NormalLaw else (other, law)
-            costs[Path(name).name] = microseconds(*parts)  # type: ignore[arg-type]
+            costs[Path(name).name] = microseconds(*parts, repetitions)  # type: ignore[arg-type]
             memory = getattr(law, "memory", 0)
             print(f"{kind.__name__:12s} {Path(name).name:32s} {costs[Path(name).name]:6.1f} us"
                   f"{f', {memory} internal variables a node' if memory else ''}", flush=True)
@@ -74,4 +75,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main("--quick" in sys.argv)

@@ -1,6 +1,6 @@
 """What derivatives of a run cost, and a point of a branch by shooting, on the beam that sticks.
 
-    python benchmarks/shooting.py [repetitions]
+    python benchmarks/shooting.py [repetitions] [--quick]
 
 A run over 50 ms, from the stuck state, and the same with derivatives to start and belt speed, for
 3, 5 and 20 modes; then points of the stick-slip branch of 20 modes. CPU time, the least of the
@@ -48,13 +48,17 @@ def measure(modes: int, repetitions: int) -> list[float]:
         lambda: derivatives(None), lambda: derivatives(1e-2))]
 
 
-def main(repetitions: int) -> None:
-    """Print the tables."""
+def main(repetitions: int = 5, quick: bool = False) -> None:
+    """Print the tables; quickly the first row, once, and no branch."""
+    if quick:
+        repetitions = 1
     print("modes     run   with derivatives   ratio   derivatives to 1e-2   ratio")
-    for modes in (3, 5, 20):
+    for modes in (3,) if quick else (3, 5, 20):
         run, tight, loose = measure(modes, repetitions)
         print(f"{modes:5}  {1e3 * run:6.1f} ms  {1e3 * tight:9.1f} ms  {tight / run:12.1f}"
               f"  {1e3 * loose:12.1f} ms  {loose / run:12.1f}")
+    if quick:
+        return
     motion = example.stick_slip(SPEED)
     begin = time.process_time()
     branch = example.orbits(motion, SPEED, bounds=(SPEED, 0.27), both=False)
@@ -64,4 +68,5 @@ def main(repetitions: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
+    main(*(int(given) for given in sys.argv[1:] if given != "--quick"),
+         quick="--quick" in sys.argv)

@@ -1,4 +1,4 @@
-"""Efficiency of a sweep of many short cases: ``python benchmarks/sweep.py [cases]``.
+"""Efficiency of a sweep of many short cases: ``python benchmarks/sweep.py [cases] [--quick]``.
 
 Two times of all cases on one core, of :func:`simulate` alone and of all that belongs to a case
 (its study, system, run, summaries), are compared with what all cores took together: in the wall
@@ -34,7 +34,9 @@ def cpu_seconds(who: int) -> float:
     return used.ru_utime + used.ru_stime
 
 
-def main(cases: int) -> None:
+def main(cases: int = 10_000, quick: bool = False) -> None:
+    if quick:
+        cases = 20
     study = Study.from_toml(STUDY)
     study.basis()
     axes = {"ground.speed": Range(1e-3, 4e-3, cases // 20),
@@ -43,7 +45,8 @@ def main(cases: int) -> None:
     single: list[tuple[float, float]] = []
     rng = np.random.default_rng(0)
     names = SweepSettings().summaries
-    for _ in range(110):
+    first = 2 if quick else 10
+    for _ in range(11 * first):
         begin = time.process_time()
         system = study.with_(**{
             "ground.speed": rng.uniform(1e-3, 4e-3),
@@ -53,7 +56,7 @@ def main(cases: int) -> None:
         end = time.process_time()
         summarise(run, functions_for(names))
         single.append((end - middle, time.process_time() - begin))
-    alone, whole = (float(value) for value in np.mean(single[10:], axis=0))
+    alone, whole = (float(value) for value in np.mean(single[first:], axis=0))
     print(f"one case: {1e3 * alone:.2f} ms for its run alone, {1e3 * whole:.2f} ms with its study, "
           f"its system and its summaries")
     ticks: list[tuple[float, int, float]] = []
@@ -68,7 +71,7 @@ def main(cases: int) -> None:
         table = sweep(study, axes, folder=folder, progress=tick)
         children = cpu_seconds(resource.RUSAGE_CHILDREN) - before - 2.0 * starting
     assert not table.failed
-    start = min(8, len(ticks) - 2)
+    start = max(0, min(8, len(ticks) - 2))
     seconds, done = ticks[-1][0] - ticks[start][0], ticks[-1][1] - ticks[start][1]
     parent = ticks[-1][2] - ticks[0][2]
     print(f"{len(table)} cases on {cores()} cores: {ticks[-1][0] - ticks[0][0]:.1f} s with the "
@@ -86,4 +89,5 @@ def main(cases: int) -> None:
 if __name__ == "__main__":
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with one_thread_each():
-        main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)
+        main(*(int(given) for given in sys.argv[1:] if given != "--quick"),
+             quick="--quick" in sys.argv)

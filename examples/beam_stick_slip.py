@@ -8,7 +8,7 @@ side is where the beam only just sticks: there the unstable orbits meet it. On t
 vibration that is left from the slip before decides when the beam lets go; the branch folds twice,
 and between the folds two stick-slip motions exist side by side.
 
-Usage: python examples/beam_stick_slip.py [FILE.png]      (prints and draws; some two minutes)
+Usage: python examples/beam_stick_slip.py [FILE.png] [--quick]   (prints and draws; two minutes)
 """
 
 import sys
@@ -78,7 +78,7 @@ def orbits(motion: fc.SettledMotion, speed: float, bounds: tuple[float, float],
         scales=scales(motion), width=0.4, both=both, settings=settings(points))
 
 
-def slipping(branch: fc.Branch, fastest: float) -> fc.Branch:
+def slipping(branch: fc.Branch, fastest: float, points: int = 200) -> fc.Branch:
     """Orbits without stick that are born where steady sliding ends, by collocation.
 
     They are smooth, and by far too unstable to be run once round.
@@ -86,7 +86,7 @@ def slipping(branch: fc.Branch, fastest: float) -> fc.Branch:
     field = fc.contact_field(beam(fastest), {SPEED: fastest})
     hopf, = branch.of_kind("Hopf")
     return fc.orbits_from_hopf(field, branch, hopf, bounds=(2e-3, fastest), intervals=60,
-                               settings=Settings(step=0.01, largest_step=0.03, points=200))
+                               settings=Settings(step=0.01, largest_step=0.03, points=points))
 
 
 def scales(motion: fc.SettledMotion) -> NDArray[np.float64]:
@@ -160,16 +160,17 @@ def draw(path: Path, stuck_slip: fc.Branch, free: fc.Branch, hopf: BranchPoint,
     plt.close(figure)
 
 
-def main(path: Path) -> None:
+def main(path: Path = Path("beam_stick_slip.png"), quick: bool = False) -> None:
     """Print where steady sliding ends, orbits with their multipliers and periods of runs; draw."""
+    points, speeds = (3, (0.08,)) if quick else (100, (0.03, 0.08, 0.12, 0.16, 0.2, 0.24, 0.27))
     steady = sliding()
     hopf, = steady.of_kind("Hopf")
     print(f"Steady sliding is stable above {1e3 * hopf.parameter:.4f} mm/s; there a vibration of "
           f"{hopf.details['frequency_hz']:.2f} Hz begins, {hopf.details['criticality']}.")
     first = stick_slip(0.05)
-    branch = seen(orbits(first, 0.05, bounds=(0.025, 0.3)))
-    free = seen(slipping(steady, fastest=0.3))
-    runs = [(speed, stick_slip(speed)) for speed in (0.03, 0.08, 0.12, 0.16, 0.2, 0.24, 0.27)]
+    branch = seen(orbits(first, 0.05, bounds=(0.025, 0.3), points=points, both=not quick))
+    free = seen(slipping(steady, fastest=0.3, points=2 * points))
+    runs = [(speed, stick_slip(speed)) for speed in speeds]
     runs += [(0.05, first), *((0.04, run) for run in side_by_side(branch, 0.04))]
     for name, each in (("Stick-slip", branch), ("Without stick", free)):
         print(f"{name}: {len(each)} points")
@@ -185,4 +186,5 @@ def main(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "beam_stick_slip.png"))
+    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
+         quick="--quick" in sys.argv)

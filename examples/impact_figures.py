@@ -3,7 +3,7 @@
 Figures 4.2-2 and 4.2-3 of the source are phase diagrams at five frequencies, and displacement,
 velocity and phase diagram of the chatter; here at the middle of the contact.
 
-Usage: python examples/impact_figures.py FOLDER
+Usage: python examples/impact_figures.py [FOLDER] [--quick]
 """
 
 import sys
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from impact_oscillator import FREQUENCIES, mesh_system, settled
+from impact_oscillator import FREQUENCIES, mesh_system, settled, two_mode_system
 from matplotlib import rc_context
 
 from fecontact import ContactSystem, Trajectory
@@ -94,22 +94,34 @@ def section_figure(points: dict[float, np.ndarray]) -> Any:
     return figure
 
 
-def strobed(system: ContactSystem, count: int) -> np.ndarray:
+def strobed(system: ContactSystem, count: int, transient: int = 200) -> np.ndarray:
     """Heights [um] and velocities [mm/s] (2, count) of the contact, drive at zero, rising."""
-    run = settled(system, transient=200, periods=count, per_period=1, rtol=1e-6)
+    run = settled(system, transient=transient, periods=count, per_period=1, rtol=1e-6)
     return np.array(contact_motion(run))
 
 
-def figures(system: ContactSystem) -> dict[str, Any]:
+def figures(system: ContactSystem, transient: int = 300,
+            points: int = SECTION_POINTS) -> dict[str, Any]:
     """All pictures by name: ``phase``, ``chatter`` and ``sections``."""
     driven = {w: system.with_(**{"drive.angular_frequency": w}) for w in FREQUENCIES}
-    runs = {w: settled(one, periods=SHOWN_PERIODS[w]) for w, one in driven.items()}
-    points = {w: strobed(one, SECTION_POINTS if w == 23.63 else 40) for w, one in driven.items()}
+    runs = {w: settled(one, transient=transient, periods=SHOWN_PERIODS[w])
+            for w, one in driven.items()}
+    sections = {w: strobed(one, points if w == 23.63 else min(points, 40), min(transient, 200))
+                for w, one in driven.items()}
     with rc_context(STYLE):
         return {"phase": phase_figure(runs), "chatter": chatter_figure(runs[9.845]),
-                "sections": section_figure(points)}
+                "sections": section_figure(sections)}
+
+
+def main(folder: Path = Path("impact-figures"), quick: bool = False) -> None:
+    """Draw all pictures; with ``quick`` of two modes, and before the motions have settled."""
+    folder.mkdir(parents=True, exist_ok=True)
+    found = figures(two_mode_system(), 5, 10) if quick else figures(mesh_system())
+    for name, figure in found.items():
+        figure.savefig(folder / f"impact-{name}.png", dpi=100)
+        print(f"{folder / f'impact-{name}.png'}: {len(figure.axes)} diagrams")
 
 
 if __name__ == "__main__":
-    for name, figure in figures(mesh_system()).items():
-        figure.savefig(Path(sys.argv[1]) / f"impact-{name}.png", dpi=100)
+    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
+         quick="--quick" in sys.argv)

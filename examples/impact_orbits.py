@@ -9,7 +9,7 @@ the folds between which motions coexist, and the doublings. Each doubled branch 
 Printed are all folds, doublings and torus bifurcations, and how many of the repeating runs lie on
 the branches; docs/impacts.md says what they mean.
 
-Usage: python examples/impact_orbits.py [FOLDER]      (prints and draws; five to ten minutes)
+Usage: python examples/impact_orbits.py [FOLDER] [--quick]   (prints and draws; five to ten minutes)
 """
 
 import sys
@@ -72,10 +72,12 @@ def field_at(w: float) -> ContactField:
     return fc.contact_field(oscillator(w), {FREQUENCY: w})
 
 
-def runs() -> fc.BruteForce:
+def runs(quick: bool = False) -> fc.BruteForce:
     """States once per period, up and down; more values where motions change quickly."""
     values = np.concatenate([np.arange(5.0, 12.0, 0.5), np.arange(12.0, 46.0, 0.2),
                              np.arange(46.0, 80.5, 0.5)])
+    if quick:
+        values = np.arange(44.0, 52.0, 2.0)
     return fc.brute_force(oscillator(), FREQUENCY, values, transient=100, keep=24,
                           initial=np.zeros(4))
 
@@ -130,7 +132,7 @@ def known(point: BranchPoint, others: Sequence[Array]) -> bool:
     return any(bool((np.abs(place(point) - other) < 1.0).all()) for other in others)
 
 
-def all_orbits(found: fc.BruteForce) -> list[fc.Branch]:
+def all_orbits(found: fc.BruteForce, starts: Sequence[Start] = STARTS) -> list[fc.Branch]:
     """Branches from the starts, those that double there, and those that double on these."""
     def begun(start: Start) -> fc.Branch | None:
         index = int(np.argmin(np.abs(found.values - start.w)))
@@ -143,7 +145,7 @@ def all_orbits(found: fc.BruteForce) -> list[fc.Branch]:
             return None
 
     with ThreadPoolExecutor(2) as pool:
-        branches = [branch for branch in pool.map(begun, STARTS) if branch is not None]
+        branches = [branch for branch in pool.map(begun, starts) if branch is not None]
         latest = [branch for branch in branches if periods(branch) == 1]
         for points in (110, 40):
             latest = all_doubled(pool, latest, points)
@@ -251,11 +253,11 @@ def draw(
                      observe=("B", "y"), insets=insets)
 
 
-def main(folder: Path = Path("impact-orbits")) -> None:
-    """Run, follow, print and draw."""
+def main(folder: Path = Path("impact-orbits"), quick: bool = False) -> None:
+    """Run, follow, print and draw; with ``quick`` a few orbits of one branch."""
     folder.mkdir(parents=True, exist_ok=True)
-    found = runs()
-    branches = all_orbits(found)
+    found = runs(quick)
+    branches = all_orbits(found, (Start(48.0, "up", (43.0, 52.0), 40),) if quick else STARTS)
     for branch in branches:
         print(f"period {periods(branch)}: {branch.parameter.min():.4f} to "
               f"{branch.parameter.max():.4f} rad/s, {len(branch)} points. {branch.status.value}")
@@ -264,12 +266,15 @@ def main(folder: Path = Path("impact-orbits")) -> None:
         print(f"{count:7d}  {point.kind or '':16s} {point.parameter:8.4f}")
     count, others = covered(found, branches)
     print(f"\n{count} runs that repeat every 1, 2 or 4 periods are on these branches; others are "
-          f"at {', '.join(f'{w:.1f}' for w in others)} rad/s.")
+          f"at {', '.join(f'{w:.1f}' for w in others) or 'no'} rad/s.")
     draw(folder / "impact_orbits.png", branches, found, 5.0, 80.0,
          [(1, 26.0), (2, 36.0), (1, 45.0), (1, 64.32)])
+    if quick:
+        return
     draw(folder / "impact_doublings.png", branches, found, 34.0, 41.5,
          [(2, 36.0), (1, 37.4), (4, 39.0), (1, 39.5)], marked=True)
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:2]))
+    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
+         quick="--quick" in sys.argv)

@@ -8,10 +8,11 @@ study file, beside this one, it is used by
     law = "own_law.py:LogarithmicFriction"
     rate_effect = 0.02
 
-Usage: python examples/own_law.py
+Usage: python examples/own_law.py [--quick]
 """
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -46,7 +47,7 @@ class LogarithmicFriction(fc.FrictionLaw):
         return 1.0 / float(np.max(self.smoothing_slope))
 
 
-def main() -> None:
+def main(end: float = 1.0) -> None:
     """Steady sliding with the law above, and with the falling law of the package."""
     body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)), thickness=0.01)
     basis = body.modal_basis(12, contact_nodes=20, damping=0.01)
@@ -54,7 +55,7 @@ def main() -> None:
         system = fc.ContactSystem(
             basis, friction=friction, ground=fc.Ground(speed=0.01), load=fc.Load(normal=14.0),
             drive=fc.Drive(stiffness_x=5610.0, damping_x=5.0))
-        run = fc.simulate(system, 1.0, outputs=2001)
+        run = fc.simulate(system, end, outputs=2001)
         late = slice(3 * len(run.time) // 4, None)
         stick = (run.contact_state[late] == fc.ContactState.STICK).mean()
         swing = np.ptp(run.displacement("B")[late, 0])
@@ -63,4 +64,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(0.2 if "--quick" in sys.argv else 1.0)

@@ -6,7 +6,7 @@ couples them, and from some friction coefficient on they merge into one mode tha
 equilibrium is followed over the friction coefficient, the Hopf point is located, and then the
 border of flutter is followed over friction coefficient and load.
 
-Usage: python examples/squeal.py [FOLDER]
+Usage: python examples/squeal.py [FOLDER] [--quick]
 """
 
 import sys
@@ -30,8 +30,10 @@ def system(friction: float = 0.0, load: float = 14.0) -> fc.ContactSystem:
         drive=fc.Drive(stiffness_x=5610.0, damping_x=0.768))
 
 
-def main(folder: Path) -> tuple[fc.Branch, fc.Branch]:
+def main(folder: Path = Path(), quick: bool = False) -> tuple[fc.Branch, fc.Branch]:
     """Pictures in the folder; gives the branch over friction and the border of flutter."""
+    folder.mkdir(parents=True, exist_ok=True)
+    columns, rows = (7, 5) if quick else (31, 29)
     field = fc.contact_field(system(), [FRICTION, "load.normal"])
     branch = fc.equilibrium_branch(field, FRICTION, bounds=(0.0, 0.6))
     fc.plot_eigenvalues(branch, folder / "squeal_modes.png", x_label="friction coefficient",
@@ -49,12 +51,13 @@ def main(folder: Path) -> tuple[fc.Branch, fc.Branch]:
     loads, frictions = border.column("load.normal"), border.column(FRICTION)
     print(f"border: {len(border)} points, friction coefficient from {frictions.min():.3f} to "
           f"{frictions.max():.3f}, load from {loads.min():.1f} to {loads.max():.1f} N")
-    found = fc.stability_map(field, {FRICTION: np.linspace(0.0, 0.6, 31),
-                                     "load.normal": np.linspace(2.0, 30.0, 29)})
+    found = fc.stability_map(field, {FRICTION: np.linspace(0.0, 0.6, columns),
+                                     "load.normal": np.linspace(2.0, 30.0, rows)})
     fc.plot_stability_map(found, folder / "squeal_map.png", borders=[border],
                           x_label="friction coefficient", y_label="load [N]")
     return branch, border
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
+         quick="--quick" in sys.argv)

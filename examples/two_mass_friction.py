@@ -5,7 +5,7 @@ sliding loses its stability at Hopf points, the vibrations that begin there turn
 double their period again and again. Unstable orbits are part of the picture: the one between the
 fold T1 and the Hopf point H1 parts the starts that come to rest from those that go on vibrating.
 
-Usage: python examples/two_mass_friction.py [FOLDER]      (pictures and the table; two minutes)
+Usage: python examples/two_mass_friction.py [FOLDER] [--quick]   (pictures, a table; two minutes)
 
 Time is scaled by sqrt(m2 / c2), B = F_N / c2 and D = d2 / (2 sqrt(c2 m2)). The equations are those
 of the book with the constants that reproduce its figures: masses 2.5 and 1, stiffnesses 2 and 1,
@@ -222,7 +222,21 @@ def shares(found: Basins) -> str:
                      for one in found.attractors)
 
 
-def main(folder: Path) -> None:
+def quick_diagram(folder: Path) -> None:
+    """The first branch over B, and its special points."""
+    folder.mkdir(parents=True, exist_ok=True)
+    field, bounds = oscillator(B=0.3), (0.3, 10.0)
+    sliding = equilibrium_branch(field, "B", bounds=bounds)
+    orbits = orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], bounds=bounds,
+                              settings=Settings(step=0.01, largest_step=0.1), scales=SMALL)
+    plot_branches([sliding, orbits], folder / "two_masses_over_B.png",
+                  amplitude(field.displacement_row(1)), x_label="B [m]",
+                  y_label="amplitude of x3 [m]", names=["steady sliding", "orbits"])
+    for point in (*sliding.special, *orbits.special):
+        print(f"{point.kind} at B = {point.parameter:.4f}")
+
+
+def main(folder: Path = Path()) -> None:
     """Compute, draw and print everything."""
     folder.mkdir(parents=True, exist_ok=True)
     x3 = amplitude(oscillator().displacement_row(1))
@@ -246,4 +260,5 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    chosen = quick_diagram if "--quick" in sys.argv else main
+    chosen(Path(next((given for given in sys.argv[1:] if given != "--quick"), ".")))

@@ -15,6 +15,8 @@ from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.normal_stop import LinearContact
 from fecontact.laws.signals import Harmonic
+from fecontact.output.analysis_figures import response_figure
+from fecontact.output.redraw import Choice, redraw
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -77,6 +79,30 @@ def test_falling_friction_takes_damping_away():
     mu = 0.4 + 0.2 * np.exp(-100.0 * speed)
     normal = (1e6 + 200j * W) / (1e6 + 200j * W - MASS * W**2)
     assert found.values[:, 0, 1] == pytest.approx(-mu * normal * expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("damping", [40.0, 30.0])
+def test_response_tells_that_steady_sliding_is_unstable(damping, tmp_path):
+    """Where falling friction takes more than the dashpot gives: m x'' + d x' + c x = 0, d < 0."""
+    speed, load = 0.01, 50.0
+    slope = -0.2 * 100.0 * np.exp(-100.0 * speed) * load
+    system = mass(normal=LinearContact(1e6, 2000.0), load=Load(load), ground=Ground(speed=speed),
+                  friction=ExponentialFriction(0.6, 0.4, 100.0, 1e9),
+                  drive=Drive(stiffness_x=1500.0, damping_x=damping - slope - 35.0))
+    found = frequency_response(system, F, [("B", "x")], linearised_at="sliding")
+    left = damping - 35.0
+    assert found.stable == (left > 0.0)
+    assert frequency_response(system, F, [("B", "x")]).stable
+    if not found.stable:
+        expected = np.roots([MASS, left, 1500.0])
+        assert found.growing == pytest.approx(expected[expected.imag > 0.0], rel=1e-3)
+        assert found.growth_in_words == "vibrations at 4.35 Hz grow by 1.25 1/s"
+    run = simulate(system, 0.1, initial="sliding")
+    redraw(run, "receptance", tmp_path / "receptance.svg", Choice(axis="x"))
+    text = (tmp_path / "receptance.svg").read_text()
+    assert ("UNSTABLE" in text) == (left < 0.0)
+    figure = response_figure([frequency_response(system, F, [("B", "x")]), found], ["a", "b"])
+    assert [line.is_dashed() for line in figure.axes[0].lines] == [False, left < 0.0]
 
 
 def test_run_in_time_moves_as_the_response_says():

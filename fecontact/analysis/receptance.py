@@ -1,7 +1,7 @@
 """Frequency responses: receptance, mobility and accelerance of a body, free or in contact."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -37,6 +37,10 @@ class FrequencyResponse:
         Directions x, y, and phi: a rotation as response, a moment as excitation.
     kind : 'receptance', 'mobility' or 'accelerance'
         Displacement, velocity or acceleration per force.
+    growing : (k,) complex array
+        Eigenvalues of the system, linearised where it was, with positive real parts [1/s], those
+        with positive or no imaginary part, the largest real part first. If there are any, free
+        vibrations grow over the response to the force, which is then not to be seen.
     """
 
     frequency_hz: Array
@@ -44,6 +48,22 @@ class FrequencyResponse:
     responses: tuple[Place, ...]
     excitations: tuple[Place, ...]
     kind: Kind
+    growing: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, dtype=complex))
+
+    @property
+    def stable(self) -> bool:
+        """Whether free vibrations die away, or at least do not grow."""
+        return len(self.growing) == 0
+
+    @property
+    def growth_in_words(self) -> str:
+        """The vibration that grows fastest, for people; empty if none does."""
+        if self.stable:
+            return ""
+        fastest = self.growing[0]
+        at = f" at {fastest.imag / (2.0 * np.pi):.3g} Hz" if fastest.imag > 0.0 else ""
+        return f"vibrations{at} grow by {fastest.real:.3g} 1/s" if at else (
+            f"deviations grow by {fastest.real:.3g} 1/s")
 
     def unit(self, response: int = 0, excitation: int = 0) -> str:
         """Unit of one of the responses, like m/N."""
@@ -80,7 +100,8 @@ def frequency_response(
     with the springs c and dashpots b of the drive, whose far ends rest, and p = 0, 1, 2 for
     receptance, mobility, accelerance. Linearised at a state, the contact's stiffness and damping
     come in by the Jacobian there; a node that sticks is held by its friction's slope
-    dR/dv, as by a dashpot.
+    dR/dv, as by a dashpot. An unstable state, of which the result says so, never answers a force
+    in this way: what grows from it ends somewhere else.
 
     Parameters
     ----------
@@ -127,15 +148,27 @@ def frequency_response(
         out = np.zeros((len(outputs), len(matrix)))
         out[:, :m] = seen
         terms: tuple[Array, Array, Array | None] = (-matrix, np.eye(len(matrix)), None)
+        growing = _growing(matrix)
     else:
         if isinstance(body, ContactSystem):
             stiffness, damping = body.arrays.stiffness, body.arrays.damping
         else:
             stiffness, damping = np.diag(basis.angular_frequencies**2), basis.damping
         into, out, terms = pushed.T, seen, (stiffness, damping, np.eye(m))
+        growing = _growing(np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -damping]]))
     values = _response(2.0 * np.pi * f, terms, into, out)
     values *= ((2j * np.pi * f) ** _POWERS[kind])[:, None, None]
-    return FrequencyResponse(f, values, outputs, inputs, kind)
+    return FrequencyResponse(f, values, outputs, inputs, kind, growing)
+
+
+def _growing(matrix: Array) -> NDArray[np.complex128]:
+    """Eigenvalues of the state matrix with positive real parts; those of a pair once."""
+    found = np.linalg.eigvals(matrix).astype(complex)
+    size = np.abs(found)
+    # Less is round-off, of undamped modes and of rigid ones.
+    zero = 1e-10 * size + 1e-13 * size.max()
+    found = found[(found.real > zero) & (found.imag >= 0.0)]
+    return np.asarray(found[np.argsort(-found.real)])
 
 
 def _response(

@@ -142,7 +142,11 @@ def simulate(
                                      static_coefficient=static_coefficient,
                                      scheme=scheme or "auto", progress=progress)
         times, states, work = found.time, found.states, found.work
-        status, statistics = found.status, found.statistics
+        status = found.status
+        # With what the run was told, it can be repeated.
+        statistics = found.statistics | {
+            "restitution": restitution, "static_coefficient": None if static_coefficient is None
+            else np.asarray(static_coefficient, dtype=float).tolist()}
         rest = {"node_friction_work": found.node_friction_work,
                 "held_normal_force": found.normal_force,
                 "held_friction_force": found.friction_force}

@@ -9,10 +9,18 @@ from numpy.typing import NDArray
 from fecontact.analysis.periods import strobed_states
 from fecontact.analysis.quantities import Point, history, point_name
 from fecontact.analysis.receptance import FrequencyResponse
+from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.figures import COLOURS, new_figure
+from fecontact.output.figures import (
+    COLOURS,
+    DASHES,
+    add_note,
+    distinct_colours,
+    new_figure,
+    thinned,
+)
 from fecontact.output.units import suitable_unit
 from fecontact.report import count
 
@@ -83,7 +91,11 @@ def spectrogram_figure(
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
     time_unit, time_symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
     unit, symbol = suitable_unit(float(np.abs(shown.values).max()), shown.unit)
-    upper.plot(trajectory.time / time_unit, shown.values / unit, color=COLOURS[0], linewidth=0.8)
+    drawn = resolved(trajectory)
+    add_note(figure, drawn)
+    line = history(drawn.trajectory, quantity, point, axis).values
+    upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
+               linewidth=0.8)
     upper.set_ylabel(f"[{symbol}]")
     upper.set_title(shown.title)
     factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
@@ -115,10 +127,13 @@ def poincare_figure(
     row = _AXES.index(axis)
     found = strobed_states(trajectory, period=period, phase=phase, start=float(trajectory.time[0]))
     basis = trajectory.system.basis
-    x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
+    drawn = resolved(trajectory)
+    x, v = (values(point)[:, row] for values in (
+        drawn.trajectory.displacement, drawn.trajectory.velocity))
     rows = trajectory._rows(point)[row]
     m = basis.modes
     figure = new_figure(6.4, 5.2)
+    add_note(figure, drawn)
     plane = figure.subplots()
     unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
     factor, rate_symbol = suitable_unit(float(np.abs(v).max()), "m/s")
@@ -138,6 +153,8 @@ def friction_work_figure(trajectory: Trajectory) -> "Figure":
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
     constant coefficient is the friction work over that coefficient.
     """
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
     basis = trajectory.system.basis
     x, length = basis.contact_x, basis.tributary
     work = trajectory.friction_work[-1] / length
@@ -145,6 +162,7 @@ def friction_work_figure(trajectory: Trajectory) -> "Figure":
     speed = np.abs(trajectory.slip_velocity) * touching
     slip = np.trapezoid(speed, trajectory.time, axis=0)
     figure = new_figure(9.0, 5.6)
+    add_note(figure, drawn)
     upper, lower = figure.subplots(2, 1, sharex=True)
     unit, symbol = suitable_unit(float(np.abs(x).max() or length.max()), "m")
     for panel, values, name, base in ((upper, work, "friction work per length", "N"),
@@ -162,7 +180,11 @@ def friction_work_figure(trajectory: Trajectory) -> "Figure":
 def response_figure(
     responses: Sequence[FrequencyResponse], labels: Sequence[str] = ()
 ) -> "Figure":
-    """Magnitude and phase of frequency responses over frequency."""
+    """Magnitude and phase of frequency responses over frequency; those of unstable states dashed.
+
+    What is linearised about an unstable state is not what a measurement would show: the legend
+    says so.
+    """
     if not any(response.values.any() for response in responses):
         raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
                          f"{_place(responses[0].excitations[0])}; choose another point or "
@@ -171,21 +193,27 @@ def response_figure(
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
     number = 0
     many = len(responses) > 1 or responses[0].values[0].size > 1
+    colours = distinct_colours(sum(response.values[0].size for response in responses))
     for index, response in enumerate(responses):
         for r, seen in enumerate(response.responses):
             for e, pushed in enumerate(response.excitations):
-                colour = COLOURS[number % len(COLOURS)]
+                colour = colours[number]
                 number += 1
                 name = f"{_place(seen)} by {_place(pushed)}"
                 if index < len(labels):
                     name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
                         labels[index])
+                style = "-" if response.stable else DASHES
+                if not response.stable:
+                    name += f"\nUNSTABLE, not to be measured:\n{response.growth_in_words}"
                 f = response.frequency_hz
-                upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name)
-                lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0)
+                upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name,
+                               linestyle=style)
+                lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0,
+                           linestyle=style)
     first = responses[0]
     upper.set_ylabel(f"{first.kind} [{first.unit()}]")
-    if many:
+    if many or not first.stable:
         upper.legend(loc="best")
     else:
         upper.set_title(f"{_place(first.responses[0])} by a force at "

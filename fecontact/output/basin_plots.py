@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.output.figures import COLOURS, new_figure
+from fecontact.output.figures import distinct_colours, new_figure
 from fecontact.output.saving import save_figure
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def basins_figure(
     figure = new_figure(8.0, 5.2)
     axis = figure.subplots()
     count = len(found.attractors)
-    colours = [_UNSETTLED, *(COLOURS[k % len(COLOURS)] for k in range(count))]
+    colours = [_UNSETTLED, *distinct_colours(count)]
     axis.pcolormesh(found.first, found.second, found.label.T, shading="nearest", alpha=0.75,
                     cmap=ListedColormap(colours), rasterized=True,
                     norm=BoundaryNorm(np.arange(-1.5, count + 0.5), count + 1))

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _INK = "#303030"
-_DOTS = {"up": "#b4b0a8", "down": "#e69f00"}
+# Colours of runs, which no branch has.
+DOTS = {"up": "#b4b0a8", "down": "#e69f00"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +134,8 @@ def draw_beneath(
         if not values.size:
             continue
         places = np.repeat(runs.values, values.shape[1])
-        axis.plot(places, values.reshape(-1), "o", color=_DOTS[name], markersize=size,
+        axis.plot(places, values.reshape(-1), "o", color=DOTS[name], markersize=size,
                   markeredgewidth=0.0, linestyle="none", zorder=1, rasterized=True)
-        handles.append(Line2D([], [], color=_DOTS[name], marker="o", linestyle="none",
+        handles.append(Line2D([], [], color=DOTS[name], marker="o", linestyle="none",
                               markersize=4.0, label=f"runs, {name}"))
     return handles

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, choices
-from fecontact.output.diagram_extras import draw_beneath, draw_insets, main_axis
-from fecontact.output.figures import COLOURS, new_figure
+from fecontact.output.diagram_extras import DOTS, draw_beneath, draw_insets, main_axis
+from fecontact.output.figures import DASHES, distinct_colours, new_figure
 from fecontact.output.saving import save_figure
 from fecontact.parameter_units import parameter_label
 
@@ -32,7 +32,6 @@ _SPECIAL = {
     "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
     "double Hopf": ("HH", ">"), "unresolved": ("?", "x"),
 }
-_DASHES = (0, (4, 2.5))
 
 
 def plot_branches(
@@ -57,7 +56,8 @@ def plot_branches(
     x_label, y_label : str, optional
         Labels of the axes, with units.
     names : sequence of str
-        Names of the branches for the legend, in which each name stands once.
+        Names of the branches for the legend, in which each name stands once; several branches
+        without names are numbered there.
     beneath : BruteForce, optional
         Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
         should be 'observed_section'.
@@ -94,9 +94,13 @@ def branches_figure(
     dots = draw_beneath(axis, beneath, observe)
     known: dict[str, list[tuple[float, float]]] = {}
     dashed = False
+    if len(branches) > 1:
+        names = [*names, *(f"branch {k + 1}" for k in range(len(names), len(branches)))]
     groups = [*names[: len(branches)], *range(len(names), len(branches))]
-    colours = {group: COLOURS[number % len(COLOURS)]
-               for number, group in enumerate(dict.fromkeys(groups))}
+    # One more, as one of them is that of runs.
+    apart = [colour for colour in distinct_colours(len(set(groups)) + 1)
+             if colour not in DOTS.values()]
+    colours = dict(zip(dict.fromkeys(groups), apart, strict=False))
     for group, branch in zip(groups, branches, strict=True):
         places, curves = _values(branch, x), _values(branch, y, rows=True)
         stable = _stable_pieces(branch)
@@ -106,7 +110,7 @@ def branches_figure(
         for first, last in _runs(stable):
             axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
                       linewidth=1.8 if stable[first] else 1.2,
-                      linestyle="-" if stable[first] else _DASHES)
+                      linestyle="-" if stable[first] else DASHES)
         for index, point in enumerate(branch.points):
             if point.kind is not None:
                 known.setdefault(point.kind, []).append((places[index], heights[index]))
@@ -203,7 +207,7 @@ def _legend(
                           for name, colour in colours.items()]
     if dashed:
         handles.append(Line2D([], [], color="#303030", linewidth=1.8, label="stable"))
-        handles.append(Line2D([], [], color="#303030", linewidth=1.2, linestyle=_DASHES,
+        handles.append(Line2D([], [], color="#303030", linewidth=1.2, linestyle=DASHES,
                               label="unstable"))
     for kind in known:
         letters, marker = _SPECIAL.get(kind, ("", "."))

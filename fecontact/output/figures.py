@@ -1,12 +1,14 @@
 """Figures of a run: histories, phase plane, contact map and energies."""
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.quantities import Point, point_name
+from fecontact.analysis.resolved import Resolved, resolved
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.contact_states import STATE_COLOURS, state_names
@@ -20,6 +22,9 @@ Array = NDArray[np.float64]
 
 # Colours that people with colour-blindness tell apart (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
+# Further ones, for the many branches of a diagram; no two of all are nearer to each other.
+_MORE_COLOURS = ("#882200", "#99dd88", "#7766ff", "#000044", "#0000ff")
+DASHES: Any = (0, (4, 2.5))
 # Of energies and powers, by the place where they are stored, come in or are lost.
 ENERGY_COLOURS = {
     "kinetic": "#0072b2", "elastic": "#56b4e9", "modal_damping": "#56b4e9",
@@ -53,10 +58,43 @@ def new_figure(width: float, height: float) -> "Figure":
     return figure
 
 
+def distinct_colours(count: int) -> list[str]:
+    """So many colours, no two alike; up to twelve are told apart by colour-blind people too."""
+    if count <= len(COLOURS) + len(_MORE_COLOURS):
+        return [*COLOURS, *_MORE_COLOURS][:count]
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    # Neighbours, which follow one another, are as far apart in lightness as they can be.
+    shades = [to_hex(colour) for colour in colormaps["cividis"](np.linspace(0.0, 0.95, count))]
+    half = (count + 1) // 2
+    mixed = [""] * count
+    mixed[::2], mixed[1::2] = shades[:half], shades[half:]
+    return mixed
+
+
+def add_note(figure: "Figure", drawn: Resolved) -> None:
+    """Say below a figure where its curves are coarser than the motion."""
+    if not drawn.note:
+        return
+    width, height = figure.get_size_inches()
+    lines = wrap(drawn.note, int(15.0 * width))
+    figure.text(0.995, 0.05 / height, "\n".join(lines), ha="right", va="bottom", fontsize=8.0,
+                color="#a03000")
+    below = (0.05 + 0.16 * len(lines)) / height
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0.0, below, 1.0, 1.0 - below))  # type: ignore[call-arg]
+
+
 def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Figure":
     """Displacements and velocities of points, and the sums of the contact forces, over time."""
     points = tuple(points) or _usual_points(trajectory)
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
+    colours = distinct_colours(len(points))
     figure = new_figure(10.0, 7.5)
+    add_note(figure, drawn)
     axes = figure.subplots(3, 2, sharex=True)
     time = _time(axes[2], trajectory)
     for column, (quantity, unit, values) in enumerate((
@@ -69,7 +107,7 @@ def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Fig
                                *(value[:, row] for value in values))
             for number, (point, value) in enumerate(zip(points, values, strict=True)):
                 axes[row, column].plot(*thinned(time, value[:, row] / factor),
-                                       color=COLOURS[number % len(COLOURS)],
+                                       color=colours[number],
                                        linewidth=1.2 if number else 2.0, label=point_name(point))
     for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
                                (axes[2, 1], "friction force", trajectory.friction_force)):
@@ -93,7 +131,10 @@ def phase_figure(trajectory: Trajectory, point: Point = "B", axis: str = "x") ->
     if axis not in _AXES:
         raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
     row = _AXES.index(axis)
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
     figure = new_figure(6.4, 5.2)
+    add_note(figure, drawn)
     plane = figure.subplots()
     x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
     unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
@@ -120,9 +161,13 @@ def contact_map_figure(trajectory: Trajectory) -> "Figure":
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
     figure = new_figure(10.0, 6.2)
+    add_note(figure, drawn)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    starts = np.unique(np.linspace(0, len(trajectory.time), _MAP_COLUMNS + 1).astype(int))[:-1]
+    columns = np.linspace(trajectory.time[0], trajectory.time[-1], _MAP_COLUMNS + 1)[:-1]
+    starts = np.unique(np.searchsorted(trajectory.time, columns))
     edges = _time_edges(trajectory.time, starts)
     time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
     places, nodes, place_label = _place_edges(trajectory)
@@ -135,7 +180,8 @@ def contact_map_figure(trajectory: Trajectory) -> "Figure":
 
     states = state_names(trajectory)
     state = np.minimum(trajectory.contact_state, len(states) - 1)
-    counts = np.stack([np.add.reduceat((state == k).astype(np.int32), starts, axis=0)
+    spans = _spans(trajectory.time)[:, None]
+    counts = np.stack([np.add.reduceat((state == k) * spans, starts, axis=0)
                        for k in range(len(states))])
     # A column of several times shows contact if there was any, as the pressure above it does.
     counts[0] *= counts[1:].sum(axis=0) == 0
@@ -157,8 +203,12 @@ def contact_map_figure(trajectory: Trajectory) -> "Figure":
 
 def energies_figure(trajectory: Trajectory) -> "Figure":
     """Stored energies, work put in and energy lost over time; terms that stay zero are left out."""
+    imbalance = trajectory.energies.imbalance
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
     energies = trajectory.energies
     figure = new_figure(10.0, 8.0)
+    add_note(figure, drawn)
     axes = figure.subplots(3, 1, sharex=True)
     time = _time(axes[2:], trajectory)
     panels = (
@@ -180,7 +230,7 @@ def energies_figure(trajectory: Trajectory) -> "Figure":
                   zorder=1.5)
         axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     figure.align_ylabels(axes)
-    axes[0].set_title(f"error of the energy balance: {energies.imbalance:.1e} of the largest term")
+    axes[0].set_title(f"error of the energy balance: {imbalance:.1e} of the largest term")
     return figure
 
 
@@ -206,21 +256,43 @@ def _labelled(axis: "Axes", name: str, unit: str, *values: Array) -> float:
     largest = max((float(np.abs(value).max()) for value in values), default=0.0)
     factor, symbol = suitable_unit(largest, unit)
     axis.set_ylabel(f"{name} [{symbol}]")
+    low = min((float(value.min()) for value in values), default=0.0)
+    high = max((float(value.max()) for value in values), default=0.0)
+    if 0.0 <= high - low < 1e-9 * largest:
+        # Round-off about a constant would fill the axis.
+        axis.set_ylim((low - 0.05 * largest) / factor, (high + 0.05 * largest) / factor)
     return factor
 
 
 def thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """A long line by the lowest and the highest of every few points, so that no peak is lost."""
-    few = len(x) // _LINE_BINS
-    if few < 4:
+    """A long line by what it is where it enters and leaves each of many narrow columns, and by its
+    lowest and highest points there, so that no peak is lost.
+    """
+    if len(x) < 4 * _LINE_BINS:
         return x, y
-    whole = len(x) - len(x) % few
-    blocks = y[:whole].reshape(-1, few)
-    first = np.arange(len(blocks)) * few
-    chosen = np.unique(np.concatenate([
-        first + blocks.argmin(axis=1), first + blocks.argmax(axis=1), np.arange(whole, len(x)),
-        [0, len(x) - 1]]))
+    columns = np.linspace(x[0], x[-1], _LINE_BINS + 1)[:-1]
+    starts = np.unique(np.searchsorted(x, columns))
+    low, high = (_places(extreme.reduceat(y, starts), y, starts)
+                 for extreme in (np.minimum, np.maximum))
+    ends = np.append(starts[1:], len(x)) - 1
+    chosen = np.unique(np.concatenate([starts, low, high, ends]))
     return x[chosen], y[chosen]
+
+
+def _places(extremes: Array, y: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Where in each column of points its extreme is."""
+    counts = np.diff(np.append(starts, len(y)))
+    met = np.flatnonzero(y == np.repeat(extremes, counts))
+    columns = np.searchsorted(starts, met, side="right")
+    return np.asarray(met[np.unique(columns, return_index=True)[1]])
+
+
+def _spans(time: Array) -> Array:
+    """Time (N,) for which each of the times stands."""
+    if len(time) == 1:
+        return np.ones(1)
+    edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
+    return np.asarray(np.diff(edges))
 
 
 def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.analysis.resolved import resolved
+from fecontact.analysis.window import window
 from fecontact.output.contact_states import STATE_COLOURS
 from fecontact.output.figures import thinned
 from fecontact.output.motion import Motion
@@ -55,7 +57,10 @@ class ForceChart:
         left, below = 7.0 * self.font / self.width, 3.4 * self.font / self.height
         axes: Any = figure.add_axes((left, below, 0.97 - left, 0.97 - below))
         motion, trajectory = self.motion, self.motion.trajectory
-        part = slice(motion.indices[0], motion.indices[-1] + 1)
+        first, last = float(motion.times[0]), float(motion.times[-1])
+        if last > first:
+            trajectory = resolved(window(trajectory, first, last)).trajectory
+        part = (first <= trajectory.time) & (trajectory.time <= last)
         time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
         forces = {"normal force": (trajectory.normal_force, _DARK),
                   "friction force": (trajectory.friction_force, STATE_COLOURS["slip"])}

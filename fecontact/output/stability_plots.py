@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.output.figures import COLOURS, new_figure
+from fecontact.output.figures import DASHES, distinct_colours, new_figure
 from fecontact.output.saving import save_figure
 from fecontact.parameter_units import parameter_label
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.branch import Branch
     from fecontact.bifurcation.stability_map import StabilityMap
 
-_DASHES = (0, (4, 2.5))
 
 
 def plot_eigenvalues(branch: "Branch", path: str | Path, *, x_label: str | None = None,
@@ -79,20 +78,19 @@ def eigenvalues_figure(
     values, followed = branch.parameter, _followed(branch.column("eigenvalues"))
     figure = new_figure(8.0, 6.4)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    shown = 0
+    modes = []
     for mode in followed.T:
         hertz = mode.imag / (2.0 * np.pi)
         inside = (hertz >= range_hz[0]) & (hertz <= range_hz[1])
-        if (hertz < 0.0).any() or not hertz.any() or not inside.any():
-            continue
-        colour = COLOURS[shown % len(COLOURS)]
-        shown += 1
-        upper.plot(values, hertz, color=colour)
+        if (hertz >= 0.0).all() and hertz.any() and inside.any():
+            modes.append(mode)
+    for mode, colour in zip(modes, distinct_colours(len(modes)), strict=True):
+        upper.plot(values, mode.imag / (2.0 * np.pi), color=colour)
         lower.plot(values, mode.real, color=colour)
     lower.axhline(0.0, color="#303030", linewidth=0.8)
     for point in branch.of_kind("Hopf"):
         for axis in (upper, lower):
-            axis.axvline(point.parameter, color="#6a6a6a", linestyle=_DASHES, linewidth=0.9)
+            axis.axvline(point.parameter, color="#6a6a6a", linestyle=DASHES, linewidth=0.9)
         upper.annotate(f"{point.details['frequency_hz']:.4g} Hz",
                        (point.parameter, point.details["frequency_hz"]), xytext=(6, 6),
                        textcoords="offset points", fontsize=9.0)

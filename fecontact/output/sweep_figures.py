@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
-from fecontact.output.figures import COLOURS, new_figure
+from fecontact.output.figures import COLOURS, distinct_colours, new_figure
 from fecontact.output.units import suitable_unit
 from fecontact.parameter_units import parameter_label
 from fecontact.sweeps.statistics import SobolIndices
@@ -54,13 +54,13 @@ def diagram_figure(
         groups = {}
         for k, value in enumerate(table.parameters[by]):
             groups.setdefault(value, []).append(k)
-    for number, (value, cases) in enumerate(groups.items()):
+    for (value, cases), colour in zip(groups.items(), distinct_colours(len(groups)), strict=True):
         order = sorted(cases, key=lambda k: x[k])
         places, values = x[order], table.values[name][order] / factor
         if not np.isfinite(values).any():
             continue
         axes.plot(places, values, "-" if len(places) <= 200 else "",
-                  color=COLOURS[number % len(COLOURS)], linewidth=0.9,
+                  color=colour, linewidth=0.9,
                   marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
                   label=None if by is None else f"{_shown(value)}")
     _mark_failed(axes, table, x)

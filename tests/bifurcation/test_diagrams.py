@@ -69,6 +69,48 @@ def test_branches_of_one_name_share_colour_and_entry():
         "a", "b", "stable"]
 
 
+# How colours are seen by those without red and green cones: matrices for linear RGB of G. M.
+# Machado, M. M. Oliveira and L. A. F. Fernandes (2009), doi 10.1109/TVCG.2009.113.
+SEEN = [np.eye(3),
+        np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                  [-0.003882, -0.048116, 1.051998]]),
+        np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                  [-0.011820, 0.042940, 0.968881]])]
+XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
+                [0.0193339, 0.1191920, 0.9503041]]) / [[0.95047], [1.0], [1.08883]]
+
+
+def differences(colours):
+    """CIE 1976 differences of all pairs as the colour-blind see them, the least of all."""
+    rgb = np.array([[int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)] for colour in colours])
+    rgb = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    least = np.inf
+    for matrix in SEEN:
+        f = np.cbrt(np.clip(rgb @ matrix.T, 0.0, 1.0) @ XYZ.T)
+        lab = np.column_stack([116.0 * f[:, 1], 500.0 * (f[:, 0] - f[:, 1]),
+                               200.0 * (f[:, 1] - f[:, 2])])
+        apart = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+        least = min(least, apart[np.triu_indices(len(lab), 1)].min())
+    return least
+
+
+@pytest.mark.parametrize("count", [2, 8, 11, 30])
+def test_no_two_branches_have_the_same_colour(count):
+    several = [Branch("p", (point(0.0, k, True), point(1.0, k + 0.5, True),
+                            point(2.0, k + 0.7, False))) for k in range(count)]
+    axis = branches_figure(several, 0).axes[0]
+    colours = [line.get_color() for line in axis.lines]
+    # The stable and the unstable part of a branch are of one colour and two styles.
+    assert colours[::2] == colours[1::2]
+    assert [line.is_dashed() for line in axis.lines] == [False, True] * count
+    assert len(set(colours)) == count
+    assert differences(colours[::2]) > (14.0 if count < 12 else 0.0)
+    entries = [text.get_text() for text in axis.get_legend().get_texts()]
+    assert entries[:count] == [f"branch {k + 1}" for k in range(count)]
+    shown = axis.get_legend().get_lines()[:count]
+    assert [line.get_color() for line in shown] == colours[::2]
+
+
 def test_letters_are_left_out_where_there_is_no_room():
     crowd = tuple(point(1.0 + 1e-4 * k, 2.0 + 1e-4 * k, True, "fold") for k in range(9))
     far = (point(0.0, 0.0, True), *crowd, point(3.0, 3.0, True, "fold"))

@@ -1,0 +1,294 @@
+"""A run with the motion between its outputs, so that pictures of it are curves and show all peaks.
+
+The outputs of a run are chosen for what is done with them, not for drawing: an impact may begin
+and end between two, and seven a period make a circle a heptagon. The state at an output is all
+that the motion after it depends on. Where outputs are too far apart it is computed again from
+there, with more of them, and again where these are too far apart for a short impact.
+"""
+
+import math
+import warnings
+from dataclasses import replace
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.errors import FecontactError
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.trajectory import Status, Trajectory
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# Largest distance of a curve from its straight pieces, of the range of what is drawn.
+_ERROR = 1.0 / 400.0
+# Ranges of displacements and velocities below these parts of the largest are noise, and so are
+# changes of forces below this part of the largest.
+_SMALL, _SMALL_RATE, _SMALL_FORCE = 1e-5, 1e-4, 1e-6
+# Distance of a repeated motion from the outputs, of the range: beyond, it is another motion.
+_SAME = 0.01
+_LEVELS = 4
+_FEWEST, _MORE, _MOST = 8, 16, 64  # parts of an interval
+_WINDOW, _GAP = 256, 16  # intervals that are run at once; those passed on the way to the next
+_NUMBERS = 20_000_000  # kept of a run
+_STEPS = 1_000_000  # computed again
+_FAILURES = 8  # one after the other, before the run is taken as one that cannot be repeated
+_TOLD = 2e-3  # part of the time
+_NODES = 8  # contact nodes whose motion is looked at, beside the named points
+
+_COUNTED = ("work", "node_friction_work")  # from the first time of a run
+_STATE = ("modal_coordinates", "modal_velocities", "memory", "held_normal_force",
+          "held_friction_force")
+
+
+class Resolved(NamedTuple):
+    """What :func:`resolved` gives.
+
+    trajectory : the run with further times between its outputs, or the run itself
+    coarse : part of the time in which straight pieces between its times may cut peaks
+    reason : why, for people
+    """
+
+    trajectory: Trajectory
+    coarse: float
+    reason: str
+
+    @property
+    def note(self) -> str:
+        """For pictures; empty if nothing is wrong."""
+        if self.coarse <= _TOLD:
+            return ""
+        return (f"straight lines between outputs in {max(self.coarse, 0.01):.0%} of the time, "
+                f"which may cut peaks: {self.reason}")
+
+
+_KNOWN: "WeakKeyDictionary[Trajectory, Resolved]" = WeakKeyDictionary()
+
+
+def resolved(trajectory: Trajectory) -> Resolved:
+    """The run with further times wherever its outputs are too far apart to be joined by lines.
+
+    Straight pieces between the times are no further than 1/400 of its range from displacements
+    and velocities of the named points, and from normal and friction forces; so much may peaks be
+    cut. Outputs stay as they are. The motion between them is that of ``simulate`` with the
+    tolerance of the run. It stays coarse beyond a million steps, and where it does not lead from
+    output to output, as in histories that were not computed by ``simulate``.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        A run, or a part of one.
+    """
+    if trajectory not in _KNOWN:
+        found = _resolved(trajectory)
+        if found.trajectory is trajectory:
+            # What is remembered must not keep alive what it is remembered by.
+            return found
+        _KNOWN[trajectory] = found
+    return _KNOWN[trajectory]
+
+
+def _resolved(run: Trajectory) -> Resolved:
+    if len(run.time) < 2 or not np.isfinite(run.states).all():
+        return Resolved(run, 0.0, "")
+    total = float(run.time[-1] - run.time[0])
+    flags, reason = _coarse(run), "they are jumps"
+    lost, left = 0.0, _STEPS
+    average = math.ceil(float(run.statistics.get("steps", 0)) / (len(run.time) - 1))
+    for level in range(_LEVELS):
+        if not flags.any():
+            break
+        parts = min(max(average, _FEWEST), _MOST) if level == 0 else _MORE
+        parts = min(parts, _room(run) // int(flags.sum()))
+        why = "this history was not computed by a run"
+        if "method" in run.statistics:
+            why = "between them the run took too many steps" if average > left else ""
+        if parts < 2:
+            why = "it moves too fast for its duration to be kept"
+        if why:
+            reason = why
+            break
+        time = run.time
+        run, refined, steps, why = _repeated(run, flags, parts, left)
+        left -= steps
+        lost += float(np.diff(time)[flags & ~refined].sum())
+        reason = why or reason
+        # What was fine, and what cannot be repeated, is not looked at again.
+        between = np.searchsorted(time, run.time[:-1], side="right") - 1
+        flags = _coarse(run) & refined[between]
+    lost += float(np.diff(run.time)[flags].sum())
+    return Resolved(run, min(1.0, lost / total), reason)
+
+
+def _room(run: Trajectory) -> int:
+    """How many times more may be kept."""
+    size = run.states.shape[1] + 8 * (run.system.basis.contact_nodes + 1)
+    return max(0, _NUMBERS // size - len(run.time))
+
+
+def _coarse(run: Trajectory) -> Flags:
+    """Which intervals (N - 1,) between the times are too long to be drawn as straight lines."""
+    moved, rates = _motion(run)
+    sizes, rate_sizes = _ranges(moved, rates)
+    normal, friction = run.normal_force, run.friction_force
+    forces = np.column_stack([normal.sum(axis=1), friction.sum(axis=1)])
+    large = np.abs(forces).max(axis=0)
+    spread = np.maximum(np.ptp(forces, axis=0), _SMALL_FORCE * large)
+    each = max(float(np.ptp(normal, axis=0).max()), _SMALL_FORCE * float(large[0]))
+    flags = np.zeros(len(run.time) - 1, dtype=bool)
+    for values, scale in ((moved, sizes), (rates, rate_sizes), (forces, spread),
+                          (normal, np.full(normal.shape[1], each))):
+        flags |= _bent(run.time, values[:, scale > 0.0] / scale[scale > 0.0])
+    # Outputs once a period look like rest, but for their velocities.
+    h = np.diff(run.time)[:, None]
+    used = sizes > 0.0
+    gone = np.diff(moved, axis=0) - 0.5 * h * (rates[1:] + rates[:-1])
+    flags |= (np.abs(gone[:, used]) > _ERROR * sizes[used]).any(axis=1)
+    return np.asarray(flags)
+
+
+def _bent(time: Array, values: Array) -> Flags:
+    """Intervals in which values (N, k), in units of their ranges, leave their chord too far."""
+    flags = np.zeros(len(time) - 1, dtype=bool)
+    if len(time) > 2 and values.shape[1]:
+        h = np.diff(time)
+        part = (h[:-1] / (h[:-1] + h[1:]))[:, None]
+        middle = (1.0 - part) * values[:-2] + part * values[2:]
+        # A parabola leaves the chord of one of two equal intervals by a fourth of what it leaves
+        # that of both.
+        off = 0.25 * np.abs(values[1:-1] - middle).max(axis=1)
+        flags[:-1] |= off * np.minimum(h[:-1] / h[1:], 1.0) > _ERROR
+        flags[1:] |= off * np.minimum(h[1:] / h[:-1], 1.0) > _ERROR
+    return flags
+
+
+def _motion(run: Trajectory) -> tuple[Array, Array]:
+    """Displacements and velocities (N, k) of the named points and of some contact nodes."""
+    basis = run.system.basis
+    n = basis.contact_nodes
+    nodes = 2 + np.unique(np.linspace(0, n - 1, min(n, _NODES)).astype(int))
+    points = np.concatenate([[0, 1], nodes, np.arange(2 + n, len(basis.T))])
+    rows = basis.T[points, :2].reshape(-1, basis.modes)
+    return run.modal_coordinates @ rows.T, run.modal_velocities @ rows.T
+
+
+def _ranges(moved: Array, rates: Array) -> tuple[Array, Array]:
+    """Ranges (k,) by which displacements and velocities count."""
+    ranges, speeds = np.ptp(moved, axis=0), np.ptp(rates, axis=0)
+    return (np.maximum(ranges, _SMALL * ranges.max(initial=0.0)),
+            np.maximum(speeds, _SMALL_RATE * speeds.max(initial=0.0)))
+
+
+def _repeated(
+    run: Trajectory, flags: Flags, parts: int, most: int
+) -> tuple[Trajectory, Flags, int, str]:
+    """Flagged intervals in so many parts each; the run with them, those that could be repeated,
+    the steps that it took, and why not all could.
+    """
+    refined = np.zeros_like(flags)
+    pieces: list[dict[str, Any]] = []
+    steps, length, failures, first, why = 0, 16, 0, 0, ""
+    t, sizes = run.time, _ranges(*_motion(run))
+    while True:
+        ahead = np.flatnonzero(flags[first:])
+        if not len(ahead):
+            break
+        if steps > most:
+            why = "between them the run took too many steps"
+            break
+        if failures >= _FAILURES:
+            break
+        first += int(ahead[0])
+        end = _end(flags, first, length)
+        times = np.concatenate([
+            *(np.linspace(t[k], t[k + 1], parts + 1)[:-1] if flags[k] else t[k : k + 1]
+              for k in range(first, end)), t[end : end + 1]])
+        again = _again(run, first, times)
+        good = 0
+        if again is not None:
+            good = _agreeing(run, again, first, end, sizes)
+            steps += int(again.statistics.get("steps", 0))
+        if again is None or good == 0:
+            why = "computed again, it does not lead from output to output"
+            failures, length, first = failures + 1, max(1, length // 4), first + 1
+            continue
+        pieces.append(_new_rows(run, again, first, first + good))
+        refined[first : first + good] = flags[first : first + good]
+        length = min(2 * length, _WINDOW) if first + good == end else max(1, length // 2)
+        failures, first = 0, first + good
+    return _joined(run, pieces) if pieces else run, refined, steps, why
+
+
+def _end(flags: Flags, first: int, length: int) -> int:
+    """End of the intervals that are run at once from a flagged one on."""
+    chosen = first + np.flatnonzero(flags[first : first + length])
+    gaps = np.flatnonzero(np.diff(chosen) > _GAP)
+    return int(chosen[gaps[0]] if len(gaps) else chosen[-1]) + 1
+
+
+def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
+    """The run once more from an output on, or None where it does not come to the end."""
+    rows = slice(first, first + 1)
+    start = replace(run, time=run.time[rows], work=run.work[rows], node_friction_work=None,
+                    events=None, **_cut(run, rows, _STATE))
+    used = run.statistics
+    options: dict[str, Any] = {"rtol": min(float(used.get("rtol", 1e-6)), 1e-2)}
+    if used["method"] == "set-valued":
+        options |= {name: used.get(name) for name in ("restitution", "static_coefficient")}
+        options |= {"method": "set-valued", "scheme": used.get("scheme")}
+    try:
+        with warnings.catch_warnings():
+            # Whatever there is to be said was said of the run itself.
+            warnings.simplefilter("ignore")
+            again = simulate(run.system, float(times[-1]), t_start=float(times[0]), initial=start,
+                             outputs=times, **options)
+    except FecontactError:
+        return None
+    if again.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    if len(again.time) != len(times) or not np.isfinite(again.states).all():
+        return None
+    return again
+
+
+def _agreeing(
+    run: Trajectory, again: Trajectory, first: int, end: int, sizes: tuple[Array, Array]
+) -> int:
+    """Number of intervals until a repeated run is no longer at an output where it should be."""
+    there = np.searchsorted(again.time, run.time[first : end + 1])
+    part = replace(run, **_cut(run, slice(first, end + 1), ("time", "work", *_STATE)))
+    off = np.zeros(end - first, dtype=bool)
+    found = _motion(again)
+    for values, others, outer, inner in zip(_motion(part), found, sizes, _ranges(*found),
+                                            strict=True):
+        # Outputs may show next to nothing of the motion.
+        scale = np.maximum(outer, inner)
+        off |= (np.abs(values[1:] - others[there[1:]]) > _SAME * scale).any(axis=1)
+    return int(np.argmax(off)) if off.any() else end - first
+
+
+def _cut(run: Trajectory, rows: slice, names: tuple[str, ...]) -> dict[str, Any]:
+    return {name: getattr(run, name)[rows] for name in names if getattr(run, name) is not None}
+
+
+def _new_rows(run: Trajectory, again: Trajectory, first: int, end: int) -> dict[str, Any]:
+    """Columns of a repeated run at the times between two outputs that are none themselves."""
+    kept = (again.time < run.time[end]) & ~np.isin(again.time, run.time[first:end])
+    rows = {"time": again.time[kept]}
+    for name in (*_STATE, *_COUNTED):
+        if getattr(run, name) is not None:
+            values = getattr(again, name)
+            offset = getattr(run, name)[first] if name in _COUNTED else 0.0
+            rows[name] = values[kept] + offset
+    return rows
+
+
+def _joined(run: Trajectory, pieces: list[dict[str, Any]]) -> Trajectory:
+    """The run with the rows of pieces between its own."""
+    time = np.concatenate([run.time, *(piece["time"] for piece in pieces)])
+    order = np.argsort(time, kind="stable")
+    columns = {name: np.concatenate([getattr(run, name), *(piece[name] for piece in pieces)])[order]
+               for name in pieces[0] if name != "time"}
+    return replace(run, time=time[order], **columns)

@@ -1,0 +1,249 @@
+"""The README and the pages of docs: their code runs, their tables are read, their commands parse."""
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecontact as fc
+from fecontact.cli import execute
+from fecontact.cli.app import COMMANDS, app
+from fecontact.output.probe import rendering_works
+from fecontact.study import Study
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = {"README.md": ROOT / "README.md", **{path.name: path for path in sorted(DOCS.glob("*.md"))}}
+TEXTS = {name: path.read_text() for name, path in PAGES.items()}
+BLOCK = re.compile(r"(?:<!-- not run: (?P<reason>[^>]+) -->\n)?```(?P<language>\w*)\n"
+                   r"(?P<text>.*?)```", re.DOTALL)
+# Long computations of a page in fewer cases, each given by a text that stands there once.
+SHORTER = {"sweeps.md": {"12e-3, 24)": "12e-3, 2)", "after=30.0": "after=0.5",
+                         "changes(17)": "changes(7)"}}
+BELT = """
+geometry = { shape = "block", element_size = 0.02 }
+body = { thickness = 0.1 }
+basis = { modes = 3, contact_nodes = 2 }
+ground = { speed = 2e-3 }
+load = { normal = 14.0 }
+drive = { stiffness_x = 5610.0, damping_x = 0.768, amplitude_x = 0.5e-3, angular_frequency = 13.8 }
+simulation = { t_end = 1.0, outputs = 101 }
+"""
+
+
+def blocks(page, language):
+    """Texts of the code of a page that is to be run or read."""
+    return [found["text"] for found in BLOCK.finditer(TEXTS[page])
+            if found["language"] == language and not found["reason"]]
+
+
+def laws_setup(folder):
+    """What the page takes for granted: modules, a basis."""
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    basis = fc.ModalBasis.from_matrices(np.eye(2), np.zeros((2, 2)),
+                                        {"contact": rows[None], "B": rows, "C": rows})
+    names = {"fc": fc, "basis": basis}
+    exec("import math\nfrom dataclasses import dataclass\nfrom typing import ClassVar\n"
+         "import numpy as np", names)
+    return names
+
+
+def sweeps_setup(folder):
+    """A study in the folder."""
+    (folder / "study.toml").write_text(BELT)
+    return {"__name__": "__main__"}
+
+
+def orbits_setup(folder):
+    """The system of the first example of the page on bifurcations."""
+    names = {}
+    exec(compile(blocks("bifurcation.md", "python")[0], "bifurcation.md", "exec"), names)
+    return names
+
+
+def sensitivity(names):
+    """The table of a sweep for Sobol indices, of which the page speaks by then."""
+    names["table"] = fc.sweep(
+        "study.toml", {"ground.speed": fc.Range(1e-3, 4e-3, 2),
+                       "load.normal": fc.Range(10.0, 20.0, 2)},
+        method="sensitivity", samples=8, summaries=["friction_power"], folder="sensitivity")
+
+
+BETWEEN = {("sweeps.md", 1): sensitivity}  # before this block of the page
+SETUP = {"laws.md": laws_setup, "sweeps.md": sweeps_setup, "orbits.md": orbits_setup}
+
+
+def check_readme(names, printed, folder):
+    assert "The run reached its end." in printed
+    assert "right to" in names["basis"].report().recommendation
+    assert names["run"].energies.imbalance < 2e-5
+    assert set(names["run"].contact_state.ravel().tolist()) == {0, 1, 2}
+    assert (folder / "contact.png").stat().st_size > 10_000
+
+
+def check_analysis(names, printed, folder):
+    assert "Peak(frequency_hz=10.2368" in printed
+    found, impacts = names["found"], names["impacts"]
+    assert (found.periods, found.settled) == (1, True)
+    assert len(impacts) == 60
+    assert abs(impacts.restitution - 0.945).max() < 1e-3
+    assert {path.name for path in folder.iterdir()} == {
+        "spectrum.png", "poincare.png", "receptance.png", "run.csv"}
+    # On its spring the mass alone has sqrt(c / m) = 5.22 Hz.
+    response = names["response"]
+    highest = response.frequency_hz[response.magnitude[:, 0, 0].argmax()]
+    assert abs(highest - 5.223) < 0.06
+
+
+def check_bifurcation(names, printed, folder):
+    first, second = (line.split() for line in printed.splitlines())
+    assert [first[0], second[0]] == ["Hopf", "Hopf"]
+    told = re.search(r"at B = ([\d.]+) and\n +([\d.]+)", TEXTS["bifurcation.md"])
+    assert [float(first[1]), float(second[1])] == pytest.approx(
+        [float(x) for x in told.groups()], abs=5e-7)
+    assert first[-1] == "subcritical"
+    assert names["flow"].of_kind("Hopf")[0].parameter == pytest.approx(470.0 / 19.0, rel=1e-10)
+    end = names["short"].points[-1]
+    assert end.kind == "first mode displaced by 1"
+    assert end.values["state"][0] == pytest.approx(1.0, rel=1e-10)
+    # The orbit of the second part is that of the runs.
+    first = names["shown"].points[0]
+    values, _ = names["runs"].observed("B", "y")
+    assert first.parameter == pytest.approx(64.0, rel=1e-9)
+    assert first.values["observed_section"][0] == pytest.approx(values[0, -1], rel=1e-3)
+    near = min(names["orbits"].points, key=lambda at: abs(at.parameter - 64.32)).values
+    decay = np.log(np.abs(near["multipliers"]).max()) / near["period"]
+    assert names["pair"].mean() == pytest.approx(decay, rel=0.03)
+    assert len(names["found"].attractors) == 1
+    assert all((folder / name).stat().st_size > 5000 for name in ("impacts.png", "basins.png"))
+
+
+def check_orbits(names, printed, folder):
+    assert "period doubling 8.0921923" in printed
+    assert (folder / "diagram.png").stat().st_size > 10000
+    second = names["doubled"].of_kind("period doubling")[0]
+    assert second.parameter == pytest.approx(9.2619, abs=1e-3)
+    assert names["times"][-1] == pytest.approx(names["orbits"].points[40].values["period"])
+    assert names["states"][0] == pytest.approx(names["states"][-1], abs=1e-12)
+
+
+def check_runs(names, printed, folder):
+    assert names["run"].events.kind[0] == "touch-down"
+    assert names["first"].status.name == "EVENT"
+    assert names["found"].exponents[0] == pytest.approx(-6.254, abs=1.0)
+    multipliers = abs(np.linalg.eigvals(names["one"].monodromy))
+    assert np.log(multipliers.max()) / names["period"] == pytest.approx(-6.254, rel=1e-3)
+    assert names["up"].shape == names["down"].shape == (9, 4)
+    assert [one.kind for one in names["plane"].attractors] == ["periodic"]
+
+
+def check_laws(names, printed, folder):
+    law = names["LogarithmicFriction"](0.2, 0.03)
+    # mu_0 + a ln(1 + v / v_0) times F = 5 N, with the sign of slip.
+    force = law.kernel.python(-0.1, 5.0, law.table(np.ones(1))[0])[0]
+    assert force == pytest.approx(-5.0 * (0.2 + 0.03 * np.log1p(0.1 / 1e-4)), rel=1e-9)
+    fc.check_law(law)
+    assert names["system"].friction.static_coefficient == 0.6
+
+
+def check_sweeps(names, printed, folder):
+    assert names["amplitude"].shape == (2, 4)
+    # The case once more, alone: half of its way is what the table says.
+    x = fc.window(names["run"], 0.5).displacement("B")[:, 0]
+    assert names["amplitude"].ravel()[7] == pytest.approx(np.ptp(x) / 2.0, rel=1e-12)
+
+
+CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
+          "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
+          "sweeps.md": check_sweeps}
+
+
+def test_every_page_with_code_is_known():
+    assert {page for page in PAGES if blocks(page, "python")} == set(CHECKS)
+
+
+@pytest.mark.parametrize("page", CHECKS)
+def test_code_of_the_page_runs(page, tmp_path, monkeypatch, capsys):
+    names = SETUP.get(page, lambda folder: {})(tmp_path)
+    capsys.readouterr()
+    monkeypatch.chdir(tmp_path)
+    shorter = SHORTER.get(page, {})
+    for old in shorter:
+        assert "\n".join(blocks(page, "python")).count(old) == 1
+    for number, code in enumerate(blocks(page, "python")):
+        BETWEEN.get((page, number), lambda names: None)(names)
+        for old, new in shorter.items():
+            code = code.replace(old, new)
+        if rendering_works() is not None:
+            code = re.sub(r"^render\(.*\)$", "", code, flags=re.MULTILINE)
+        exec(compile(code, page, "exec"), names)
+    CHECKS[page](names, capsys.readouterr().out, tmp_path)
+
+
+def test_study_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text(blocks("README.md", "toml")[0])
+    assert execute(["modes", "study.toml"]) == 0
+    assert execute(["run", "study.toml", "--set", "simulation.t_end=0.1"]) == 0
+    assert (tmp_path / "results" / "study.vtkhdf").exists()
+    assert "study.vtkhdf" in capsys.readouterr().out
+
+
+TABLES = [(page, text) for page in PAGES for text in blocks(page, "toml")]
+
+
+@pytest.mark.parametrize(("page", "text"), TABLES,
+                         ids=[f"{page}-{number}" for number, (page, _) in enumerate(TABLES)])
+def test_tables_of_the_pages_are_understood(page, text):
+    shape = '[geometry]\nshape = "beam"\n'
+    study = Study.from_toml(text if "[geometry]" in text else text + shape, "study.toml")
+    given = tomllib.loads(text)
+    written = study.tables()
+    for section, keys in given.items():
+        for key, value in keys.items():
+            if not isinstance(value, dict | list):
+                assert written[section][key] == value
+
+
+COMMAND_LINES = [(page, line) for page, text in TEXTS.items()
+                 for line in re.findall(r"^    (fecontact .*)$", text, re.MULTILINE)]
+
+
+@pytest.mark.parametrize(("page", "line"), COMMAND_LINES,
+                         ids=[f"{page}-{line.split()[1]}" for page, line in COMMAND_LINES])
+def test_command_lines_of_the_pages_are_understood(page, line):
+    command, bound, _ = app.parse_args(shlex.split(line, comments=True)[1:], exit_on_error=False,
+                                       print_error=False)
+    assert command in COMMANDS
+    assert bound.arguments
+
+
+def test_commands_within_sentences_exist():
+    names = {command.__name__ for command in COMMANDS}
+    for text in TEXTS.values():
+        for name in re.findall(r"`fecontact (\w+)", text):
+            assert name in names, name
+
+
+def test_scripts_and_targets_of_the_pages_exist():
+    makefile = (ROOT / "Makefile").read_text()
+    for page, text in TEXTS.items():
+        for name in re.findall(r"\b((?:examples|benchmarks)/\w+\.(?:py|toml))", text):
+            assert (ROOT / name).exists(), (page, name)
+        for target in re.findall(r"^    make (\w+)|`make (\w+)`", text, re.MULTILINE):
+            assert re.search(rf"^{''.join(target)}:", makefile, re.MULTILINE), (page, target)
+
+
+def test_links_of_the_pages_lead_somewhere():
+    for page, text in TEXTS.items():
+        for target in re.findall(r"\]\(([^)#:]+)\)", text):
+            assert (PAGES[page].parent / target).exists(), (page, target)
+
+
+def test_what_is_not_run_has_a_reason():
+    reasons = [found["reason"] for text in TEXTS.values() for found in BLOCK.finditer(text)
+               if found["reason"]]
+    assert reasons == ["needs mpi4py and mpiexec"]

@@ -1,0 +1,79 @@
+"""Every example runs in its short form, says what it should, and writes where it is told to."""
+
+import numpy as np
+import pytest
+from scripts_for_tests import ROOT, check_numbers, run_script
+
+from fecontact.cli import execute
+from fecontact.output.probe import rendering_works
+from fecontact.output.store import read_case
+
+# Spring of the drive and elastic mode with the contact held: w^2 of the one motion that is left.
+_w = 2.0 * np.pi * 30.0
+HELD_HZ = np.sqrt((0.5**2 * 0.0 + _w**2 + 5610.0 / 5.632 * (0.5 + 0.5) ** 2) / 1.25) / (2 * np.pi)
+
+# Arguments; patterns, numbers and tolerances; files.
+EXAMPLES = {
+    "own_law": ((), [(r"^LogarithmicFriction .* (\d+)% of the time", 0.0, 0.5)], set()),
+    "from_other_programs": ((), [(r"^universal file .* frequencies differ by (\S+),", 0.0, 2e-5),
+                                 (r"^Abaqus.* shapes by (\S+)$", 0.0, 1e-9)], set()),
+    "impact_calibration": ((), [(r"4 mm: (\S+) kg", 0.092, 1e-5), (r"kg, (\S+) Hz", 230.0, 0.02),
+                                (r"Hz, (\S+)$", 0.6, 1e-4)], set()),
+    # The middle fifth carries most of 5 kN; both tables as in docs/convergence.md.
+    "contact_convergence": ((), [(r"^\| 10 \| 10 \|[^|]*\| (\S+) \|", 20.71, 0.01),
+                                 (r"^\| 5 \| 20 \|[^|]*\| (\S+) \|", 20.43, 0.01)], set()),
+    "squeal": (("out",), [(r"coefficient of (\S+) on", 0.3108, 2e-4), (r"at (\S+) Hz,", 646.0, 0.1)],
+               {"out/squeal_map.png", "out/squeal_modes.png"}),
+    # As printed by Sextro: 7.09 and 8.09; the others see the example itself.
+    "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
+                                     (r"fold at B = (\S+)", 0.890687, 1e-4),
+                                     (r"doubling at B = (\S+)", 8.092192, 1e-4)],
+                          {"out/two_masses_over_B.png"}),
+    "friction_oscillator": (("out",), [(r"vibrate at (\S+) Hz", HELD_HZ, 0.006),
+                                       (r"^c: three modes .* (\S+) Hz", HELD_HZ, 0.05),
+                                       (r"equilibrium: (\S+) N", 14.0, 1e-6)],
+                            {f"out/{name}.png" for name in (
+                                "phase", "irregular", "spectrogram", "block-contact",
+                                "block-friction-work")}),
+    "impact_oscillator": ((), [(r"\| 2 \| period (\d)", 1.0, 0.0),
+                               (r"\| 2 \|.* ([-+][\d.]+) \|$", -6.254, 0.01)], set()),
+    "impact_figures": (("out",), [(r"phase.png: (\d+) diagrams", 6.0, 0.0)],
+                       {f"out/impact-{name}.png" for name in ("phase", "chatter", "sections")}),
+    "impact_map": (("out",), [(r"up to (\d) of 5", 4.0, 1.0)],
+                   {"out/impact-bifurcation.png", "out/impact-map.png"}),
+    "impact_orbits": (("out",), [(r"^(\d+) runs that repeat", 8.0, 0.0)],
+                      {"out/impact_orbits.png"}),
+    # The orbit that is followed and the run have one period.
+    "beam_stick_slip": (("out.png",), [(r"stable above (\S+) mm/s", 8.3365, 1e-3),
+                                       (r"50.0000 mm/s: (\S+) ms", 55.619, 2e-3),
+                                       (r"run at 50 mm/s: (\S+) ms", 55.619, 2e-3)], {"out.png"}),
+    "sliding_beam": (("out",), [(r"off by (\S+)\.$", 0.0, 1e-8), (r"^   10 +(\S+)%", 4.2, 0.5)],
+                     {f"out/{name}" for name in ("energies.png", "contact.png", "history.png",
+                                                 "friction-work.png", "sliding-beam.mp4")}),
+    "sweep_on_dask": ((), [(r"^(\d+) cases, 0 failed", 4.0, 0.0)], set()),
+}
+
+
+def test_every_example_is_here():
+    assert {path.stem for path in (ROOT / "examples").glob("*.py")} == set(EXAMPLES)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_example(name, tmp_path, monkeypatch, capsys):
+    if name == "sliding_beam" and (reason := rendering_works()) is not None:
+        pytest.skip(reason)
+    if name == "sweep_on_dask":
+        pytest.importorskip("distributed")
+    arguments, numbers, files = EXAMPLES[name]
+    printed, left = run_script(f"examples/{name}.py", arguments, tmp_path, monkeypatch, capsys)
+    check_numbers(printed, numbers)
+    assert left == files
+
+
+@pytest.mark.parametrize("study", sorted((ROOT / "examples").glob("*.toml")), ids=lambda x: x.stem)
+def test_study_of_the_examples(study, tmp_path, capsys):
+    assert execute(["run", str(study), "-o", str(tmp_path), "--set", "simulation.t_end=0.05",
+                    "--set", "simulation.outputs=11", "--set", "output.frames=2"]) == 0
+    run = read_case(tmp_path / f"{study.stem}.vtkhdf").trajectory
+    assert run.time[-1] == 0.05
+    assert run.energies.imbalance < 1e-4
