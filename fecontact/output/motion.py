@@ -98,7 +98,7 @@ class Motion:
         if self.given_scale is not None:
             return float(self.given_scale)
         extent = float(np.linalg.norm(np.ptp(self.field.nodes, axis=0)))
-        gap = float(self.trajectory.system.arrays.gap.min())
+        gap = float(np.min(self.trajectory.system.gap))
         low, high = self.trajectory.system.ground.height_range
         size = max(self._largest["shape"], 0.5 * (high - low), gap)
         return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
@@ -118,7 +118,7 @@ class Motion:
     @cached_property
     def ground_level(self) -> float:
         """Drawn height of the flat ground: under the lowest contact node by its gap [m]."""
-        basis, gap = self.trajectory.system.basis, float(self.trajectory.system.arrays.gap.min())
+        basis, gap = self.trajectory.system.basis, float(np.min(self.trajectory.system.gap))
         heights = basis.positions[2 : 2 + basis.contact_nodes, 1]
         return float(heights.min() - self.scale * gap)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.sweeps.batch import Row, case_file
-from fecontact.whole_files import replaced
+from fecontact.whole_files import clear_leftovers, replaced
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,7 @@ class Store:
     def tidy(self) -> None:
         """Remove what a killed sweep has left half written."""
         for name in ("", "shards", "bases", "cases"):
-            for part in (self.folder / name).glob("*.part*"):
-                part.unlink(missing_ok=True)
+            clear_leftovers(self.folder / name)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -140,6 +139,7 @@ def write_whole(path: Path, text: str) -> None:
     InputError
         If it cannot be written.
     """
-    with replaced(path) as part:
+    with contextlib.suppress(OSError):  # said by what follows
         path.parent.mkdir(parents=True, exist_ok=True)
+    with replaced(path) as part:
         part.write_text(text, encoding="utf-8")
