@@ -110,10 +110,6 @@ class Checkpoint:
                          f"part{index}": item for index, item in enumerate(self._parts())})
         self._written = clock.monotonic()
 
-    def remove(self) -> None:
-        """Remove the file: the run has ended."""
-        self.path.unlink(missing_ok=True)
-
 
 def _leaves(arrays: Any) -> list[Any]:
     if isinstance(arrays, tuple):

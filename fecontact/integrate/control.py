@@ -270,8 +270,6 @@ def integrate(
                                   "seconds": clock.perf_counter() - begin}
     if ended is None:
         ended = ENDS[result]
-        if kept is not None:
-            kept.remove()
     if ended not in (Status.FINISHED, Status.EVENT):
         statistics["message"] = f"{_place(run, ended)}"
     done = run.outputs

@@ -116,6 +116,7 @@ def recorded_system(
     Parameters
     ----------
     basis : ModalBasis
+        That of the run.
     tables : mapping
         As of :func:`fecontact.tables.system_tables`.
     where : str
