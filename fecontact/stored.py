@@ -8,7 +8,7 @@ import io
 import json
 import math
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sized
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,7 +22,7 @@ T = TypeVar("T")
 Shape = tuple[int | None, ...]
 
 _DENSEST = 1100  # bytes that deflate makes of one, at most
-_LARGEST = 20_000_000  # rows and columns of a sparse matrix that this package can work with
+LARGEST = 20_000_000  # rows and columns of a sparse matrix that this package can work with
 _KINDS = {"f": ("fiu", np.float64), "i": ("iu", np.int64)}
 
 
@@ -44,6 +44,10 @@ def reading(path: str | Path, what: str = "damaged or of another version of feco
         yield
     except MemoryError:
         raise
+    except InputError as error:
+        if str(error).startswith(str(path)):
+            raise
+        raise InputError(f"{path} is {what} ({str(error).rstrip('.')}).") from None
     except Exception as error:  # damaged files make libraries fail in every way there is
         detail = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         if isinstance(error, KeyError):
@@ -98,8 +102,7 @@ def array(group: Any, name: str, shape: Shape, kind: str = "f") -> NDArray[Any]:
 def indices(group: Any, name: str, shape: Shape, end: int) -> NDArray[np.int64]:
     """As :func:`array` of integers, each from 0 to below ``end``."""
     found = array(group, name, shape, "i")
-    if found.size and (found.min() < 0 or found.max() >= end):
-        raise DamagedError(f"'{name}' holds numbers outside of 0 to {end - 1}")
+    _require_within(found, 0, end)
     return found
 
 
@@ -159,16 +162,24 @@ def sound_sparse(matrix: Any) -> Any:
     DamagedError
         If they lie outside of its shape, or it is larger than can be worked with.
     """
-    if max(matrix.shape) > _LARGEST:
-        raise DamagedError(f"a matrix of shape {matrix.shape} is larger than {_LARGEST} rows or "
+    if max(matrix.shape) > LARGEST:
+        raise DamagedError(f"a matrix of shape {matrix.shape} is larger than {LARGEST} rows or "
                            f"columns")
-    if hasattr(matrix, "check_format"):
+    rows, columns = matrix.shape
+    if matrix.format in ("csr", "csc", "bsr"):
         matrix.check_format(full_check=True)
     elif matrix.format == "coo":
-        for index, length in zip(matrix.coords, matrix.shape, strict=True):
-            if index.size and (index.min() < 0 or index.max() >= length):
-                raise DamagedError(f"indices lie outside of the shape {matrix.shape}")
+        _require_within(matrix.row, 0, rows)
+        _require_within(matrix.col, 0, columns)
+    elif matrix.format == "dia":
+        _require_within(matrix.offsets, 1 - rows, columns)
     return matrix
+
+
+def _require_within(numbers: NDArray[Any], first: int, end: int) -> None:
+    if numbers.size and (numbers.min() < first or numbers.max() >= end):
+        raise DamagedError(f"indices from {numbers.min()} to {numbers.max()} lie outside of "
+                           f"{first} to {end - 1}")
 
 
 def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -208,7 +219,7 @@ def npy_array(stream: Any, size: int) -> NDArray[Any]:
     return flat.reshape(shape, order="F" if by_columns else "C")
 
 
-def require_lengths(what: str, length: int, items: Sequence[Any]) -> None:
+def require_lengths(what: str, length: int, items: Sized) -> None:
     """Raise DamagedError unless there are as many items as there should be."""
     if len(items) != length:
         raise DamagedError(f"{what} has {len(items)} values, not {length}")

@@ -94,7 +94,10 @@ def beside(path: Path) -> Iterator[Path]:
         If it cannot be written.
     """
     if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
+        what = (f"{path.parent} is not a folder" if path.parent.exists()
+                else f"folder {path.parent} does not exist")
+        raise InputError(f"{path} cannot be written: {what}; choose a folder that exists and is "
+                         f"writable.")
     folder, lock = _workplace(path)
     try:
         yield folder
@@ -139,7 +142,7 @@ def _locked(folder: Path) -> tuple[Path, int] | None:
         return None
     try:
         lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-    except FileNotFoundError:
+    except (FileNotFoundError, FileExistsError):  # another process was between the two calls
         return None
     except OSError:
         with suppress(OSError):
@@ -175,6 +178,8 @@ def _clear(folder: Path, path: Path | None) -> None:
         lock = os.open(folder / _LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
         try:
             if os.read(lock, 100) != _MARK or not _take(lock, wait=False):
+                return
+            if not os.fstat(lock).st_nlink:  # its process has ended well, and the name is free
                 return
             earlier = folder / _EARLIER
             if earlier.exists():

@@ -88,7 +88,7 @@ class RecordedSystem(ContactSystem):
         return self.states
 
     @property
-    def arrays(self) -> Any:  # type: ignore[override]
+    def arrays(self) -> Any:
         """The compiled laws, which are not there."""
         raise InputError(self.needs)
 
