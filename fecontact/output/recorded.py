@@ -92,6 +92,14 @@ class RecordedSystem(ContactSystem):
         """The compiled laws, which are not there."""
         raise InputError(self.needs)
 
+    def with_(self, **changes: Any) -> ContactSystem:
+        """A copy with other parameters, which the laws would be needed for."""
+        raise InputError(self.needs)
+
+    def parameters(self) -> dict[str, Any]:
+        """All parameters, which the laws would be needed for."""
+        raise InputError(self.needs)
+
     def contact_history(self, times: Array, states: Array) -> Array:
         """Recorded contact quantities (N, n, 6)."""
         return np.asarray(self.history(np.column_stack([times, states])))
