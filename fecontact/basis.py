@@ -334,7 +334,7 @@ class ModalBasis:
             If there is no such file, or it holds no basis or a damaged one.
         """
         from fecontact.output.hdf5 import open_file, read_basis
-        from fecontact.stored import member, reading
+        from fecontact.stored import member
 
-        with open_file(path, "basis") as file, reading(path):
+        with open_file(path, "basis") as file:
             return read_basis(member(file, "basis"))

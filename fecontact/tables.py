@@ -247,7 +247,8 @@ def _options(hint: Any) -> Sequence[Any]:
 
 def _words(hint: Any, plural: bool) -> list[str]:
     simple = {float: ("a number", "numbers"), int: ("a whole number", "whole numbers"),
-              str: ("a text in quotes", "texts in quotes"), bool: ("true or false",) * 2}
+              str: ("a text in quotes", "texts in quotes"), bool: ("true or false",) * 2,
+              Any: ("a value", "values")}
     origin, args = get_origin(hint), get_args(hint)
     if hint in simple:
         return [simple[hint][plural]]

@@ -42,9 +42,9 @@ def load_branches(path: str | Path) -> dict[str, Branch]:
         If there is no such file, it is damaged, or it holds no branches.
     """
     from fecontact.output.hdf5 import open_file
-    from fecontact.stored import member, reading, text
+    from fecontact.stored import member, text
 
-    with open_file(path, "branches") as file, reading(path):
+    with open_file(path, "branches") as file:
         groups = member(file, "branches")
         return {text(groups[key], "name"): Branch.read(groups[key], path)
                 for key in sorted(groups, key=int)}

@@ -17,6 +17,7 @@ from fecontact.stored import (
     array,
     indices,
     member,
+    reading,
     require_lengths,
     sound_sparse,
     values,
@@ -89,7 +90,8 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
     Raises
     ------
     InputError
-        If there is no such file, it is not HDF5, or it has no such group.
+        If there is no such file, it is not HDF5, or it has no such group; and in the place of
+        whatever else the block raises, see :func:`fecontact.stored.reading`.
     """
     import h5py
 
@@ -100,7 +102,7 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
         file = h5py.File(path, "r")
     except OSError:
         raise InputError(f"{path} is not an HDF5 file, or is damaged.") from None
-    with file:
+    with reading(path), file:
         if group not in file:
             raise InputError(f"{path} was not written by fecontact: it has no group '{group}'.")
         yield file

@@ -131,23 +131,27 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
         if "trajectory" not in file:
             raise InputError(f"{path} holds a modal basis but no run; read it with "
                              f"ModalBasis.load.")
-        with reading(path):
-            basis = read_basis(member(file, "basis"))
-            tables = with_folder(from_json(text(member(file, "system"), "json"), dict,
-                                           "the system"), Path(path).parent)
-            stored = member(file, "trajectory")
-            state = _read_state(stored, basis)
-            status = Status[text(stored, "status")]
-            statistics = from_json(text(stored, "statistics"), dict, "the statistics")
-            study = (_changed(text(member(file, "study"), "toml"),
-                              lambda table: with_folder(table, Path(path).parent))
-                     if "study" in file else None)
-            versions = {name: str(one) for name, one in member(file, "versions").attrs.items()}
-        with trusting(trust):
-            try:
-                system = system_from_tables(basis, tables, str(path))
-            except UntrustedError as error:
-                system = _recorded(path, basis, tables, state, stored, str(error))
+        basis = read_basis(member(file, "basis"))
+        tables = with_folder(from_json(text(member(file, "system"), "json"), dict, "the system"),
+                             Path(path).parent)
+        stored = member(file, "trajectory")
+        state = _read_state(stored, basis)
+        of_laws = _read_of_laws(stored, basis, len(state["time"]))
+        status = Status[text(stored, "status")]
+        statistics = from_json(text(stored, "statistics"), dict, "the statistics")
+        study = (_changed(text(member(file, "study"), "toml"),
+                          lambda table: with_folder(table, Path(path).parent))
+                 if "study" in file else None)
+        versions = {name: str(one) for name, one in member(file, "versions").attrs.items()}
+    with trusting(trust):
+        try:
+            system = system_from_tables(basis, tables, str(path))
+        except UntrustedError as error:
+            if of_laws is None:
+                raise
+            from fecontact.output.recorded import recorded_system
+
+            system = recorded_system(basis, tables, str(path), state, *of_laws, str(error))
     with reading(path):
         _require_states(system, state)
     return Case(Trajectory(system=system, status=status, statistics=statistics, **state),
@@ -186,21 +190,14 @@ def _require_states(system: ContactSystem, state: dict[str, Any]) -> None:
         raise DamagedError(f"states at events do not have {system.size} values")
 
 
-def _recorded(
-    path: str | Path, basis: ModalBasis, tables: dict[str, Any], state: dict[str, Any],
-    stored: Any, needs: str,
-) -> ContactSystem:
-    """The system of a run whose laws are not to be loaded, from what its file holds of them."""
-    from fecontact.output.recorded import recorded_system
-
+def _read_of_laws(stored: Any, basis: ModalBasis, count: int) -> tuple[Any, Any, Any] | None:
+    """Contact history, contact states and contact energy of a run with laws of the user's own."""
     if not all(name in stored for name in _OF_LAWS):
-        raise InputError(needs)
-    shape = len(state["time"]), basis.contact_nodes
-    with reading(path):
-        contact = np.stack([array(stored, name, shape) for name in _COLUMNS], axis=2)
-        contact_state = array(stored, "contact_state", shape, "i")
-        energy = array(stored, "contact_energy", shape[:1])
-    return recorded_system(basis, tables, str(path), state, contact, contact_state, energy, needs)
+        return None
+    shape = count, basis.contact_nodes
+    return (np.stack([array(stored, name, shape) for name in _COLUMNS], axis=2),
+            array(stored, "contact_state", shape, "i"),
+            array(stored, "contact_energy", (count,)))
 
 
 def _changed(study: str, change: Callable[[Any], Any]) -> str:
