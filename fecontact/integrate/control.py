@@ -263,6 +263,8 @@ def integrate(
     try:
         result = finish(run, progress, keep=None if kept is None else kept.keep)
     except KeyboardInterrupt:
+        if not run.outputs:  # nothing was computed that could be kept
+            raise
         ended = Status.INTERRUPTED
         if kept is not None:
             kept.write()
