@@ -326,8 +326,15 @@ class ModalBasis:
 
     @classmethod
     def load(cls, path: str | Path) -> "ModalBasis":
-        """Read a basis that :meth:`save` wrote, or that of a case; exact to the last bit."""
+        """Read a basis that :meth:`save` wrote, or that of a case; exact to the last bit.
+
+        Raises
+        ------
+        InputError
+            If there is no such file, or it holds no basis or a damaged one.
+        """
         from fecontact.output.hdf5 import open_file, read_basis
+        from fecontact.stored import member
 
         with open_file(path, "basis") as file:
-            return read_basis(file["basis"])
+            return read_basis(member(file, "basis"))

@@ -9,11 +9,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 
 from fecontact.errors import InputError
 from fecontact.whole_files import replaced
 
 INTERRUPTED = 130  # exit code after Ctrl-C
+_ENDING = ("SIGTERM", "SIGHUP")
+_ended_by: list[int] = []  # the first of these signals that came
 PATIENCE = 2.0  # nothing is shown of work that takes less [s]
 
 
@@ -79,7 +82,7 @@ def loading() -> Iterator[None]:
     """
     def leave(*_: object) -> None:
         os.write(sys.stderr.fileno(), b"error: interrupted.\n")
-        os._exit(INTERRUPTED)
+        os._exit(interrupted_code())
 
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -88,6 +91,81 @@ def loading() -> Iterator[None]:
     try:
         with waiting("Loading, and compiling after changes"):
             yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def interrupted_code() -> int:
+    """Exit code of a command that was interrupted: 130 after Ctrl-C, else 128 and the signal."""
+    return 128 + _ended_by[0] if _ended_by else INTERRUPTED
+
+
+@contextmanager
+def ending_signals() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP do what Ctrl-C does, whatever that is at the time.
+
+    Batch systems and closing terminals send them, more than once: the first counts, so that what
+    is then written is not interrupted in turn. Signals that are ignored, as by nohup, stay so.
+    """
+    def end(number: int, frame: FrameType | None) -> None:
+        if _ended_by:
+            return
+        _ended_by.append(number)
+        if number != signal.SIGTERM:
+            _leave_terminal(terminals)
+        interrupt = signal.getsignal(signal.SIGINT)
+        if callable(interrupt):
+            interrupt(number, frame)
+        else:  # Ctrl-C is ignored by what a shell runs in the background
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    terminals = [descriptor for descriptor in (1, 2) if os.isatty(descriptor)]
+    before = {number: signal.getsignal(number) for name in _ENDING
+              if (number := getattr(signal, name, None)) is not None}
+    taken = [number for number, handler in before.items() if handler is signal.SIG_DFL]
+    _ended_by.clear()
+    try:
+        for number in taken:
+            signal.signal(number, end)
+        yield
+    finally:
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)
+        _ended_by.clear()
+
+
+def _leave_terminal(descriptors: list[int]) -> None:
+    """Write no longer to a terminal that has been closed, which would be an error."""
+    with suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for descriptor in descriptors:
+            os.dup2(nowhere, descriptor)
+        os.close(nowhere)
+
+
+@contextmanager
+def held_back_interrupt() -> Iterator[Callable[[], None]]:
+    """A function that raises KeyboardInterrupt if Ctrl-C has come since the block began.
+
+    For libraries that call back into Python and swallow an exception that is raised there, or are
+    left in disorder by it. Where Ctrl-C is ignored it stays so.
+    """
+    came: list[int] = []
+
+    def check() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield check
+        return
+    signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    try:
+        yield check
     finally:
         signal.signal(signal.SIGINT, before)
 

@@ -1,6 +1,9 @@
 """Meshing of plane bodies by Gmsh, with named boundaries and points."""
 
+import ctypes
 import math
+import os
+import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +24,7 @@ __all__ = ["MAX_CELLS", "Beam", "Block", "Pendulum", "Shape", "generate"]
 
 MAX_CELLS = 2_000_000
 
+_SIGACTION_BYTES = 512  # more than struct sigaction has on any system
 _GMSH_LOCK = threading.Lock()  # Gmsh has one global state
 _GMSH_OPTIONS: dict[str, float] = {
     "General.Terminal": 0,
@@ -147,12 +151,36 @@ def _mesh(gmsh: Any, grid: Grid, shape: Shape) -> Mesh:
 
 
 @contextmanager
+def _signals_as_before() -> Iterator[None]:
+    """Leave signals as they are: Gmsh sets several back to their defaults as it starts.
+
+    A closed pipe would end the process without a word, and so would SIGTERM. By the C library,
+    since Python sets signals in the main thread alone.
+    """
+    action = None if os.name == "nt" else getattr(ctypes.CDLL(None), "sigaction", None)
+    if action is None:
+        yield
+        return
+    kept = {}
+    for number in signal.valid_signals():
+        kept[number] = ctypes.create_string_buffer(_SIGACTION_BYTES)
+        if action(int(number), None, kept[number]) != 0:
+            del kept[number]
+    try:
+        yield
+    finally:
+        for number, before in kept.items():
+            action(int(number), before, None)
+
+
+@contextmanager
 def _gmsh_session(gmsh: Any) -> Iterator[None]:
     """An own, quiet Gmsh model that leaves nothing behind."""
     mine = not gmsh.isInitialized()
     if mine:
         # Gmsh would take SIGINT away from Python, and only the main thread may set a handler.
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        with _signals_as_before():
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
     options: dict[str, float] = {}
     model = f"fecontact-{uuid4().hex}"
     previous = gmsh.model.getCurrent()

@@ -81,7 +81,7 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
     """Write a mesh as Gmsh 4.1 text, boundaries and points as physical groups.
 
     Coordinates are written in full, so that :func:`read_mesh` gives the same mesh back. The file
-    is complete or not there: it is written as ``NAME.part`` and renamed.
+    is complete or not there.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def write_fields(
     Parameters
     ----------
     path : str or Path
-        The file, written as ``NAME.part`` and renamed when complete.
+        The file, written whole or not at all.
     points : (N, 2) or (N, 3) array
         Coordinates [m]; z is zero where it is not given.
     cells : (M, 3) or (M, 4) integer array

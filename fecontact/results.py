@@ -85,8 +85,11 @@ class StoredRun:
     current: bool = True
 
 
-def stored_run(file: Path) -> StoredRun:
+def stored_run(file: Path, trust: bool = False) -> StoredRun:
     """A run from its own file, or found by the file of its study.
+
+    ``trust`` says whether to run code that the file of the run names; that of laws which the
+    study names is run.
 
     Raises
     ------
@@ -94,31 +97,38 @@ def stored_run(file: Path) -> StoredRun:
         If there is no such file, or the study was not run yet.
     """
     with loading():
+        from fecontact.laws.names import law_files
         from fecontact.output.store import read_case
         from fecontact.study import Study
         from fecontact.study_sections import RenderSettings
+        from fecontact.tables import from_table
 
     if file.suffix.lower() == ".toml":
         study = Study.read(file)
         path = study.results / f"{study.name}.vtkhdf"
         if not path.is_file():
             raise InputError(f"{path} does not exist; run the study first: fecontact run {file}")
-        case = read_case(path)
-        return StoredRun(path, case.trajectory, study.render, _same_run(study, case.study))
-    case = read_case(file)
+        known = law_files(study.tables())
+        case = read_case(path, trust=trust or known)
+        return StoredRun(path, case.trajectory, study.render,
+                         _same_run(study, case.study, trust or known))
+    case = read_case(file, trust=trust)
     try:
-        settings = Study.from_toml(case.study or "").render
+        settings = from_table(RenderSettings, tomllib.loads(case.study or "").get("render", {}),
+                              "[render]")
     except FecontactError:
-        # A run without a study, or with one that this version does not know, can still be drawn.
+        # A run with a study that this version does not know can still be drawn.
         settings = RenderSettings()
     return StoredRun(file, case.trajectory, settings)
 
 
-def _same_run(study: "Study", stored: str | None) -> bool:
+def _same_run(study: "Study", stored: str | None, trust: bool | set[Path]) -> bool:
+    from fecontact.laws.names import trusting
     from fecontact.study import Study
 
     try:
-        earlier = Study.from_toml(stored or "")
+        with trusting(trust):
+            earlier = Study.from_toml(stored or "")
     except FecontactError:
         return False
     return study == replace(earlier, output=study.output, render=study.render,

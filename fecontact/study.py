@@ -279,7 +279,8 @@ class Study:
     ) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
 
-        The checkpoint is left out for methods that have none.
+        The checkpoint is left out for methods that have none. It stays when the run has ended:
+        remove it once the run is written.
         """
         settings, t_end, system = self.simulation, self.t_end, self.system()
         with located(f"{_title(self.path)}: [output]:"):
@@ -295,7 +296,8 @@ class Study:
                             scheme=settings.scheme, progress=progress,
                             events=(ContactEvents(settings.stop)
                                     if settings.events or settings.stop else None),
-                            checkpoint=checkpoint if settings.method == "Rodas5P" else None)
+                            checkpoint=checkpoint if settings.method == "Rodas5P" else None,
+                            keep_checkpoint=True)
 
     @cached_property
     def _mesh(self) -> Mesh:

@@ -3,7 +3,7 @@
 import json
 import re
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
@@ -114,18 +114,25 @@ def system_from_tables(
     basis: ModalBasis, tables: Mapping[str, Any], where: str = "The system"
 ) -> ContactSystem:
     """The contact system of a basis and tables ``normal``, ``friction``, ... , ``gap``."""
-    parts: dict[str, Any] = {
-        part: from_table(cls, tables.get(part, {}), f"{where}: [{part}]")
-        for part, cls in PART_CLASSES.items() if part in tables or part != "normal"
-    }
-    for group, laws in tables.get("contact", {}).items():
+    parts = system_parts(tables, where, PART_CLASSES)
+    groups = convert(tables.get("contact", {}), Mapping[str, Mapping[str, Any]], where, "contact")
+    for group, laws in groups.items():
         for part, table in laws.items():
+            require_known(part, ("normal", "friction"), f"{where}: [contact.{group}]")
             if not isinstance(parts.get(part), dict):
                 parts[part] = {}
             parts[part][group] = from_table(PART_CLASSES[part], table,
                                             f"{where}: [contact.{group}.{part}]")
     gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
     return ContactSystem(basis, gap=gap, **parts)
+
+
+def system_parts(
+    tables: Mapping[str, Any], where: str, names: Iterable[str]
+) -> dict[str, Any]:
+    """Those of the parts of :func:`system_tables` that are named."""
+    return {part: from_table(PART_CLASSES[part], tables.get(part, {}), f"{where}: [{part}]")
+            for part in names if part in tables or part != "normal"}
 
 
 def require_known(key: str, valid: Mapping[str, Any] | Sequence[str], where: str) -> None:
@@ -204,6 +211,8 @@ def _converted_to(value: Any, hint: Any, where: str) -> Any:
     origin, args = get_origin(hint), get_args(hint)
     if isinstance(value, np.ndarray):
         value = value.tolist()
+    if hint is Any:
+        return value
     if hint is float and isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
     if hint is int and isinstance(value, Integral) and not isinstance(value, bool):
@@ -238,7 +247,8 @@ def _options(hint: Any) -> Sequence[Any]:
 
 def _words(hint: Any, plural: bool) -> list[str]:
     simple = {float: ("a number", "numbers"), int: ("a whole number", "whole numbers"),
-              str: ("a text in quotes", "texts in quotes"), bool: ("true or false",) * 2}
+              str: ("a text in quotes", "texts in quotes"), bool: ("true or false",) * 2,
+              Any: ("a value", "values")}
     origin, args = get_origin(hint), get_args(hint)
     if hint in simple:
         return [simple[hint][plural]]

@@ -213,12 +213,13 @@ def test_body_fills_the_frame_whatever_its_shape(length, height):
 def test_png_frames_have_the_size_and_the_body_moves(tmp_path):
     trajectory = run(basis(columns=20, rows=4), times=21)
     seen = []
-    (tmp_path / "run_0007.png").touch()
+    render(trajectory, tmp_path / "run.png", frames=6, size=SMALL)
+    (tmp_path / "run_0009.png").write_bytes(b"of somebody else")
     first = render(trajectory, tmp_path / "run.png", frames=4, size=SMALL,
                    progress=lambda done, total: seen.append((done, total)))
     assert first == tmp_path / "run_0000.png"
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        f"run_{k:04d}.png" for k in range(4)]
+        *(f"run_{k:04d}.png" for k in range(4)), "run_0009.png"]
     assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
     images = [imread(tmp_path / f"run_{k:04d}.png") for k in range(4)]
     assert all(image.shape[:2] == SMALL[::-1] for image in images)

@@ -163,23 +163,24 @@ class Branch:
     @classmethod
     def read(cls, group: Any, path: str | Path) -> "Branch":
         """Read a branch from an HDF5 group that :meth:`write` filled, of the file ``path``."""
-        try:
-            kinds = [kind.decode() for kind in group["kind"][()]]
+        from fecontact.stored import array, member, reading, text, texts
+
+        with reading(path):
+            kinds = texts(group, "kind") if len(member(group, "kind")) else []
             count = len(kinds)
-            u, tangent = _read(group["u"], count), _read(group["tangent"], count)
-            stored = {name: _read(item, count) for name, item in group.get("values", {}).items()}
+            u = array(group, "u", (count, None) if count else (0,))
+            tangent = array(group, "tangent", u.shape)
+            stored = {name: _read(item, count)
+                      for name, item in _members(group, "values").items()}
             details = {int(index): {name: _value(item) for name, item in part.items()}
-                       for index, part in group.get("details", {}).items()}
+                       for index, part in _members(group, "details").items()}
             points = tuple(
                 BranchPoint(u[k], tangent[k], {name: row[k] for name, row in stored.items()},
                             kinds[k] or None, details.get(k, {})) for k in range(count))
             attributes = {name: _value(item)
-                          for name, item in group.get("attributes", {}).items()}
-            return cls(str(group.attrs["parameter"]), points, Status[group.attrs["status"]],
-                       str(group.attrs["message"]), attributes)
-        except (KeyError, OSError) as error:
-            raise InputError(f"{path} is damaged or of another version of fecontact "
-                             f"({error}).") from None
+                          for name, item in _members(group, "attributes").items()}
+            return cls(text(group, "parameter"), points, Status[text(group, "status")],
+                       text(group, "message"), attributes)
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:
@@ -192,14 +193,32 @@ def _write(group: Any, name: str, values: list[Any]) -> None:
         group.create_dataset(f"{name}/{index}", data=value)
 
 
+def _members(group: Any, name: str) -> Any:
+    """The members of a group that may be missing."""
+    from fecontact.stored import DamagedError, member
+
+    if name not in group:
+        return {}
+    found = member(group, name)
+    if not hasattr(found, "items"):
+        raise DamagedError(f"'{name}' is no group")
+    return found
+
+
 def _read(item: Any, count: int) -> list[Any]:
-    if hasattr(item, "shape"):
-        return [_plain(value) for value in item[()]]
-    return [_value(item[str(index)]) for index in range(count)]
+    from fecontact.stored import require_lengths, values
+
+    if not hasattr(item, "shape"):
+        return [_value(item[str(index)]) for index in range(count)]
+    found = [_plain(value) for value in np.atleast_1d(values(item))]
+    require_lengths(f"'{item.name}'", count, found)
+    return found
 
 
 def _value(item: Any) -> Any:
-    return _plain(item[()])
+    from fecontact.stored import values
+
+    return _plain(values(item))
 
 
 def _plain(value: Any) -> Any:

@@ -39,11 +39,12 @@ def load_branches(path: str | Path) -> dict[str, Branch]:
     Raises
     ------
     InputError
-        If there is no such file, or it holds no branches.
+        If there is no such file, it is damaged, or it holds no branches.
     """
     from fecontact.output.hdf5 import open_file
+    from fecontact.stored import member, text
 
     with open_file(path, "branches") as file:
-        groups = file["branches"]
-        return {str(groups[key].attrs["name"]): Branch.read(groups[key], path)
+        groups = member(file, "branches")
+        return {text(groups[key], "name"): Branch.read(groups[key], path)
                 for key in sorted(groups, key=int)}

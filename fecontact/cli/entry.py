@@ -6,7 +6,7 @@ from cyclopts import CycloptsError
 
 from fecontact.cli.app import app
 from fecontact.cli.printing import complain
-from fecontact.console import INTERRUPTED
+from fecontact.console import INTERRUPTED, ending_signals, interrupted_code
 from fecontact.errors import FecontactError
 
 
@@ -19,8 +19,15 @@ def execute(tokens: list[str]) -> int:
     """Run one command line; the exit code.
 
     0 when all went well, 1 for an error, 2 for a command line that cannot be understood, 130
-    after Ctrl-C. Errors are one sentence on stderr; ``--debug`` shows where they come from.
+    after Ctrl-C, 143 after SIGTERM and 129 after SIGHUP. Errors are one sentence on stderr;
+    ``--debug`` shows where they come from.
     """
+    with ending_signals():
+        code = _execute(tokens)
+        return interrupted_code() if code == INTERRUPTED else code
+
+
+def _execute(tokens: list[str]) -> int:
     debug = "--debug" in tokens
     try:
         return int(app.meta(tokens, exit_on_error=False, print_error=False,

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.options import RunFile
+from fecontact.cli.options import RunFile, Trust
 from fecontact.cli.printing import note_age, say_written
 
 
@@ -26,6 +26,7 @@ def render(
         help="Factor by which displacements are drawn larger.")] = None,
     start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
     end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
+    trust: Trust = False,
 ) -> None:
     """Draw a run as a movie or as numbered pictures; [render] of the study holds the defaults."""
     from dataclasses import replace
@@ -36,7 +37,7 @@ def render(
     changes: dict[str, Any] = {
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
         "start": start, "end": end}
-    stored = stored_run(file)
+    stored = stored_run(file, trust)
     from fecontact.tables import located
 
     with located("render:", "RenderSettings"):
@@ -68,12 +69,13 @@ def plot(
     end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
+    trust: Trust = False,
 ) -> None:
     """Draw a plot of a run, again or of another kind."""
     from fecontact.console import output_folder, waiting
     from fecontact.results import stored_run
 
-    stored = stored_run(file)
+    stored = stored_run(file, trust)
     from fecontact.output.redraw import Choice, point_of, redraw
 
     choice = Choice(quantity, tuple(point_of(text) for text in point or ()), axis, highest)
@@ -93,12 +95,13 @@ def export(
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="The file, or for pvd a folder of its own.")] = None,
     frames: Annotated[int, Parameter(help="Number of fields over the body, for pvd.")] = 200,
+    trust: Trust = False,
 ) -> None:
     """Write a run in another format."""
     from fecontact.console import output_folder, waiting
     from fecontact.results import stored_run
 
-    stored = stored_run(file)
+    stored = stored_run(file, trust)
     from fecontact.output.export import export_run
 
     with output_folder((output or stored.path).parent), waiting("Writing"):

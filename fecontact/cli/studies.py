@@ -91,7 +91,8 @@ def run(
 ) -> int:
     """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
 
-    Ctrl-C stops the run; what was computed until then is written, and --resume goes on from there.
+    Ctrl-C stops the run, and so do SIGTERM and SIGHUP; what was computed until then is written, and
+    --resume goes on from there.
     """
     from fecontact.console import output_folder, progress_bar, waiting
     from fecontact.report import notes, run_table
@@ -114,11 +115,13 @@ def run(
             trajectory = described.run(progress, checkpoint)
         with waiting("Writing"):
             files = write_run(described, trajectory, folder)
+        ended = trajectory.status.name
+        if ended != "INTERRUPTED":
+            checkpoint.unlink(missing_ok=True)
         show(run_table(trajectory))
         for note in notes(trajectory):
             say(f"note: {note}")
         say_written(*files)
-    ended = trajectory.status.name
     if ended not in ("FINISHED", "EVENT", "INTERRUPTED"):
         return complain("the run did not reach its end; what was computed is written.", 1)
     return INTERRUPTED if ended == "INTERRUPTED" else 0

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, choices, nearest
+from fecontact.stored import LARGEST
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_LARGEST_LABEL = 999_999_999  # of a node, in Abaqus
 _KEYWORD = re.compile(r"^[ \t]*\*(?!\*)(.*)$", re.MULTILINE)
 
 
@@ -61,6 +63,11 @@ def read_abaqus_matrix(path: Path, name: str | None) -> tuple[Any, Ints | None]:
     if not whole.all():
         raise InputError(f"Line {_line(block, int(np.argmin(whole)))} has a row, column, node or "
                          f"direction that is no whole number.")
+    large = np.abs(numbers).max(axis=1) > (LARGEST if width == 3 else _LARGEST_LABEL)
+    if large.any():
+        raise InputError(f"Line {_line(block, int(np.argmax(large)))} has the number "
+                         f"{np.abs(numbers).max():.6g}, which is too large for a row, column, node "
+                         f"or direction.")
     places = numbers.astype(np.int64)
     labels = None
     if width == 3:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.errors import InputError, choices, nearest
 from fecontact.formats.abaqus_matrix import read_abaqus_matrix
+from fecontact.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
 
 _BANNER = b"%%MatrixMarket"
 
@@ -101,12 +102,17 @@ def _read_mtx(path: Path, name: str | None) -> tuple[Any, NDArray[np.int64] | No
         first = stream.readline()
     if not first.startswith(_BANNER):
         return read_abaqus_matrix(path, name)
-    from scipy.io import mmread
+    from scipy.io import mminfo, mmread
 
     _require_no_name(name)
     if b"pattern" in first.lower():
         raise InputError("The Matrix Market file says where the matrix has entries, but not which "
                          "(pattern); write it with values.")
+    rows, columns, entries, form, _, symmetry = mminfo(path)
+    if form == "array":
+        entries = rows * columns // (1 if symmetry == "general" else 2)
+    if 2 * entries > path.stat().st_size:  # a digit and a blank each, at least
+        raise InputError(f"The file is said to hold {entries} numbers, which it does not hold.")
     return mmread(path), None
 
 
@@ -132,30 +138,32 @@ def _from_hdf5(item: Any) -> Any:
     if isinstance(item, h5py.Dataset):
         if item.attrs.get("MATLAB_class") in (b"char", b"cell"):
             return None
-        value = item[()].T
+        value = values(item).T
         return value["real"] + 1j * value["imag"] if value.dtype.names else value
     if "MATLAB_sparse" not in item.attrs:
         return None
-    starts = item["jc"][()].astype(np.int64)
+    starts = array(item, "jc", (None,), "i")
     shape = (int(item.attrs["MATLAB_sparse"]), len(starts) - 1)
     if "data" not in item:
         return sp.csc_array(shape)
-    return sp.csc_array((item["data"][()], item["ir"][()].astype(np.int64), starts), shape=shape)
+    return sp.csc_array((values(item["data"]), array(item, "ir", (None,), "i"), starts),
+                        shape=shape)
 
 
 def _read_npz(path: Path, name: str | None) -> tuple[Any, None]:
     import scipy.sparse as sp
 
-    with np.load(path) as arrays:
-        if {"format", "shape", "data"} <= set(arrays.files):
-            _require_no_name(name)
-            return sp.load_npz(path), None
-        return _chosen({key: arrays[key] for key in arrays.files}, name), None
+    arrays = npz_arrays(path)
+    if {"format", "shape", "data"} <= set(arrays):
+        _require_no_name(name)
+        return sp.load_npz(path), None
+    return _chosen(arrays, name), None
 
 
 def _read_npy(path: Path, name: str | None) -> tuple[Any, None]:
     _require_no_name(name)
-    return np.load(path), None
+    with path.open("rb") as stream:
+        return npy_array(stream, path.stat().st_size), None
 
 
 def _chosen(variables: Mapping[str, Any], name: str | None) -> Any:
@@ -187,4 +195,7 @@ def _real(path: Path, matrix: Any) -> Any:
     if matrix.ndim != 2 or matrix.dtype.kind not in "biuf":
         raise InputError(f"{path}: the array of shape {matrix.shape} and type {matrix.dtype} is "
                          f"no matrix of numbers.")
-    return sp.csc_array(matrix, dtype=float) if sp.issparse(matrix) else np.asarray(matrix, float)
+    if not sp.issparse(matrix):
+        return np.asarray(matrix, float)
+    with reading(path, "no sound sparse matrix"):
+        return sp.csc_array(sound_sparse(matrix), dtype=float)

@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.errors import MeshError
 from fecontact.formats.raw import Ints, RawMesh
+from fecontact.stored import member, values
 
 _KINDS = {"PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
           "QU4": "quad", "QU8": "quad8", "QU9": "quad9"}
@@ -49,7 +50,7 @@ def _families(families: Any, support: str) -> dict[int, list[str]]:
     """Names of the groups that each family belongs to, by the number of the family."""
     groups = {}
     for family in families.get(support, {}).values():
-        rows = family["GRO/NOM"][()] if "GRO" in family else []
+        rows = values(member(family, "GRO/NOM")) if "GRO" in family else []
         groups[int(family.attrs["NUM"])] = [
             np.asarray(row, np.int8).tobytes().split(b"\0")[0].decode(errors="replace").strip()
             for row in rows
@@ -59,7 +60,7 @@ def _families(families: Any, support: str) -> dict[int, list[str]]:
 
 def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
               of_cells: dict[int, list[str]]) -> RawMesh:
-    points = step["NOE/COO"][()].reshape(dimension, -1).T
+    points = values(member(step, "NOE/COO")).reshape(dimension, -1).T
     nodes: dict[str, list[Ints]] = {}
     edges: dict[str, list[Ints]] = {}
     cells: list[tuple[str, Ints]] = []
@@ -68,7 +69,7 @@ def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
                 members: Ints) -> None:
         if "FAM" not in stored:
             return
-        family = stored["FAM"][()]
+        family = values(stored["FAM"])
         for number in np.unique(family):
             for name in names.get(int(number), []):
                 into.setdefault(name, []).append(members[family == number])
@@ -80,7 +81,7 @@ def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
             raise MeshError(f"The mesh holds elements {code}, which are not read; mesh with "
                             f"first-order triangles or quadrilaterals.")
         number = int(stored["NOD"].attrs["NBR"])
-        members = stored["NOD"][()].reshape(-1, number).T.astype(np.int64) - 1
+        members = values(stored["NOD"]).reshape(-1, number).T.astype(np.int64) - 1
         if kind == "vertex":
             collect(nodes, of_cells, stored, members[:, 0])
         elif kind.startswith("line"):

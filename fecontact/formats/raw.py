@@ -72,6 +72,10 @@ def plane_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
                         f"(N, 3).")
     if corners.min() < 0 or corners.max() >= len(points):
         raise MeshError("The elements name nodes that the file does not hold.")
+    named = [*second_order, *raw.nodes.values(), *(group[:, :2] for group in raw.edges.values())]
+    if any(group.size and (group.min() < 0 or group.max() >= len(points)) for group in named):
+        raise MeshError("A group, or the middle of a side, names nodes that the file does not "
+                        "hold.")
     used = np.unique(corners)
     if not np.isfinite(points[used]).all():
         raise MeshError("The nodes hold values that are not finite.")

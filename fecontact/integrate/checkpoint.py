@@ -1,22 +1,25 @@
 """Checkpoints: a long run in a file, from which it goes on bit for bit."""
 
 import hashlib
-import os
 import time as clock
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
+from fecontact.integrate.run_arrays import OUTPUTS
+from fecontact.stored import DamagedError, npz_arrays, reading
+from fecontact.whole_files import replaced
 
 if TYPE_CHECKING:
     from fecontact.integrate.control import Run
 
 Array = NDArray[np.float64]
+
+_COUNTS = 1  # place of the counts among the leaves of the progress
 
 
 @dataclass
@@ -50,24 +53,40 @@ class Checkpoint:
         """
         if not self.path.exists():
             return
-        try:
-            with np.load(self.path) as stored:
-                if str(stored["mark"]) != self.mark:
-                    raise InputError(f"{self.path} is the checkpoint of another run (other system, "
-                                     f"start, output times or tolerance); remove it or name "
-                                     f"another file.")
-                for index, item in enumerate(self._parts()):
-                    item[...] = stored[f"part{index}"]
-                self.run.found.append((stored["found"], stored["found_states"]))
-                for name in ("states", "work"):
-                    getattr(self.run, name)[: self.run.outputs] = stored[name]
-        except (OSError, KeyError, BadZipFile, EOFError) as error:
-            raise InputError(f"{self.path} is not a checkpoint of fecontact "
-                             f"({error}).") from None
-        except ValueError as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{self.path} is not a checkpoint of fecontact.") from None
+        with reading(self.path, "not a checkpoint of fecontact"):
+            stored = npz_arrays(self.path)
+            mark = str(stored["mark"])
+        if mark != self.mark:
+            raise InputError(f"{self.path} is the checkpoint of another run (other system, "
+                             f"start, output times or tolerance); remove it or name "
+                             f"another file.")
+        with reading(self.path, "not a checkpoint of fecontact"):
+            self._take(stored)
+
+    def _take(self, stored: dict[str, NDArray[Any]]) -> None:
+        run, parts = self.run, self._parts()
+
+        def like(name: str, wanted: NDArray[Any], length: int | None = None) -> NDArray[Any]:
+            """A stored array of the same type and shape, except for its length."""
+            found = stored[name]
+            shape = wanted.shape if length is None else (length, *wanted.shape[1:])
+            if found.shape != shape or found.dtype.kind != wanted.dtype.kind:
+                raise DamagedError(f"'{name}' has shape {found.shape} and type {found.dtype}, not "
+                                   f"{shape} and {wanted.dtype}")
+            return found
+
+        kept = [like(f"part{index}", np.asarray(item)) for index, item in enumerate(parts)]
+        done = int(kept[_COUNTS][OUTPUTS])
+        if not 0 <= done <= len(run.times) or kept[_COUNTS].min() < 0:
+            raise DamagedError(f"{done} outputs of {len(run.times)} are done")
+        states, work = like("states", run.states, done), like("work", run.work, done)
+        events = like("found", np.zeros((0, 3)), len(stored["found"]))
+        if not np.isfinite(events).all() or (events[:, 1] < 0.0).any():
+            raise DamagedError("events of no kind were found")
+        run.found.append((events, like("found_states", run.states, len(events))))
+        for item, value in zip(parts, kept, strict=True):
+            item[...] = value
+        run.states[:done], run.work[:done] = states, work
 
     def _parts(self) -> list[Any]:
         """The arrays from which a run goes on."""
@@ -81,25 +100,15 @@ class Checkpoint:
 
     def write(self) -> None:
         """Write the file, whole or not at all."""
-        part = self.path.with_name(f"{self.path.name}.part")
-        try:
-            with open(part, "wb") as file:
-                done = self.run.outputs
-                rows = [np.zeros((0, 3)), *(rows for rows, _ in self.run.found)]
-                states = [self.run.states[:0], *(states for _, states in self.run.found)]
-                np.savez(file, mark=self.mark, states=self.run.states[:done],
-                         work=self.run.work[:done], found=np.vstack(rows),
-                         found_states=np.vstack(states), **{
-                             f"part{index}": item for index, item in enumerate(self._parts())})
-            os.replace(part, self.path)
-        except OSError as error:
-            raise InputError(f"The checkpoint {self.path} cannot be written: "
-                             f"{error.strerror or error}.") from None
+        done = self.run.outputs
+        rows = [np.zeros((0, 3)), *(rows for rows, _ in self.run.found)]
+        states = [self.run.states[:0], *(states for _, states in self.run.found)]
+        with replaced(self.path) as part, part.open("wb") as file:
+            np.savez(file, mark=self.mark, states=self.run.states[:done],
+                     work=self.run.work[:done], found=np.vstack(rows),
+                     found_states=np.vstack(states), **{
+                         f"part{index}": item for index, item in enumerate(self._parts())})
         self._written = clock.monotonic()
-
-    def remove(self) -> None:
-        """Remove the file: the run has ended."""
-        self.path.unlink(missing_ok=True)
 
 
 def _leaves(arrays: Any) -> list[Any]:

@@ -263,6 +263,8 @@ def integrate(
     try:
         result = finish(run, progress, keep=None if kept is None else kept.keep)
     except KeyboardInterrupt:
+        if not run.outputs:  # nothing was computed that could be kept
+            raise
         ended = Status.INTERRUPTED
         if kept is not None:
             kept.write()
@@ -270,8 +272,6 @@ def integrate(
                                   "seconds": clock.perf_counter() - begin}
     if ended is None:
         ended = ENDS[result]
-        if kept is not None:
-            kept.remove()
     if ended not in (Status.FINISHED, Status.EVENT):
         statistics["message"] = f"{_place(run, ended)}"
     done = run.outputs

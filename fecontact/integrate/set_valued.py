@@ -153,6 +153,8 @@ def integrate_set_valued(
             if progress is not None:
                 progress(float(reached[0]))
     except KeyboardInterrupt:
+        if not counts[4]:  # nothing was computed that could be kept
+            raise
         ended = Status.INTERRUPTED
     statistics: dict[str, Any] = {
         "method": "set-valued", "scheme": scheme, "rtol": rtol, "steps": int(counts[0]),

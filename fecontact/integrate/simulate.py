@@ -42,6 +42,7 @@ def simulate(
     static_coefficient: float | Sequence[float] | None = None,
     scheme: str | None = None,
     checkpoint: str | Path | None = None,
+    keep_checkpoint: bool = False,
     events: Watched | Sequence[Watched] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
@@ -76,6 +77,8 @@ def simulate(
     checkpoint : path, optional
         For 'Rodas5P': a file that keeps a long run every minute and when it is interrupted. If it
         is there, the run goes on from it, to the same numbers; at the end it is removed.
+    keep_checkpoint : bool
+        Leave the file there at the end, to be removed once the run is written.
     events : ContactEvents, Crossing, Event or sequence of them, optional
         For 'Rodas5P': what to watch for, located within the steps and kept in
         :attr:`Trajectory.events`; the run ends at those that say so.
@@ -132,6 +135,8 @@ def simulate(
                         checkpoint=None if checkpoint is None else Path(checkpoint),
                         events=watched)
         times, states, work, status, statistics, found = run
+        if checkpoint is not None and not keep_checkpoint and status is not Status.INTERRUPTED:
+            Path(checkpoint).unlink(missing_ok=True)
         rest["events"] = found if watched else None
         rest["node_friction_work"] = work[:, len(POWERS) :]
         work = work[:, : len(POWERS)]

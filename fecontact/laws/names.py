@@ -4,7 +4,9 @@ import importlib.util
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -130,8 +132,15 @@ def own_law(kind: Any, name: str, where: str) -> type:
         If there is no such file, it cannot be loaded, or has no such class.
     """
     path, _, title = name.rpartition(":")
+    file = str(Path(path).resolve())
+    trusted = _trusted.get()
     try:
-        found = getattr(_module(str(Path(path).resolve())), title, None)
+        if trusted is None or file in trusted:
+            found = getattr(_module(file), title, None)
+        elif (found := _loaded(file, title)) is None:
+            raise UntrustedError(
+                f"{where} is code in a file, which is not run unadvised; if you trust {path}, say "
+                f"--trust (trust=True).")
     except FileNotFoundError:
         raise InputError(f"{where}: there is no file {path}.") from None
     except InputError:
@@ -147,6 +156,52 @@ def own_law(kind: Any, name: str, where: str) -> type:
         raise InputError(f"{where}: {path} has no {what} of that name"
                          f"{nearest(title, laws)}; it has {choices(laws)}.")
     return found
+
+
+class UntrustedError(InputError):
+    """A file names code that may not be run."""
+
+
+_trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted", default=None)
+
+
+@contextmanager
+def trusting(files: bool | Iterable[Path]) -> Iterator[None]:
+    """Let laws be loaded from all files of Python, from none, or from those named alone.
+
+    Others raise :class:`UntrustedError`, unless their module is loaded already.
+    """
+    allowed = None if files is True else frozenset(
+        str(file.resolve()) for file in files or ())
+    token = _trusted.set(allowed)
+    try:
+        yield
+    finally:
+        _trusted.reset(token)
+
+
+def law_files(table: Any) -> set[Path]:
+    """Files of Python that the laws of a table name."""
+    if isinstance(table, list | tuple):
+        return {file for item in table for file in law_files(item)}
+    if not isinstance(table, Mapping):
+        return set()
+    found = {file for item in table.values() for file in law_files(item)}
+    name = table.get("law")
+    if isinstance(name, str) and ".py:" in name:
+        found.add(Path(name.rpartition(":")[0]))
+    return found
+
+
+def _loaded(file: str, title: str) -> type | None:
+    """A class of a module that was loaded from a file, if there is one."""
+    for module in list(sys.modules.values()):
+        known = getattr(module, "__file__", None)
+        if isinstance(known, str) and os.path.realpath(known) == file:
+            found = vars(module).get(title)
+            if isinstance(found, type):
+                return found
+    return None
 
 
 def name_of(law: Any) -> str | None:

@@ -138,9 +138,6 @@ def export_run(
 
 def _whole(path: str | Path, write: Callable[[Path], None]) -> Path:
     """Let a file be written beside its place, and put it there when it is complete."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
     with replaced(path) as part:
         write(part)
-    return path
+    return Path(path)

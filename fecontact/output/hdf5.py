@@ -1,6 +1,6 @@
 """HDF5 files: written whole or not at all, and the modal basis inside them."""
 
-import os
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,38 +9,78 @@ from typing import Any
 import numpy as np
 
 from fecontact.basis import ModalBasis
+from fecontact.console import held_back_interrupt
 from fecontact.errors import InputError
 from fecontact.field import Field, Quality
+from fecontact.stored import (
+    DamagedError,
+    array,
+    indices,
+    member,
+    reading,
+    require_lengths,
+    sound_sparse,
+    values,
+)
+from fecontact.whole_files import replaced
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
 _FIELD = ("nodes", "cells", "outline", "shapes", "stress")
 
 
+class _Sink(io.FileIO):
+    """A file for HDF5 that never fails: the first error is kept, what follows is dropped.
+
+    The library leaves a file that it cannot write in a state in which closing it crashes the
+    process.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self.error: OSError | None = None
+
+    def write(self, content: Any) -> int:
+        view = memoryview(content).cast("B")
+        done = 0
+        while self.error is None and done < len(view):
+            try:
+                done += super().write(view[done:])
+            except OSError as error:
+                self.error = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+
 @contextmanager
 def new_file(path: str | Path) -> Iterator[Any]:
-    """A new HDF5 file, open for writing as ``NAME.part`` and renamed when the block ends well.
+    """A new HDF5 file, open for writing, that takes its place when the block ends well.
+
+    Ctrl-C is held back until then: an exception inside the library would leave a broken file open.
 
     Raises
     ------
     InputError
-        If the folder does not exist or cannot be written.
+        If it cannot be written.
     """
     import h5py
 
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
-    try:
-        file = h5py.File(part, "w")
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({_reason(path, error)}); "
-                         f"choose a folder that exists and is writable.") from None
-    try:
-        with file:
-            yield file
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with held_back_interrupt() as check:
+        with replaced(path) as part, _Sink(part) as sink:
+            try:
+                with h5py.File(sink, "w") as file:
+                    yield file
+            except Exception:
+                if sink.error is None:
+                    raise
+            if sink.error is not None:
+                raise sink.error
+        check()
 
 
 @contextmanager
@@ -50,7 +90,8 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
     Raises
     ------
     InputError
-        If there is no such file, it is not HDF5, or it has no such group.
+        If there is no such file, it is not HDF5, or it has no such group; and in the place of
+        whatever else the block raises, see :func:`fecontact.stored.reading`.
     """
     import h5py
 
@@ -61,7 +102,7 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
         file = h5py.File(path, "r")
     except OSError:
         raise InputError(f"{path} is not an HDF5 file, or is damaged.") from None
-    with file:
+    with reading(path), file:
         if group not in file:
             raise InputError(f"{path} was not written by fecontact: it has no group '{group}'.")
         yield file
@@ -90,36 +131,54 @@ def write_basis(group: Any, basis: ModalBasis) -> None:
 
 
 def read_basis(group: Any) -> ModalBasis:
-    """Read a basis from an HDF5 group that :func:`write_basis` filled."""
+    """Read a basis from an HDF5 group that :func:`write_basis` filled.
+
+    Raises
+    ------
+    DamagedError, KeyError, InputError
+        If it holds something else; see :func:`fecontact.stored.reading`.
+    """
+    w = array(group, "angular_frequencies", (None,))
+    m = len(w)
+    T = array(group, "T", (None, 3, m))
+    extra = tuple(str(name) for name in np.atleast_1d(group.attrs["extra"]))
+    names, sizes = (np.atleast_1d(group.attrs[name]) for name in ("groups", "group_sizes"))
+    require_lengths("'group_sizes'", len(names), sizes)
+    return ModalBasis(
+        w, array(group, "damping", (m, m)), T, array(group, "positions", (len(T), 2)),
+        array(group, "tributary", (None,)), extra=extra,
+        field=_read_field(member(group, "field"), m, len(T)) if "field" in group else None,
+        quality=_read_quality(member(group, "quality"), m, len(T)) if "quality" in group else None,
+        groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)))
+
+
+def _read_field(group: Any, modes: int, points: int) -> Field:
     import scipy.sparse as sp
 
-    field = None
-    if "field" in group:
-        stored = group["field"]
-        matrix = stored["restriction"]
-        field = Field(
-            **{name: stored[name][()] for name in _FIELD},
-            restriction=sp.csr_array(
-                tuple(matrix[name][()] for name in ("data", "indices", "indptr")),
-                shape=tuple(int(k) for k in matrix.attrs["shape"]),
-            ),
-        )
-    quality = None
-    if "quality" in group:
-        stored = {name: item[()] for name, item in group["quality"].items()}
-        quality = Quality(**stored | {"mass": float(stored["mass"]),
-                                      "vibration_modes": int(stored["vibration_modes"]),
-                                      "orthogonality": float(stored["orthogonality"])})
-    extra = tuple(str(name) for name in np.atleast_1d(group.attrs["extra"]))
-    groups = tuple((str(name), int(count)) for name, count in zip(
-        group.attrs["groups"], group.attrs["group_sizes"], strict=True))
-    return ModalBasis(**{name: group[name][()] for name in _PLAIN}, extra=extra, field=field,
-                      quality=quality, groups=groups)
+    nodes = array(group, "nodes", (None, 2))
+    N = len(nodes)
+    cells = indices(group, "cells", (None, None), N)
+    if cells.shape[1] not in (3, 4):
+        raise DamagedError(f"cells have {cells.shape[1]} corners, not 3 or 4")
+    stored = member(group, "restriction")
+    shape = tuple(int(length) for length in np.atleast_1d(stored.attrs["shape"]))
+    if shape != (3 * points, 2 * N):
+        raise DamagedError(f"the restriction has shape {shape}, not {(3 * points, 2 * N)}")
+    rows = array(stored, "indptr", (shape[0] + 1,), "i")
+    columns = array(stored, "indices", (None,), "i")
+    restriction = sp.csr_array((array(stored, "data", (len(columns),)), columns, rows),
+                               shape=shape)
+    return Field(nodes, cells, indices(group, "outline", (None, 2), N),
+                 array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
+                 sound_sparse(restriction))
 
 
-def _reason(path: Path, error: OSError) -> str:
-    if not path.parent.is_dir():
-        return f"folder {path.parent} does not exist"
-    if not os.access(path.parent, os.W_OK):
-        return f"folder {path.parent} is not writable"
-    return os.strerror(error.errno) if error.errno else "the file may be open elsewhere"
+def _read_quality(group: Any, modes: int, points: int) -> Quality:
+    mass, count, orthogonality = (
+        values(member(group, name)).item() for name in ("mass", "vibration_modes",
+                                                        "orthogonality"))
+    return Quality(
+        mass=float(mass), vibration_modes=int(count), orthogonality=float(orthogonality),
+        residuals=array(group, "residuals", (modes,)),
+        participation=array(group, "participation", (2, modes)),
+        compliance=array(group, "compliance", (points, 2)))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,7 @@ class Motion:
         if self.given_scale is not None:
             return float(self.given_scale)
         extent = float(np.linalg.norm(np.ptp(self.field.nodes, axis=0)))
-        gap = float(self.trajectory.system.arrays.gap.min())
+        gap = self._gap
         low, high = self.trajectory.system.ground.height_range
         size = max(self._largest["shape"], 0.5 * (high - low), gap)
         return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
@@ -118,9 +118,9 @@ class Motion:
     @cached_property
     def ground_level(self) -> float:
         """Drawn height of the flat ground: under the lowest contact node by its gap [m]."""
-        basis, gap = self.trajectory.system.basis, float(self.trajectory.system.arrays.gap.min())
+        basis = self.trajectory.system.basis
         heights = basis.positions[2 : 2 + basis.contact_nodes, 1]
-        return float(heights.min() - self.scale * gap)
+        return float(heights.min() - self.scale * self._gap)
 
     def body(self, frame: int) -> tuple[Array, Array]:
         """Drawn places (N, 2) of the nodes [m] and their colours (N,) in SI units."""
@@ -147,6 +147,12 @@ class Motion:
         """Drawn travel (F,) of the ground [m]."""
         ground = self.trajectory.system.ground
         return self._drift_scale * np.array([ground.travel(float(time)) for time in self.times])
+
+    @property
+    def _gap(self) -> float:
+        """Smallest gap of a contact node [m]."""
+        gap = self.trajectory.system.gap
+        return min(gap) if isinstance(gap, tuple) else float(cast(float, gap))
 
     @property
     def _drift_scale(self) -> float:

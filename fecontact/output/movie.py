@@ -1,11 +1,8 @@
 """Moving pictures of a run: MP4, numbered PNG files, or a single still."""
 
-import os
+import glob
 import re
-import shutil
-import signal
 import subprocess
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.console import held_back_interrupt
 from fecontact.errors import InputError, MissingLibraryError, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.frames import frame_indices, require_field
@@ -21,11 +19,15 @@ from fecontact.output.furniture import Furniture
 from fecontact.output.motion import Colour, Motion
 from fecontact.output.probe import require_rendering
 from fecontact.output.scene import Scene
+from fecontact.whole_files import beside, put, replaced, unwritable
 
 Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
 _SMALLEST = (320, 180)
+# In the head of a picture, by which it is known as one of this package's.
+_SOFTWARE = ("Software", "fecontact")
+_OURS = "\0".join(_SOFTWARE).encode()
 _STILL_FRAMES = 200  # whose range of colours and motion a still shares with a movie
 
 
@@ -58,7 +60,8 @@ def render(
         Its modal basis must hold shapes over the body.
     path : str or Path
         ``NAME.mp4`` for a movie, ``NAME.png`` for ``NAME_0000.png`` and so on, or a folder for
-        ``frame_0000.png`` and so on in it. Earlier files of these names are replaced.
+        ``frame_0000.png`` and so on in it. Earlier files of these names are replaced, and
+        pictures of an earlier call that made more of them are removed.
     frames : int
         Number of frames, evenly spaced, never more than there are output times.
     fps : float
@@ -104,7 +107,7 @@ def render(
     lasting = float(motion.times[-1] - motion.times[0])
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
     require_rendering()
-    with (_held_back_interrupt() as check,
+    with (held_back_interrupt() as check,
           _movie_file(path, size, fps) if movie else _numbered_files(path) as take):
         for done, image in enumerate(_images(motion, size, title, slowness), start=1):
             check()
@@ -162,12 +165,8 @@ def picture(
     require_rendering()
     frame = int(np.searchsorted(motion.indices, at))
     (image,) = _images(motion, size, title, None, only=frame)
-    part = path.with_name(path.name + ".part")
-    try:
+    with replaced(path) as part:
         _save(part, image)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
     return path
 
 
@@ -193,74 +192,50 @@ def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
     except RuntimeError as error:
         raise MissingLibraryError(f"There is no ffmpeg to encode movies with ({error}); reinstall "
                                   f"imageio-ffmpeg, or write .png pictures.") from None
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
-    writer = imageio_ffmpeg.write_frames(
-        str(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
-        pix_fmt_out="yuv420p", ffmpeg_log_level="error",
-        output_params=["-movflags", "+faststart"])
-    try:
+    with replaced(path) as part:
+        writer = imageio_ffmpeg.write_frames(
+            str(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
+            pix_fmt_out="yuv420p", ffmpeg_log_level="error",
+            output_params=["-movflags", "+faststart"])
         try:
             writer.send(None)
             yield lambda image: writer.send(np.ascontiguousarray(image))
         finally:
             writer.close()
         _require_readable(imageio_ffmpeg.get_ffmpeg_exe(), part)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written "
-                         f"({str(error).strip().splitlines()[0]}).") from None
-    finally:
-        part.unlink(missing_ok=True)
-
-
-@contextmanager
-def _held_back_interrupt() -> Iterator[Callable[[], None]]:
-    """A function that raises KeyboardInterrupt if Ctrl-C has come since the block began.
-
-    VTK calls back into Python, and swallows an exception that is raised there.
-    """
-    came: list[int] = []
-
-    def check() -> None:
-        if came:
-            raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield check
-        return
-    before = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
-    try:
-        yield check
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
 def _numbered_files(path: Path) -> Iterator[Callable[[Image], Any]]:
-    """A function that adds a numbered picture; all appear when the block ends well."""
+    """A function that adds a numbered picture; all appear when the block ends well.
+
+    Pictures of an earlier movie that had more of them are removed, others of such names are not.
+    """
     folder, stem = (path, "frame") if path.is_dir() or not path.suffix else (path.parent, path.stem)
-    _require_folder(path)
-    part = path.parent / f"{path.stem}.part"
-    shutil.rmtree(part, ignore_errors=True)
     names: list[str] = []
 
-    def take(image: Image) -> None:
-        names.append(f"{stem}_{len(names):04d}.png")
-        _save(part / names[-1], image)
-
     try:
-        part.mkdir()
-        yield take
-        folder.mkdir(exist_ok=True)
-        for old in folder.iterdir():
-            if re.fullmatch(re.escape(stem) + r"_\d{4,}\.png", old.name):
+        with beside(path) as part:
+            def take(image: Image) -> None:
+                names.append(f"{stem}_{len(names):04d}.png")
+                _save(part / names[-1], image)
+
+            yield take
+            folder.mkdir(exist_ok=True)
+            for name in names:
+                put(part / name, folder / name)
+        for old in folder.glob(f"{glob.escape(stem)}_*.png"):
+            if re.fullmatch(re.escape(stem) + r"_\d{4,}\.png", old.name) and (
+                    old.name not in names and _is_ours(old)):
                 old.unlink()
-        for name in names:
-            os.replace(part / name, folder / name)
     except OSError as error:
-        raise InputError(f"{folder} cannot be written ({error.strerror or error}).") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        raise InputError(unwritable(folder, error)) from None
+
+
+def _is_ours(picture: Path) -> bool:
+    """Whether this package has drawn a picture."""
+    with picture.open("rb") as file:
+        return _OURS in file.read(1000)
 
 
 def _require_readable(ffmpeg: str, movie: Path) -> None:
@@ -274,7 +249,7 @@ def _require_readable(ffmpeg: str, movie: Path) -> None:
 def _save(path: Path, image: Image) -> None:
     from matplotlib.image import imsave
 
-    imsave(path, image, format="png")
+    imsave(path, image, format="png", metadata=dict([_SOFTWARE]))
 
 
 def _require_folder(path: Path) -> None:

@@ -1,11 +1,11 @@
 """Frames of a run as PVD and VTU files, for ParaView before 5.12 and other programs."""
 
-import os
-import shutil
+import re
 from pathlib import Path
 
 import numpy as np
 
+from fecontact.console import output_folder
 from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.frames import (
@@ -16,10 +16,12 @@ from fecontact.output.frames import (
     von_mises,
 )
 from fecontact.output.store import Case, read_case
+from fecontact.whole_files import replaced, replaced_folder
 
 
 def export_pvd(
-    case: Case | Trajectory | str | Path, path: str | Path, *, frames: int = 200
+    case: Case | Trajectory | str | Path, path: str | Path, *, frames: int = 200,
+    trust: bool = False,
 ) -> Path:
     """Write frames of a run into a folder of VTU files, and a PVD file that lists them.
 
@@ -33,10 +35,12 @@ def export_pvd(
     path : str or Path
         ``FOLDER`` for ``FOLDER/FOLDER.pvd`` with the frames beside it, or ``NAME.pvd`` with the
         frames in the folder ``NAME``. The folder is written whole or not at all. One that exists
-        is replaced if there is nothing but .pvd and .vtu files in it; its parent folder is made
+        is replaced if there is nothing in it but files of these names; its parent folder is made
         if there is none.
     frames : int
         Number of frames, evenly spaced, never more than there are output times.
+    trust : bool
+        Whether to run code that a file names; see :func:`fecontact.output.store.read_case`.
 
     Returns
     -------
@@ -49,7 +53,7 @@ def export_pvd(
         If the run has no shapes over the body, ``frames`` is not above zero, the folder holds
         other files or cannot be written, or the case cannot be read.
     """
-    trajectory = _trajectory(case)
+    trajectory = _trajectory(case, trust)
     field = require_field(trajectory)
     indices = frame_indices(trajectory.time, frames)
     if not len(indices):
@@ -62,11 +66,7 @@ def export_pvd(
     _require_free(folder)
     from fecontact.mesh_io import write_fields
 
-    part = folder.with_name(folder.name + ".part")
-    shutil.rmtree(part, ignore_errors=True)
-    new_parent = not folder.parent.exists()
-    try:
-        part.mkdir(parents=new_parent)
+    with output_folder(folder.parent), replaced_folder(folder) as part:
         names = []
         for number, index in enumerate(indices):
             q = trajectory.modal_coordinates[index : index + 1]
@@ -78,24 +78,19 @@ def export_pvd(
                     trajectory, slice(index, index + 1))[0].astype(np.float32),
             })
         times = trajectory.time[indices].tolist()
-        listed = [f"{name}/{file}" for file in names] if beside else names
-        (part / collection.name).write_text(_collection(listed, times), encoding="utf-8")
-        _replace(folder, part)
-        if beside:
-            os.replace(folder / collection.name, collection)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be written ({error.strerror or error}).") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-        if new_parent and not collection.exists():
-            folder.parent.rmdir()
+        if not beside:
+            (part / collection.name).write_text(_collection(names, times), encoding="utf-8")
+    if beside:
+        with replaced(collection) as file:
+            file.write_text(_collection([f"{name}/{one}" for one in names], times),
+                            encoding="utf-8")
     return collection
 
 
-def _trajectory(case: Case | Trajectory | str | Path) -> Trajectory:
+def _trajectory(case: Case | Trajectory | str | Path, trust: bool) -> Trajectory:
     if isinstance(case, Trajectory):
         return case
-    return (case if isinstance(case, Case) else read_case(case)).trajectory
+    return (case if isinstance(case, Case) else read_case(case, trust=trust)).trajectory
 
 
 def _collection(names: list[str], times: list[float]) -> str:
@@ -116,24 +111,9 @@ def _require_free(folder: Path) -> None:
                          f"exist.")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; give a folder.")
-    others = [item.name for item in folder.iterdir() if item.suffix not in (".vtu", ".pvd")] \
+    ours = re.compile(re.escape(folder.name) + r"(_\d{4,}\.vtu|\.pvd)")
+    others = [item.name for item in folder.iterdir() if not ours.fullmatch(item.name)] \
         if folder.is_dir() else []
     if others:
         raise InputError(f"{folder} holds other files ({min(others)}); give a folder of its own "
                          f"for the frames.")
-
-
-def _replace(folder: Path, part: Path) -> None:
-    """Put the finished folder in its place; an earlier one survives if that fails."""
-    if not folder.exists():
-        os.replace(part, folder)
-        return
-    old = folder.with_name(folder.name + ".old")
-    shutil.rmtree(old, ignore_errors=True)
-    os.replace(folder, old)
-    try:
-        os.replace(part, folder)
-    except OSError:
-        os.replace(old, folder)
-        raise
-    shutil.rmtree(old)

@@ -2,21 +2,27 @@
 
 import json
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
+from fecontact.basis import ModalBasis
+from fecontact.contact_energy import POWERS
+from fecontact.contact_kernels import GROUND_RATE
 from fecontact.errors import InputError
 from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.laws.names import movable, with_folder
+from fecontact.laws.names import UntrustedError, law_files, movable, trusting, with_folder
 from fecontact.output.frames import frame_indices
 from fecontact.output.hdf5 import new_file, open_file, read_basis, write_basis
 from fecontact.output.vtkhdf import write_vtkhdf
+from fecontact.stored import DamagedError, array, from_json, member, reading, text, texts
+from fecontact.system import ContactSystem
 from fecontact.tables import system_from_tables, system_tables
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
@@ -24,8 +30,13 @@ _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^
           "work": "J"}
 _OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
              "held_normal_force": "N", "held_friction_force": "N"}
+# What laws of the user's own give, by which a run can be drawn without their code.
+_OF_LAWS = {"penetration_rate": "m/s", "ground_rate": "m/s", "contact_energy": "J"}
 _CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
             "slip_velocity": "m/s", "contact_state": "0 open, 1 stick, 2 slip"}
+# In the order of the columns of a contact history.
+_COLUMNS = ("normal_force", "friction_force", "penetration", "penetration_rate", "slip_velocity",
+            "ground_rate")
 
 
 @dataclass(frozen=True)
@@ -96,42 +107,97 @@ def write_case(
     return Path(path)
 
 
-def read_case(path: str | Path) -> Case:
+def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case:
     """Read a run that :func:`write_case` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    trust : bool or files
+        Whether to run the code of laws that the file names as ``FILE.py:CLASS``, or the files of
+        Python whose code may be run. Untrusted laws are not loaded: forces, states of contact and
+        energies of the run are those that the file holds, and what needs the laws themselves
+        raises InputError. Laws of modules that are loaded already are used.
 
     Raises
     ------
     InputError
         If there is no such file, it is not HDF5, was not written by fecontact, holds no run, is
-        damaged, or its system has parameters that this version does not know.
+        damaged, its system has parameters that this version does not know, or its ground, drive
+        or load needs code that is not trusted.
     """
     with open_file(path, "basis") as file:
         if "trajectory" not in file:
             raise InputError(f"{path} holds a modal basis but no run; read it with "
                              f"ModalBasis.load.")
+        basis = read_basis(member(file, "basis"))
+        tables = with_folder(from_json(text(member(file, "system"), "json"), dict, "the system"),
+                             Path(path).parent)
+        stored = member(file, "trajectory")
+        state = _read_state(stored, basis)
+        of_laws = _read_of_laws(stored, basis, len(state["time"]))
+        status = Status[text(stored, "status")]
+        statistics = from_json(text(stored, "statistics"), dict, "the statistics")
+        study = (_changed(text(member(file, "study"), "toml"),
+                          lambda table: with_folder(table, Path(path).parent))
+                 if "study" in file else None)
+        versions = {name: str(one) for name, one in member(file, "versions").attrs.items()}
+    with trusting(trust):
         try:
-            basis = read_basis(file["basis"])
-            tables = with_folder(json.loads(file["system"].attrs["json"]), Path(path).parent)
-            stored = file["trajectory"]
-            state = {name: stored[name][()] for name in _STATE}
-            state |= {name: stored[name][()] for name in _OPTIONAL if name in stored}
-            if "events" in stored:
-                events = stored["events"]
-                state["events"] = Events(
-                    events["time"][()], tuple(kind.decode() for kind in events["kind"][()]),
-                    events["node"][()], events["states"][()])
-            status = Status[stored.attrs["status"]]
-            statistics = json.loads(stored.attrs["statistics"])
-            study = (_changed(str(file["study"].attrs["toml"]),
-                              lambda table: with_folder(table, Path(path).parent))
-                     if "study" in file else None)
-            versions = {name: str(text) for name, text in file["versions"].attrs.items()}
-        except (KeyError, OSError, json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
-            raise InputError(f"{path} is damaged or of another version of fecontact "
-                             f"({error}).") from None
-    system = system_from_tables(basis, tables, str(path))
+            system = system_from_tables(basis, tables, str(path))
+        except UntrustedError as error:
+            if of_laws is None:
+                raise
+            from fecontact.output.recorded import recorded_system
+
+            system = recorded_system(basis, tables, str(path), state, *of_laws, str(error))
+    with reading(path):
+        _require_states(system, state)
     return Case(Trajectory(system=system, status=status, statistics=statistics, **state),
                 study, versions)
+
+
+def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
+    """What a trajectory holds besides system, status and statistics."""
+    time = array(stored, "time", (None,))
+    N, m, n = len(time), basis.modes, basis.contact_nodes
+    if not (N and np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+        raise DamagedError("the output times are not ascending")
+    widths = {"modal_coordinates": m, "modal_velocities": m, "work": len(POWERS), "memory": None}
+    state: dict[str, Any] = {"time": time}
+    for name in (*_STATE, *_OPTIONAL):
+        if name != "time" and (name in _STATE or name in stored):
+            state[name] = array(stored, name, (N, widths.get(name, n)))
+    if "events" in stored:
+        events = member(stored, "events")
+        times = array(events, "time", (None,))
+        nodes = array(events, "node", (len(times),), "i")
+        if len(nodes) and not (nodes.min() >= -1 and nodes.max() < n):
+            raise DamagedError("events name contact nodes that the basis lacks")
+        state["events"] = Events(times, tuple(texts(events, "kind", len(times))), nodes,
+                                 array(events, "states", (len(times), None)))
+    return state
+
+
+def _require_states(system: ContactSystem, state: dict[str, Any]) -> None:
+    """Raise DamagedError unless states have as many internal variables as the laws."""
+    n, memory = system.basis.contact_nodes, state.get("memory")
+    found = 0 if memory is None else memory.shape[1]
+    if found != n * system.memory:
+        raise DamagedError(f"states have {found} internal variables, not {n * system.memory}")
+    if "events" in state and state["events"].states.shape[1] != system.size:
+        raise DamagedError(f"states at events do not have {system.size} values")
+
+
+def _read_of_laws(stored: Any, basis: ModalBasis, count: int) -> tuple[Any, Any, Any] | None:
+    """Contact history, contact states and contact energy of a run with laws of the user's own."""
+    if not all(name in stored for name in _OF_LAWS):
+        return None
+    shape = count, basis.contact_nodes
+    return (np.stack([array(stored, name, shape) for name in _COLUMNS], axis=2),
+            array(stored, "contact_state", shape, "i"),
+            array(stored, "contact_energy", (count,)))
 
 
 def _changed(study: str, change: Callable[[Any], Any]) -> str:
@@ -147,8 +213,12 @@ def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
 
     kept = {name: unit for name, unit in _OPTIONAL.items()
             if getattr(trajectory, name) is not None}
-    for name, unit in (_STATE | kept | _CONTACT).items():
-        data = group.create_dataset(name, data=getattr(trajectory, name))
+    of_laws = _of_laws(trajectory) if law_files(system_tables(trajectory.system)) else {}
+    for name, unit in (_STATE | kept | _CONTACT | _OF_LAWS).items():
+        if name in _OF_LAWS and not of_laws:
+            continue
+        data = group.create_dataset(name, data=of_laws[name] if name in of_laws
+                                    else getattr(trajectory, name))
         data.attrs["unit"] = unit
     if trajectory.events is not None:
         events = group.create_group("events")
@@ -158,6 +228,13 @@ def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
         events.create_dataset("kind", data=list(trajectory.events.kind), dtype=h5py.string_dtype())
     group.attrs["status"] = trajectory.status.name
     group.attrs["statistics"] = json.dumps(trajectory.statistics, default=lambda x: x.item())
+
+
+def _of_laws(trajectory: Trajectory) -> dict[str, Any]:
+    contact = trajectory.system.contact_history(trajectory.time, trajectory.states)
+    return {"penetration_rate": trajectory.penetration_rate,
+            "ground_rate": contact[:, :, GROUND_RATE],
+            "contact_energy": trajectory.energies.contact}
 
 
 def _versions() -> dict[str, str]:

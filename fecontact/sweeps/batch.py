@@ -4,14 +4,12 @@ A batch is all that goes to a worker and rows are all that come back, so that an
 do. Workers import neither Gmsh nor VTK nor matplotlib, unless they are to make meshes.
 """
 
-import os
 import pickle
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict, cast
-from uuid import uuid4
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, FecontactError
@@ -21,6 +19,7 @@ from fecontact.study import Study
 from fecontact.sweeps.settings import Strobing
 from fecontact.sweeps.summaries import functions_for, summarise
 from fecontact.tables import PART_CLASSES
+from fecontact.whole_files import unwritable
 
 BASIS_SECTIONS = ("geometry", "body", "basis")
 
@@ -226,21 +225,12 @@ def _write(batch: Batch, case: Case, study: Study, trajectory: Trajectory) -> No
 
     assert batch.files is not None
     target = case_file(Path(batch.files), case.key)
-    # A name of its own: an executor may run a batch twice.
-    part = target.with_name(f"{case.key}.{uuid4().hex}.part")
     # How long it took differs from run to run, all else is the same to the last bit.
     statistics = {key: value for key, value in trajectory.statistics.items() if key != "seconds"}
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        write_case(part, replace(trajectory, statistics=statistics), frames=batch.frames,
+        write_case(target, replace(trajectory, statistics=statistics), frames=batch.frames,
                    study=study.to_toml())
-        os.replace(part, target)
     except (OSError, FecontactError) as error:
-        reason = str(error) if isinstance(error, FecontactError) else _sentence(target, error)
+        reason = str(error) if isinstance(error, FecontactError) else unwritable(target, error)
         raise UnwritableError(reason) from None
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _sentence(path: Path, error: OSError) -> str:
-    return f"{path} cannot be written ({(error.strerror or str(error)).lower()})."

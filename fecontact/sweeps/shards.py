@@ -8,14 +8,20 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
+from fecontact.stored import DamagedError, from_json, reading
 from fecontact.sweeps.batch import Row, case_file
-from fecontact.whole_files import replaced
+from fecontact.whole_files import clear_leftovers, replaced
+
+_SUFFIXES = {"shards": ".json", "cases": ".vtkhdf", "bases": ".h5"}
+_OURS = re.compile(r"[0-9a-f]{24}")  # hashes, of rows, cases and bases
 
 
 @dataclass(frozen=True)
@@ -47,16 +53,12 @@ class Store:
             If a shard cannot be read.
         """
         found: dict[str, Row] = {}
-        for path in sorted((self.folder / "shards").glob("*.json")):
-            try:
-                rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
-                for row in rows:
-                    if not row.keys() >= Row.__required_keys__:
-                        raise KeyError("a row is not whole")
+        for path in self.kept("shards"):
+            with reading(path, "damaged; remove it, and its cases are computed again"):
+                shard = from_json(path.read_text(encoding="utf-8"), dict, "the shard")
+                for row in shard["rows"]:
+                    _require_row(row)
                     self._take(row, found)
-            except (OSError, ValueError, KeyError, TypeError) as error:
-                raise InputError(f"{path} is damaged ({error}); remove it, and its cases are "
-                                 f"computed again.") from None
         return found
 
     def _take(self, row: Row, found: dict[str, Row]) -> None:
@@ -92,11 +94,15 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             basis.save(path)
 
+    def kept(self, what: str) -> list[Path]:
+        """The files that sweeps have kept in ``shards``, ``cases`` or ``bases``, by their names."""
+        return sorted(path for path in (self.folder / what).glob(f"*{_SUFFIXES[what]}")
+                      if _OURS.fullmatch(path.stem))
+
     def tidy(self) -> None:
         """Remove what a killed sweep has left half written."""
         for name in ("", "shards", "bases", "cases"):
-            for part in (self.folder / name).glob("*.part*"):
-                part.unlink(missing_ok=True)
+            clear_leftovers(self.folder / name)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -132,6 +138,16 @@ class Store:
             os.close(descriptor)
 
 
+def _require_row(row: Any) -> None:
+    """Raise DamagedError unless a stored row is a whole one."""
+    if not (isinstance(row, dict) and row.keys() >= Row.__required_keys__
+            and isinstance(row["case"], str) and isinstance(row["reason"], str)
+            and isinstance(row["values"], dict) and isinstance(row.get("points", []), list)
+            and all(isinstance(value, int | float)
+                    for value in (*row["values"].values(), *row.get("points", [])))):
+        raise DamagedError("a row is not whole")
+
+
 def write_whole(path: Path, text: str) -> None:
     """Write a text file whole or not at all, also when several processes do so at once.
 
@@ -140,6 +156,7 @@ def write_whole(path: Path, text: str) -> None:
     InputError
         If it cannot be written.
     """
-    with replaced(path) as part:
+    with contextlib.suppress(OSError):  # said by what follows
         path.parent.mkdir(parents=True, exist_ok=True)
+    with replaced(path) as part:
         part.write_text(text, encoding="utf-8")

@@ -108,10 +108,15 @@ def sweep(
     work = _Work.of(base, wanted, plan(wanted))
     place = Path(folder) if folder is not None else base.results / f"{base.name}-sweep"
     store = Store(place, files=wanted.keep != "none")
+    described = place / "sweep.toml"
+    if study.path is not None and described.exists() and described.samefile(study.path):
+        raise InputError(f"The sweep would write {described} in the place of its study; choose "
+                         f"another folder, or another name for the study.")
     with _folder(place), store.locked():
         _clear_or_refuse(store, resume=resume, overwrite=overwrite)
-        write_whole(place / "sweep.toml", replace(study, sweep=wanted).to_toml())
+        write_whole(described, replace(study, sweep=wanted).to_toml())
         rows = store.rows()
+        work.require_points(rows)
         if retry:
             rows = {key: row for key, row in rows.items() if not row["reason"]}
         try:
@@ -179,6 +184,16 @@ class _Work:
             [None if row is None else row["reason"] for row in found],
             shape=self.plan.shape, folder=folder, strobed=self._strobed(found))
 
+    def require_points(self, rows: Mapping[str, Row]) -> None:
+        """Raise InputError if a stored case has another number of points than is kept of each."""
+        keep = 0 if self.settings.strobe is None else self.settings.strobe.keep
+        for case in self.cases:
+            points = rows[case.key].get("points") if case.key in rows else None
+            if points is not None and len(points) != keep:
+                raise InputError(f"The stored case {case.key} has {len(points)} displacements, one "
+                                 f"a period, not {keep}; compute it again with --overwrite "
+                                 f"(overwrite=True).")
+
     def _strobed(self, rows: Sequence[Row | None]) -> NDArray[np.float64] | None:
         if self.settings.strobe is None:
             return None
@@ -213,12 +228,11 @@ def _folder(folder: Path) -> Iterator[None]:
 
 def _clear_or_refuse(store: Store, *, resume: bool, overwrite: bool) -> None:
     store.tidy()
-    kept = [path for name in ("shards/*.json", "cases/*.vtkhdf", "bases/*.h5")
-            for path in store.folder.glob(name)]
     if overwrite:
-        for path in kept:
-            path.unlink(missing_ok=True)
-    elif not resume and any(path.suffix == ".json" for path in kept):
+        for what in ("shards", "cases", "bases"):
+            for path in store.kept(what):
+                path.unlink(missing_ok=True)
+    elif not resume and store.kept("shards"):
         raise InputError(f"{store.folder} holds a sweep; go on with --resume (resume=True), begin "
                          f"anew with --overwrite (overwrite=True), or choose another folder.")
 

@@ -163,18 +163,23 @@ def read_table(path: str | Path) -> SweepTable:
             columns["key"],
             [None if status == "missing" else reason
              for status, reason in zip(columns["status"], columns["reason"], strict=True)],
-            folder=path.parent, strobed=_read_strobed(_strobed_file(path)))
+            folder=path.parent, strobed=_read_strobed(_strobed_file(path), len(rows)))
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; run the sweep first.") from None
-    except (OSError, ValueError, KeyError, IndexError):
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError, IndexError, csv.Error, RecursionError):
         raise InputError(f"{path} is not the table of a sweep.") from None
 
 
-def _read_strobed(path: Path) -> Array | None:
+def _read_strobed(path: Path, count: int) -> Array | None:
     if not path.is_file():
         return None
     with path.open(encoding="utf-8", newline="") as file:
-        return np.array([[float(text or "nan") for text in row[1:]] for row in csv.reader(file)])
+        rows = [[float(text or "nan") for text in row[1:]] for row in csv.reader(file)]
+    if len(rows) != count:
+        raise InputError(f"{path} has {len(rows)} lines, not one for each of the {count} cases.")
+    return np.array(rows)
 
 
 def _is_parameter(name: str) -> bool:

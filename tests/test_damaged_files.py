@@ -1,0 +1,305 @@
+"""Files of results that were cut, changed or made up: one sentence each, and nothing else."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from sweep_study import Serial, write_study
+from synthetic import basis, run
+
+from fecontact import Range, load_branches, read_table, save_branches, sweep
+from fecontact.basis import ModalBasis
+from fecontact.bifurcation.branch import Branch, BranchPoint, Status
+from fecontact.errors import InputError
+from fecontact.integrate.events import Events
+from fecontact.output.store import read_case, write_case
+from fecontact.stored import DamagedError, npz_arrays
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    path = tmp_path_factory.mktemp("case") / "case.vtkhdf"
+    trajectory = run(basis(contact_nodes=3), times=7)
+    events = Events(np.array([0.01]), ("stick",), np.array([1]), trajectory.states[:1])
+    object.__setattr__(trajectory, "events", events)
+    return write_case(path, trajectory, frames=0, study='[ground]\nspeed = 0.1\n')
+
+
+def longer(name):
+    """A change of a file: one more row of a dataset."""
+    def change(file):
+        data = file[name][()]
+        del file[name]
+        file[name] = np.concatenate([data, data[:1]])
+    return change
+
+
+def other(name, data):
+    """A change of a file: something else in the place of a dataset."""
+    def change(file):
+        del file[name]
+        file[name] = data
+    return change
+
+
+def huge(name, shape):
+    """A change of a file: a dataset that is said to be large, without its values."""
+    def change(file):
+        del file[name]
+        file.create_dataset(name, shape=shape, dtype="f8")
+    return change
+
+
+def attribute(group, name, value):
+    """A change of a file: an attribute."""
+    def change(file):
+        file[group].attrs[name] = value
+    return change
+
+
+def external(name):
+    """A change of a file: values that lie in another file."""
+    def change(file):
+        del file[name]
+        file.create_dataset(name, shape=(7,), dtype="f8", external=[("/etc/passwd", 0, 56)])
+    return change
+
+
+def linked(name):
+    """A change of a file: a link into another file."""
+    def change(file):
+        del file[name]
+        file[name] = h5py.ExternalLink("other.h5", "/x")
+    return change
+
+
+DAMAGES = {
+    "not-json": attribute("system", "json", "{ not json"),
+    "json-list": attribute("system", "json", "[1, 2]"),
+    "json-number": attribute("system", "json", 5),
+    "json-deep": attribute("system", "json", "[" * 100_000),
+    "json-digits": attribute("system", "json", '{"gap": ' + "9" * 5000 + "}"),
+    "json-wrong": attribute("system", "json", '{"ground": 3}'),
+    "json-contact": attribute("system", "json", '{"contact": [1]}'),
+    "json-group": attribute("system", "json", '{"contact": {"contact": {"drive": {}}}}'),
+    "json-gap": attribute("system", "json", '{"gap": "wide"}'),
+    "no-json": lambda file: file["system"].attrs.pop("json"),
+    "no-system": lambda file: file.pop("system"),
+    "statistics": attribute("trajectory", "statistics", '"fast"'),
+    "status": attribute("trajectory", "status", "DONE"),
+    "status-number": attribute("trajectory", "status", 3),
+    "study": attribute("study", "toml", "[[[ not toml"),
+    "study-deep": attribute("study", "toml", "a = " + "[" * 5000),
+    "study-number": attribute("study", "toml", 1.0),
+    "time-long": longer("trajectory/time"),
+    "time-back": other("trajectory/time", np.linspace(1.0, 0.0, 7)),
+    "time-nan": other("trajectory/time", np.full(7, np.nan)),
+    "time-text": other("trajectory/time", [b"a"] * 7),
+    "time-scalar": other("trajectory/time", 1.0),
+    "time-empty": other("trajectory/time", h5py.Empty("f8")),
+    "time-huge": huge("trajectory/time", (10**12,)),
+    "time-external": external("trajectory/time"),
+    "time-linked": linked("trajectory/time"),
+    "q-long": longer("trajectory/modal_coordinates"),
+    "q-narrow": other("trajectory/modal_coordinates", np.zeros((7, 2))),
+    "q-huge": huge("trajectory/modal_coordinates", (7, 10**12)),
+    "rate-flat": other("trajectory/modal_velocities", np.zeros(7)),
+    "work-complex": other("trajectory/work", np.zeros((7, 8), dtype=complex)),
+    "work-narrow": other("trajectory/work", np.zeros((7, 3))),
+    "friction-work": lambda file: file["trajectory"].create_dataset(
+        "node_friction_work", data=np.zeros((7, 99))),
+    "states-of-memory": lambda file: file["trajectory"].create_dataset(
+        "memory", data=np.zeros((7, 3))),
+    "event-node": other("trajectory/events/node", np.array([99])),
+    "event-time": longer("trajectory/events/time"),
+    "event-kind": other("trajectory/events/kind", np.array([1])),
+    "event-states": other("trajectory/events/states", np.zeros((1, 3))),
+    "event-group": other("trajectory/events", 1.0),
+    "trajectory": other("trajectory", np.zeros(3)),
+    "basis": other("basis", np.zeros(3)),
+    "frequencies": huge("basis/angular_frequencies", (10**11,)),
+    "damping": other("basis/damping", np.zeros((2, 3))),
+    "rows": other("basis/T", np.zeros((1, 3, 5))),
+    "tributary": other("basis/tributary", np.zeros(3)),
+    "tributary-long": longer("basis/tributary"),
+    "groups": attribute("basis", "group_sizes", [1, 2]),
+    "groups-text": attribute("basis", "group_sizes", ["x"]),
+    "groups-large": attribute("basis", "group_sizes", [10**15]),
+    "extra": attribute("basis", "extra", ["E"] * 5),
+    "cells": lambda file: file["basis/field/cells"].write_direct(
+        np.full(file["basis/field/cells"].shape, 10**9)),
+    "outline": lambda file: file["basis/field/outline"].write_direct(
+        np.full(file["basis/field/outline"].shape, -1)),
+    "shapes": other("basis/field/shapes", np.zeros((3, 2, 5))),
+    "restriction": lambda file: file["basis/field/restriction/indices"].write_direct(
+        np.full(file["basis/field/restriction/indices"].shape, 10**6,
+                dtype=file["basis/field/restriction/indices"].dtype)),
+    "restriction-starts": lambda file: file["basis/field/restriction/indptr"].write_direct(
+        file["basis/field/restriction/indptr"][()][::-1].copy()),
+    "restriction-shape": attribute("basis/field/restriction", "shape", [10**12, 10**12]),
+    "restriction-short": other("basis/field/restriction/data", np.zeros(1)),
+}
+
+
+@pytest.mark.parametrize("change", DAMAGES.values(), ids=DAMAGES.keys())
+def test_a_damaged_run_is_one_sentence(case, change, tmp_path):
+    path = tmp_path / "damaged.vtkhdf"
+    path.write_bytes(case.read_bytes())
+    with h5py.File(path, "a") as file:
+        change(file)
+    with pytest.raises(InputError) as caught:
+        read_case(path)
+    said = str(caught.value)
+    assert said.startswith(str(path))
+    assert "\n" not in said
+    assert len(said) < 700
+
+
+def test_a_run_cut_anywhere_is_refused(case, tmp_path):
+    whole, path = case.read_bytes(), tmp_path / "cut.vtkhdf"
+    for place in np.linspace(0, len(whole) - 1, 60).astype(int):
+        path.write_bytes(whole[:place])
+        with pytest.raises(InputError, match=r"cut\.vtkhdf"):
+            read_case(path)
+
+
+def branches():
+    points = tuple(BranchPoint(np.array([0.1 * k, 1.0 + k]), np.array([1.0, 0.0]),
+                               {"stable": True, "observed": 0.2 * k},
+                               "fold" if k == 1 else None,
+                               {"coefficient": 3.0} if k == 1 else {}) for k in range(4))
+    return {"main": Branch("ground.speed", points, Status.BOUND, "", {"nodes": 4})}
+
+
+@pytest.mark.parametrize("change", [
+    longer("branches/0/u"), other("branches/0/u", np.zeros(3)), huge("branches/0/u", (4, 10**12)),
+    longer("branches/0/tangent"), other("branches/0/kind", np.zeros(4)),
+    longer("branches/0/values/observed"), huge("branches/0/values/observed", (10**12,)),
+    other("branches/0/values", 1.0), attribute("branches/0", "status", "GOOD"),
+    attribute("branches/0", "parameter", 3), lambda file: file.move("branches/0", "branches/x"),
+    other("branches/0/details/1/coefficient", h5py.Empty("f8")),
+    other("branches/0", np.zeros(2)), linked("branches/0/u"),
+])
+def test_a_damaged_branch_is_one_sentence(change, tmp_path):
+    path = save_branches(tmp_path / "b.h5", branches())
+    found = load_branches(path)["main"]
+    assert [point.kind for point in found.points] == [None, "fold", None, None]
+    assert found.points[1].details == {"coefficient": 3.0}
+    assert np.array_equal(found.column("observed"), 0.2 * np.arange(4))
+    with h5py.File(path, "a") as file:
+        change(file)
+    with pytest.raises(InputError) as caught:
+        load_branches(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_damaged_basis_is_one_sentence(tmp_path):
+    path = tmp_path / "basis.h5"
+    run(times=3).system.basis.save(path)
+    with h5py.File(path, "a") as file:
+        huge("basis/T", (10**6, 3, 10**6))(file)
+    with pytest.raises(InputError, match=r"basis\.h5 is damaged"):
+        ModalBasis.load(path)
+
+
+SHARDS = {
+    "text": "not json", "deep": "[" * 100_000, "list": "[1, 2]", "no-rows": "{}",
+    "number": '{"rows": 3}', "rows": '{"rows": [1]}', "part": '{"rows": [{"case": "x"}]}',
+    "case": '{"rows": [{"case": 3, "values": {}, "reason": ""}]}',
+    "values": '{"rows": [{"case": "x", "values": [1], "reason": ""}]}',
+    "value": '{"rows": [{"case": "x", "values": {"a": "b"}, "reason": ""}]}',
+    "reason": '{"rows": [{"case": "x", "values": {}, "reason": null}]}',
+    "points": '{"rows": [{"case": "x", "values": {}, "reason": "", "points": ["a"]}]}',
+    "digits": '{"rows": ' + "9" * 5000 + "}",
+}
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("swept")
+    study = write_study(folder)
+    sweep(study, {"ground.speed": Range(1e-3, 2e-3, 2)}, Serial(), folder=folder / "f",
+          summaries=["amplitude_x"])
+    return study, folder / "f"
+
+
+@pytest.mark.parametrize("content", SHARDS.values(), ids=SHARDS.keys())
+def test_a_damaged_shard_is_one_sentence(swept, content):
+    study, folder = swept
+    shard = folder / "shards" / ("0" * 24 + ".json")
+    shard.write_text(content)
+    try:
+        with pytest.raises(InputError) as caught:
+            sweep(study, {"ground.speed": Range(1e-3, 2e-3, 2)}, Serial(), folder=folder,
+                  summaries=["amplitude_x"], resume=True)
+        assert str(caught.value).startswith(
+            f"{shard} is damaged; remove it, and its cases are computed again")
+        assert "\n" not in str(caught.value)
+    finally:
+        shard.unlink()
+
+
+def test_stored_displacements_of_another_number_are_refused(swept, tmp_path):
+    study, _ = swept
+    options = {"strobe": {"keep": 3, "transient": 1}}
+    axes = {"ground.speed": [1e-3]}
+    sweep(study, axes, Serial(), folder=tmp_path / "f", **options)
+    (shard,) = (tmp_path / "f" / "shards").glob("*.json")
+    stored = json.loads(shard.read_text())
+    stored["rows"][0]["points"] = [1.0, 2.0]
+    shard.write_text(json.dumps(stored))
+    with pytest.raises(InputError, match="has 2 displacements, one a period, not 3"):
+        sweep(study, axes, Serial(), folder=tmp_path / "f", resume=True, **options)
+
+
+@pytest.mark.parametrize("content", [
+    "", "case\n", "case,key,ground.speed,status,reason\n0,x,[[[[,finished,\n",
+    "case,key,ground.speed,status,reason\n0,x," + "[" * 100_000 + ",finished,\n",
+    "case,key,status,reason\n0,x,finished\n", "a\0b", "x" * 200_000,
+])
+def test_a_damaged_table_is_one_sentence(content, tmp_path):
+    (tmp_path / "index.csv").write_text(content)
+    with pytest.raises(InputError, match=r"index\.csv is not the table of a sweep"):
+        read_table(tmp_path / "index.csv")
+
+
+def test_sweeps_remove_only_what_they_made(swept, tmp_path):
+    study, _ = swept
+    place = tmp_path / "here"
+    for name in ("notes.part", "thesis.part1.tex", "cases/mine.vtkhdf", "bases/mine.h5",
+                 "shards/mine.json"):
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        (place / name).write_text("of the user")
+    for _ in range(2):
+        sweep(study, {"ground.speed": [1e-3]}, Serial(), folder=place, overwrite=True,
+              summaries=["amplitude_x"], keep="histories")
+    mine = [path for path in place.rglob("*") if path.is_file()
+            and path.read_bytes() == b"of the user"]
+    assert len(mine) == 5
+    assert len(list((place / "shards").iterdir())) == 2
+    text = study.read_text()
+    (tmp_path / "sweep.toml").write_text(text)
+    with pytest.raises(InputError, match=r"would write .*sweep\.toml in the place of its study"):
+        sweep(tmp_path / "sweep.toml", {"ground.speed": [1e-3]}, Serial(), folder=tmp_path)
+    assert (tmp_path / "sweep.toml").read_text() == text
+
+
+def test_arrays_that_a_file_does_not_hold(tmp_path):
+    import zipfile
+
+    header = np.lib.format.magic(1, 0)
+    text = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }"
+    text = text.ljust(117) + "\n"
+    header += len(text).to_bytes(2, "little") + text.encode()
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("x.npy", header)
+    with pytest.raises(DamagedError, match="not held by the file"):
+        npz_arrays(tmp_path / "a.npz")
+    np.savez_compressed(tmp_path / "b.npz", x=np.zeros((2000, 500)),
+                        y=np.asfortranarray(np.arange(6.0).reshape(2, 3)), z=np.array(3))
+    found = npz_arrays(tmp_path / "b.npz")
+    assert found["x"].shape == (2000, 500)
+    assert np.array_equal(found["y"], np.arange(6.0).reshape(2, 3))
+    assert found["z"] == 3

@@ -1,0 +1,149 @@
+"""Signals: what ends a command, and what Gmsh does to them."""
+
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from fecontact.cli import execute
+from fecontact.console import ending_signals, interrupted_code
+from fecontact.geometry import Beam, generate
+from fecontact.integrate.trajectory import Status
+from fecontact.output.store import read_case
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+
+STUDY = """
+geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.01 }
+body = { material = "steel", thickness = 0.02 }
+basis = { modes = 5, contact_nodes = 4, damping = 0.01 }
+ground = { speed = 0.1, amplitude = 1e-5 }
+load = { normal = 10.0 }
+simulation = { t_end = 1e5, outputs = 100001 }
+output = { frames = 0 }
+"""
+RUN = """
+import signal, sys, threading
+from fecontact.cli import execute
+from fecontact.integrate.control import Run
+
+advance = Run.advance
+def told(run, steps):
+    if run.outputs:
+        print("running", file=sys.stderr, flush=True)
+    return advance(run, steps)
+Run.advance = told
+sys.exit(execute(["run", sys.argv[1]]))
+"""
+
+
+def files(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize("deaf", [False, True])
+def test_sigterm_writes_the_run_and_its_checkpoint(tmp_path, deaf):
+    """As Ctrl-C does, also where that is ignored; more of them change nothing."""
+    (tmp_path / "s.toml").write_text(STUDY)
+    ignored = signal.SIG_IGN if deaf else signal.default_int_handler
+    process = subprocess.Popen(
+        [sys.executable, "-c", RUN, str(tmp_path / "s.toml")], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, ignored))
+    assert process.stderr.readline() == "running\n"
+    for _ in range(3):
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.05)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM, err
+    assert set(err.splitlines()) <= {"running"}
+    assert "The run was interrupted" in out
+    assert {"s.checkpoint", "s.vtkhdf", "s-history.png"} <= set(files(tmp_path / "results"))
+    run = read_case(tmp_path / "results" / "s.vtkhdf").trajectory
+    assert run.status is Status.INTERRUPTED
+    assert 0.0 < run.time[-1] < 1e5
+
+
+def test_a_run_that_is_ended_before_its_first_step_leaves_nothing(tmp_path):
+    (tmp_path / "s.toml").write_text(STUDY)
+    code = RUN.replace("def told(run, steps):", "def told(run, steps):\n"
+                       "    signal.raise_signal(signal.SIGTERM)")
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "s.toml")], text=True,
+                          capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (143, "error: interrupted.\n")
+    assert files(tmp_path) == ["s.toml"]
+
+
+def test_a_closed_terminal_writes_the_run(tmp_path):
+    """SIGHUP comes, and all that is written to the terminal from then on is an error."""
+    (tmp_path / "s.toml").write_text(STUDY)
+    child, terminal = pty.fork()
+    if child == 0:
+        os.execv(sys.executable, [sys.executable, "-c", RUN, str(tmp_path / "s.toml")])
+    seen = b""
+    while b"running" not in seen:
+        seen += os.read(terminal, 1000)
+    os.close(terminal)
+    _, status = os.waitpid(child, 0)
+    assert os.WIFEXITED(status)
+    assert os.WEXITSTATUS(status) == 128 + signal.SIGHUP
+    assert {"s.checkpoint", "s.vtkhdf", "s-energies.png"} <= set(files(tmp_path / "results"))
+
+
+def test_handlers_are_as_before_afterwards():
+    handlers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in handlers]
+    assert execute(["laws"]) == 0
+    assert [signal.getsignal(number) for number in handlers] == before
+    ignored = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with ending_signals():
+            signal.raise_signal(signal.SIGHUP)  # as under nohup
+            assert interrupted_code() == 130
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGTERM)
+            assert interrupted_code() == 143
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, ignored)
+    assert interrupted_code() == 130
+    found = []
+    thread = threading.Thread(target=lambda: found.append(execute(["laws", "none"])))
+    thread.start()
+    thread.join()
+    assert found == [1]
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="looks at signals in /proc")
+def test_gmsh_leaves_all_signals_as_they_were():
+    """A closed pipe stays an error of Python's, and handlers of the caller's stay in place."""
+    def dispositions():
+        return re.findall(r"^Sig(?:Ign|Cgt):.*$", Path("/proc/self/status").read_text(),
+                          re.MULTILINE)
+
+    import gmsh  # noqa: F401  before: it loads libraries with a signal of their own
+
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        kept = dispositions()
+        generate(Beam(length=0.1, height=0.01, element_size=0.01))
+        assert dispositions() == kept
+        thread = threading.Thread(
+            target=generate, args=(Beam(length=0.1, height=0.01, element_size=0.01),))
+        thread.start()
+        thread.join()
+        assert dispositions() == kept
+        read, write = os.pipe()
+        os.close(read)
+        with pytest.raises(BrokenPipeError):
+            os.write(write, b"x")
+        os.close(write)
+    finally:
+        signal.signal(signal.SIGTERM, before)

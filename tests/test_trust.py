@@ -1,0 +1,186 @@
+"""Files of runs name files of Python: none of them is run without being asked."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fecontact as fc
+from fecontact.cli import execute
+from fecontact.study import Study
+
+LAW = """
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from fecontact import NormalLaw, normal_law
+
+with Path(__file__).with_name("ran").open("a") as file:
+    file.write("x")
+
+
+@normal_law
+def stiff(u, v, p):
+    if u <= 0.0:
+        return 0.0, 0.0, 0.0
+    return p[0] * u, p[0], 0.0
+
+
+@dataclass(frozen=True)
+class Stiff(NormalLaw):
+    stiffness: float = 2e6
+    kernel: ClassVar = stiff
+    penetration_scale: ClassVar = 1e-6
+"""
+STUDY = """
+geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.01 }
+body = { material = "steel", thickness = 0.02 }
+basis = { modes = 5, contact_nodes = 4 }
+load = { normal = 10.0 }
+ground = { speed = 0.1, amplitude = 1e-5 }
+simulation = { t_end = 2e-3, outputs = 101 }
+output = { frames = 3 }
+render = { frames = 2, size = [320, 180] }
+normal = { law = "own.py:Stiff" }
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A run with a law of the user's own, made by another process."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "own.py").write_text(LAW)
+    (folder / "s.toml").write_text(STUDY)
+    subprocess.run([sys.executable, "-m", "fecontact", "run", str(folder / "s.toml")], check=True,
+                   capture_output=True, timeout=120)
+    assert (folder / "ran").read_text() == "x"
+    return folder
+
+
+@pytest.fixture
+def stored(made, tmp_path):
+    """A copy of it, whose law was never loaded here."""
+    for name in ("own.py", "s.toml", "results/s.vtkhdf"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes((made / name).read_bytes())
+    return tmp_path / "results" / "s.vtkhdf"
+
+
+def ran(stored):
+    return (stored.parent.parent / "ran").exists()
+
+
+def test_what_is_stored_needs_no_code(stored):
+    """All that pictures and tables show is that of the run, to the last bit."""
+    safe = fc.read_case(stored).trajectory
+    assert not ran(stored)
+    energies, contact = safe.energies, safe.contact_state
+    part = fc.window(safe, 5e-4, 1e-3)
+    assert not ran(stored)
+    whole = fc.read_case(stored, trust=True).trajectory
+    assert ran(stored)
+    assert (whole.normal_force > 0.0).any()
+    for name in ("normal_force", "friction_force", "penetration", "penetration_rate",
+                 "slip_velocity", "friction_work", "states"):
+        assert np.array_equal(getattr(safe, name), getattr(whole, name)), name
+    assert np.array_equal(contact, whole.contact_state)
+    assert np.array_equal(energies.contact, whole.energies.contact)
+    assert energies.imbalance == whole.energies.imbalance
+    assert np.array_equal(part.contact_state, fc.window(whole, 5e-4, 1e-3).contact_state)
+
+
+def test_what_needs_the_law_says_so(stored):
+    system = fc.read_case(stored).trajectory.system
+    state = np.zeros(system.size)
+    for ask in (lambda: system.rhs(0.0, state), lambda: system.penetration_scale,
+                lambda: system.with_(gap=1e-6), lambda: system.parameters(),
+                lambda: fc.simulate(system, 1e-3),
+                lambda: system.stored_energy(np.full((1, 4), 1e-9)),
+                lambda: system.contact_history(np.zeros(1), state[None])):
+        with pytest.raises(fc.InputError, match=r"own\.py.*if you trust .*own\.py, say --trust"):
+            ask()
+    assert not ran(stored)
+
+
+def test_the_command_line_runs_nothing_unasked(stored, capsys):
+    out = stored.parent / "out"
+    for kind in ("contact", "energies", "friction_work", "receptance"):
+        code = execute(["plot", str(stored), kind, "-o", str(out / f"{kind}.png")])
+        said = capsys.readouterr().err
+        assert (code, said) == (0, "") or (
+            kind == "receptance" and code == 1 and said.count("\n") == 1 and "--trust" in said)
+    for form in ("pvd", "csv"):
+        assert execute(["export", str(stored), "--format", form, "--frames", "2"]) == 0
+    assert execute(["render", str(stored), "-o", str(out / "a.mp4")]) == 0 or (
+        "apt-get" in capsys.readouterr().err)
+    assert not ran(stored)
+    assert execute(["plot", str(stored), "receptance", "--trust", "-o", str(out / "r.png")]) == 0
+    assert ran(stored)
+
+
+def test_a_study_of_ones_own_names_its_law(stored, capsys):
+    """Whoever gives the study gives its law; but not one that the run alone names."""
+    study = stored.parent.parent / "s.toml"
+    assert execute(["plot", str(study), "energies"]) == 0
+    assert "other values" not in capsys.readouterr().err
+    assert ran(stored)
+    (stored.parent.parent / "ran").unlink()
+    hostile = stored.parent / "hostile.py"
+    hostile.write_text("from pathlib import Path\nPath(__file__).with_name('harm').touch()\n")
+    with h5py.File(stored, "a") as file:
+        tables = json.loads(file["system"].attrs["json"])
+        tables["friction"] = {"law": "hostile.py:Harm"}
+        file["system"].attrs["json"] = json.dumps(tables)
+        file["study"].attrs["toml"] = STUDY + '\nfriction = { law = "hostile.py:Harm" }\n'
+    assert execute(["plot", str(study), "history"]) == 0
+    assert "other values" in capsys.readouterr().err
+    assert not (stored.parent / "harm").exists()
+
+
+@pytest.mark.parametrize("place", [
+    {"normal": {"law": "hostile.py:Harm"}}, {"friction": {"law": "hostile.py:Harm"}},
+    {"ground": {"profile": {"law": "hostile.py:Harm"}}},
+    {"ground": {"motion": {"law": "hostile.py:Harm"}}},
+    {"drive": {"motion_x": {"law": "hostile.py:Harm"}}},
+    {"load": {"forces": [{"point": "C", "direction": "x",
+                          "signal": {"law": "hostile.py:Harm"}}]}},
+    {"contact": {"contact": {"normal": {"law": "hostile.py:Harm"}}}},
+])
+def test_a_hostile_file_runs_nothing(stored, place, capsys):
+    hostile = stored.parent / "hostile.py"
+    hostile.write_text("from pathlib import Path\nPath(__file__).with_name('harm').touch()\n")
+    with h5py.File(stored, "a") as file:
+        tables = json.loads(file["system"].attrs["json"])
+        file["system"].attrs["json"] = json.dumps({
+            key: {**table, **place.get(key, {})} if isinstance(table, dict) else table
+            for key, table in tables.items()} | {
+                key: table for key, table in place.items() if key not in tables})
+    for tokens in (["plot", str(stored), "history", "-o", str(stored.parent / "a.png")],
+                   ["export", str(stored), "--format", "csv"]):
+        code = execute(tokens)
+        said = capsys.readouterr().err
+        assert code in (0, 1)
+        assert said.count("\n") == code
+        assert "Traceback" not in said
+        assert "should not happen" not in said
+    assert not (stored.parent / "harm").exists()
+    assert not ran(stored)
+
+
+def test_a_law_that_is_loaded_needs_no_trust(tmp_path, monkeypatch):
+    """A script that defines its law, runs and reads the run again."""
+    (tmp_path / "mylaws.py").write_text(LAW)
+    monkeypatch.syspath_prepend(tmp_path)
+    import mylaws  # type: ignore[import-not-found]
+
+    (tmp_path / "s.toml").write_text(STUDY.replace("own.py", "mylaws.py"))
+    system = Study.read(tmp_path / "s.toml").with_(
+        **{"simulation.outputs": 3}).system().with_(normal=mylaws.Stiff())
+    written = fc.write_case(tmp_path / "a.vtkhdf", fc.simulate(system, 1e-5, outputs=3))
+    assert type(fc.read_case(written).trajectory.system.normal) is mylaws.Stiff
+    assert Path(tmp_path / "ran").read_text() == "xx"  # by import, and by the study
