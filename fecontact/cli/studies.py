@@ -94,6 +94,7 @@ def run(
     Ctrl-C stops the run; what was computed until then is written, and --resume goes on from there.
     """
     from fecontact.console import output_folder, progress_bar, waiting
+    from fecontact.locks import locked
     from fecontact.report import notes, run_table
     from fecontact.results import read_study, write_run
 
@@ -101,7 +102,10 @@ def run(
     t_end = described.t_end
     with waiting("Compiling, once after an installation"):
         from fecontact.integrate import control  # noqa: F401
-    with output_folder(output or described.results) as folder:
+    with (output_folder(output or described.results) as folder,
+          locked(folder / f".{described.name}.lock",
+                 f"Another run is writing {folder / described.name}.vtkhdf; wait for it, or choose "
+                 f"another folder with -o.")):
         with waiting("Computing modes"):
             described.system()
         checkpoint = folder / f"{described.name}.checkpoint"

@@ -15,6 +15,7 @@ from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.memory import require_memory
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -98,6 +99,8 @@ def simulate(
         raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")
     if t_start is None:
         t_start = float(initial.time[-1]) if isinstance(initial, Trajectory) else 0.0
+    if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
+        require_memory("outputs", int(outputs), _row_size(system))
     times = output_times(t_start, t_end, outputs)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
@@ -157,6 +160,13 @@ def simulate(
                       memory=states[:, 2 * m :] if system.memory else None, **rest)
 
 
+def _row_size(system: ContactSystem) -> float:
+    """Memory for an output time [bytes]: states and work, copied once, and contact quantities."""
+    n = system.basis.contact_nodes
+    states = 2 * system.basis.modes + n * system.memory
+    return 8.0 * (2 * (states + len(POWERS) + n) + 10 * n)
+
+
 def _grows(system: ContactSystem, times: Array, states: Array, work: Array, rtol: float) -> bool:
     """Whether energy came from nowhere, by some of the output times."""
     some = np.unique(np.linspace(0, len(times) - 1, min(len(times), _LOOKS)).astype(int))
@@ -190,7 +200,12 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         if outputs < 2:
             raise InputError(f"outputs = {outputs} must be at least 2.")
-        return np.linspace(t_start, t_end, int(outputs))
+        times = np.linspace(t_start, t_end, int(outputs))
+        if not (np.diff(times) > 0.0).all():
+            raise InputError(f"t_end = {t_end!r} is too near t_start = {t_start!r} for outputs = "
+                             f"{outputs}: floating-point numbers cannot tell so many times apart; "
+                             f"end later or take fewer outputs.")
+        return times
     try:
         times = np.array(outputs, dtype=float)
     except (TypeError, ValueError):

@@ -26,6 +26,7 @@ Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
 _SMALLEST = (320, 180)
+_MOVING, _STILL = 2, 4  # pixels rendered for each of a movie and of a still, in both directions
 _STILL_FRAMES = 200  # whose range of colours and motion a still shares with a movie
 
 
@@ -103,7 +104,7 @@ def render(
     motion = Motion(trajectory, indices, colour, scale)
     lasting = float(motion.times[-1] - motion.times[0])
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
-    require_rendering()
+    require_rendering(size, _MOVING)
     with (_held_back_interrupt() as check,
           _movie_file(path, size, fps) if movie else _numbered_files(path) as take):
         for done, image in enumerate(_images(motion, size, title, slowness), start=1):
@@ -159,7 +160,7 @@ def picture(
                                                                             - time)))
     chosen = frame_indices(trajectory.time, _STILL_FRAMES)
     motion = Motion(trajectory, np.union1d(chosen, [at]), colour, scale)
-    require_rendering()
+    require_rendering(size, _STILL)
     frame = int(np.searchsorted(motion.indices, at))
     (image,) = _images(motion, size, title, None, only=frame)
     part = path.with_name(path.name + ".part")
@@ -176,7 +177,7 @@ def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: 
     """Pictures (height, width, 3) of all frames of a motion, or of one."""
     furniture = Furniture(motion, *size, title, slowness)
     scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
-                  fineness=2 if only is None else 4)
+                  fineness=_MOVING if only is None else _STILL)
     with scene:
         for frame in range(len(motion.indices)) if only is None else (only,):
             yield furniture.around(scene.image(frame), frame)
@@ -195,7 +196,8 @@ def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
                                   f"imageio-ffmpeg, or write .png pictures.") from None
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     writer = imageio_ffmpeg.write_frames(
-        str(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
+        # Names with colons or a leading hyphen would be protocols and options of ffmpeg.
+        os.path.abspath(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
         pix_fmt_out="yuv420p", ffmpeg_log_level="error",
         output_params=["-movflags", "+faststart"])
     try:
@@ -265,8 +267,9 @@ def _numbered_files(path: Path) -> Iterator[Callable[[Image], Any]]:
 
 def _require_readable(ffmpeg: str, movie: Path) -> None:
     """Raise OSError for a movie cut short: the encoder's exit status is not passed on."""
-    done = subprocess.run([ffmpeg, "-v", "error", "-i", str(movie), "-frames:v", "1", "-f", "null",
-                           "-"], capture_output=True, check=False, stdin=subprocess.DEVNULL)
+    done = subprocess.run([ffmpeg, "-v", "error", "-i", os.path.abspath(movie), "-frames:v", "1",
+                           "-f", "null", "-"], capture_output=True, check=False,
+                          stdin=subprocess.DEVNULL)
     if done.returncode != 0:
         raise OSError("the encoder did not finish; the disk may be full")
 

@@ -114,8 +114,10 @@ def sweep(
         rows = store.rows()
         if retry:
             rows = {key: row for key, row in rows.items() if not row["reason"]}
+        finished = False
         try:
             _compute(work, store, rows, executor, workers, progress)
+            finished = True
         except FecontactError as error:
             done = sum(case.key in rows for case in work.cases)
             if not done:
@@ -123,9 +125,11 @@ def sweep(
             raise type(error)(f"{error} {done} of {len(work.cases)} cases are kept in {place}; go "
                               f"on with --resume (resume=True).") from None
         finally:
-            with contextlib.suppress(InputError):
-                work.table(rows, place).write(place / "index.csv")
-    return work.table(rows, place)
+            table = work.table(rows, place)
+            # Where something else went wrong, that is what must be said.
+            with contextlib.nullcontext() if finished else contextlib.suppress(InputError):
+                table.write(place / "index.csv")
+    return table
 
 
 @dataclass(frozen=True, eq=False)
