@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fecontact.basis import ModalBasis
 from fecontact.damping import Damping
 from fecontact.errors import InputError, MeshError, choices, nearest, require_positive
+from fecontact.memory import require_memory
 from fecontact.mesh import Mesh
 from fecontact.supports import check_supports, expansion, fixed_dofs
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from fecontact.reduction import Reduction
 
 Array = NDArray[np.float64]
+
+# Unknowns of a cell by its corners and the degree, and memory for each to find modes [bytes].
+_UNKNOWNS = {(3, 1): 1, (3, 2): 4, (4, 1): 2, (4, 2): 8}
+_BYTES = {3: 7e3, 4: 9.5e3}
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,10 @@ class ElasticBody:
             raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")
         if self.degree not in (1, 2):
             raise InputError(f"ElasticBody: degree = {self.degree!r} must be 1 or 2.")
+        corners, degree = self.mesh.cells.shape[1], int(self.degree)
+        require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
+                       _UNKNOWNS[corners, degree] * _BYTES[corners],
+                       ", by a larger element_size, or triangles or degree = 1")
         check_supports(self)
         pieces = _pieces(self.mesh)
         if pieces > 1:

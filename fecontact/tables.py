@@ -279,7 +279,8 @@ def _converted_to(value: Any, hint: Any, where: str) -> Any:
         return int(value)
     if hint in (str, bool, types.NoneType) and isinstance(value, hint):
         return value
-    if origin is Literal and value in args and not isinstance(value, bool):
+    if origin is Literal and isinstance(value, str | int) and value in args and not (
+            isinstance(value, bool)):
         return value
     if is_dataclass(hint):
         if isinstance(value, hint):  # type: ignore[arg-type]

@@ -26,7 +26,8 @@ def init(
 
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
-    if file.exists() and not force:
+    # Resolved, because none/../study.toml is there once the folder of the new file is made.
+    if file.resolve().exists() and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
     say(f"{file} is written; next: fecontact run {file}")

@@ -25,6 +25,8 @@ _DEEP = 100.0
 # Growth of energy without a source, relative to the largest energy, that is an error, and the
 # output times that are looked at for it.
 _GROWTH, _LOOKS = 1e-2, 200
+# Shortest run [s], and in spacings of floating-point numbers at its times.
+_SHORTEST, _SPACINGS = 1e-100, 1e5
 
 METHODS = ("Rodas5P", "Radau", "BDF", "LSODA", "CVODE", "set-valued")
 
@@ -197,14 +199,19 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float
     if not (isinstance(t_start, Real) and isinstance(t_end, Real)
             and -np.inf < t_start < t_end < np.inf):
         raise InputError(f"t_end = {t_end!r} must be a finite time after t_start = {t_start!r}.")
+    latest = max(abs(t_start), abs(t_end))
+    if t_end - t_start < max(_SHORTEST, _SPACINGS * float(np.spacing(latest))):
+        raise InputError(f"t_end = {t_end!r} is too near t_start = {t_start!r} for steps in "
+                         f"between: floating-point numbers cannot tell their times apart; end "
+                         f"later.")
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         if outputs < 2:
             raise InputError(f"outputs = {outputs} must be at least 2.")
         times = np.linspace(t_start, t_end, int(outputs))
         if not (np.diff(times) > 0.0).all():
-            raise InputError(f"t_end = {t_end!r} is too near t_start = {t_start!r} for outputs = "
-                             f"{outputs}: floating-point numbers cannot tell so many times apart; "
-                             f"end later or take fewer outputs.")
+            raise InputError(f"outputs = {outputs} are too many from t_start = {t_start!r} to "
+                             f"t_end = {t_end!r}: floating-point numbers cannot tell so many "
+                             f"times apart; end later or take fewer outputs.")
         return times
     try:
         times = np.array(outputs, dtype=float)

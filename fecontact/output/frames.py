@@ -1,5 +1,6 @@
 """Fields over the body at chosen times, for files and pictures."""
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+
+_SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
 
 
 def frame_indices(
@@ -46,6 +49,13 @@ def frame_indices(
     right = np.clip(np.searchsorted(inside, wanted), 1, len(inside) - 1)
     nearest = np.where(wanted - inside[right - 1] < inside[right] - wanted, right - 1, right)
     return chosen[np.unique(nearest)]
+
+
+def require_frame_rate(owner: str, fps: float) -> None:
+    """Raise :class:`InputError` unless movies can have so many frames a second."""
+    if not (isinstance(fps, Real) and not isinstance(fps, bool) and _SLOWEST <= fps <= _FASTEST):
+        raise InputError(f"{owner}: fps = {fps!r} must be a number from {_SLOWEST:g} to "
+                         f"{_FASTEST:g} frames a second.")
 
 
 def require_field(trajectory: Trajectory) -> Field:

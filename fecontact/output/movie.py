@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError, MissingLibraryError, require_positive
+from fecontact.errors import InputError, MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.frames import frame_indices, require_field
+from fecontact.output.frames import frame_indices, require_field, require_frame_rate
 from fecontact.output.furniture import Furniture
 from fecontact.output.motion import Colour, Motion
 from fecontact.output.probe import require_rendering
@@ -95,7 +95,7 @@ def render(
     if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
         raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
                          f"folder.")
-    require_positive("A movie", fps=fps)
+    require_frame_rate("A movie", fps)
     _require_size(size)
     require_field(trajectory)
     indices = frame_indices(trajectory.time, frames, start, end)
