@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.basis import ModalBasis
 from fecontact.damping import Damping
-from fecontact.errors import InputError, MeshError, choices, nearest, require_positive
+from fecontact.errors import (
+    InputError,
+    MeshError,
+    choices,
+    nearest,
+    require_finite,
+    require_positive,
+)
 from fecontact.memory import require_memory
 from fecontact.mesh import Mesh
 from fecontact.supports import check_supports, expansion, fixed_dofs
@@ -51,6 +59,7 @@ class Material:
 
     def __post_init__(self) -> None:
         require_positive("Material", youngs_modulus=self.youngs_modulus, density=self.density)
+        require_finite("Material", poisson_ratio=self.poisson_ratio)
         if not -1.0 < self.poisson_ratio < 0.5:
             raise InputError(f"Material: poisson_ratio = {self.poisson_ratio!r} must be above -1 "
                              f"and below 0.5.")
@@ -59,9 +68,10 @@ class Material:
     def named(cls, name: str) -> "Material":
         """'steel' or 'aluminium' with handbook values; InputError lists the names there are."""
         if name not in _MATERIALS:
-            raise InputError(f"There is no material '{name}'{nearest(name, _MATERIALS)}; named "
-                             f"materials are {choices(_MATERIALS)}, or give youngs_modulus, "
-                             f"poisson_ratio and density.")
+            raise InputError(f"There is no material '{name}'"
+                             f"{nearest(str(name), _MATERIALS)}; named materials are "
+                             f"{choices(_MATERIALS)}, or give youngs_modulus, poisson_ratio and "
+                             f"density.")
         return cls(*_MATERIALS[name])
 
 
@@ -105,6 +115,11 @@ class ElasticBody:
     fixed: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_kind("ElasticBody", Mesh, mesh=self.mesh)
+        require_kind("ElasticBody", Material, material=self.material)
+        require_kind("ElasticBody", Mapping, fixed=self.fixed)
+        for name, directions in self.fixed.items():
+            require_kind("ElasticBody: fixed", str, name=name, directions=directions)
         require_positive("ElasticBody", thickness=self.thickness)
         if self.plane not in ("stress", "strain"):
             raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
+from fecontact.arguments import require_kind
 from fecontact.contact_jacobian import jacobian
 from fecontact.errors import AnalysisError
 from fecontact.laws.contract import friction_law, signal
@@ -48,6 +49,7 @@ def static_equilibrium(
         If there is no equilibrium: it names the direction in which nothing holds the body, or
         says that the load lifts or tips it; and for steady sliding on wavy ground.
     """
+    require_kind("static_equilibrium", ContactSystem, system=system)
     ground = system.ground
     if friction and ground.wavy:
         raise AnalysisError("There is no steady sliding on wavy ground; start from rest or "

@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fecontact.arguments import as_path, require_kind
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody
 from fecontact.errors import InputError, choices, nearest
@@ -124,7 +125,7 @@ class Study:
             If there is no such file, it is not TOML, or it has unknown sections or keys, values
             of the wrong type or out of range.
         """
-        path = Path(path)
+        path = as_path(path, "a study")
         try:
             text = path.read_text(encoding="utf-8")
         except FileNotFoundError:
@@ -140,7 +141,8 @@ class Study:
     @classmethod
     def from_toml(cls, text: str, path: str | Path | None = None) -> "Study":
         """A study from TOML text; ``path`` says where it stands, see :meth:`read`."""
-        path = None if path is None else Path(path)
+        path = None if path is None else as_path(path, "a study")
+        require_kind(_title(path), str, text=text)
         return cls.from_tables(parsed(text, _title(path)), path)
 
     @classmethod

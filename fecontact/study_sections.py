@@ -18,7 +18,7 @@ from fecontact.errors import (
 from fecontact.integrate.initial import RigidStart
 from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.mesh import Mesh
-from fecontact.output.frames import require_frame_rate
+from fecontact.output.frames import require_frame_rate, require_scale
 from fecontact.points import Patch
 from fecontact.tables import located
 
@@ -300,7 +300,7 @@ class RenderSettings:
             raise InputError(f"RenderSettings: size = {list(self.size)} must be an even width and "
                              f"height in pixels, at least [320, 180].")
         if self.scale is not None:
-            require_positive("RenderSettings", scale=self.scale)
+            require_scale("RenderSettings", self.scale)
         for name in ("start", "end"):
             if getattr(self, name) is not None:
                 require_finite("RenderSettings", **{name: getattr(self, name)})

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_path
 from fecontact.contact_energy import POWERS
 from fecontact.contact_kernels import PENETRATION
 from fecontact.errors import InputError, choices, nearest
@@ -118,6 +119,11 @@ def simulate(
         raise InputError(f"A checkpoint is for method = 'Rodas5P' alone, not '{method}'.")
     if events is not None and method != "Rodas5P":
         raise InputError(f"Events are for method = 'Rodas5P' alone, not '{method}'.")
+    if checkpoint is not None and not as_path(checkpoint, "a checkpoint").parent.is_dir():
+        raise InputError(f"checkpoint = {str(checkpoint)!r} cannot be written: there is no folder "
+                         f"{Path(checkpoint).parent}.")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress = {progress!r} must be a function of the time reached.")
     watched = as_watched(events)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory):

@@ -163,6 +163,8 @@ def response_figure(
     responses: Sequence[FrequencyResponse], labels: Sequence[str] = ()
 ) -> "Figure":
     """Magnitude and phase of frequency responses over frequency."""
+    if not responses:
+        raise InputError("responses = [] holds nothing to draw; give at least one.")
     if not any(response.values.any() for response in responses):
         raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
                          f"{_place(responses[0].excitations[0])}; choose another point or "

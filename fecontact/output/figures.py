@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.quantities import Point, point_name
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.contact_states import STATE_COLOURS, state_names
@@ -55,6 +56,7 @@ def new_figure(width: float, height: float) -> "Figure":
 
 def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Figure":
     """Displacements and velocities of points, and the sums of the contact forces, over time."""
+    require_kind("plot_history", Sequence, points=points)
     points = tuple(points) or _usual_points(trajectory)
     figure = new_figure(10.0, 7.5)
     axes = figure.subplots(3, 2, sharex=True)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.arguments import as_path
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.field import Field, Quality
@@ -54,7 +55,7 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
     """
     import h5py
 
-    path = Path(path)
+    path = as_path(path, "a file of results")
     if not path.is_file():
         raise InputError(f"{path} does not exist.")
     try:

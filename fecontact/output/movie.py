@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import as_path
 from fecontact.errors import InputError, MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.frames import frame_indices, require_field, require_frame_rate
@@ -90,7 +91,7 @@ def render(
     MissingLibraryError
         If this computer cannot render pictures or encode movies; the message says what to install.
     """
-    path = Path(path)
+    path = as_path(path, "a movie")
     movie = path.suffix.lower() == ".mp4"
     if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
         raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
@@ -150,7 +151,7 @@ def picture(
     InputError, MissingLibraryError
         See :func:`render`.
     """
-    path = Path(path)
+    path = as_path(path, "a picture")
     if path.suffix.lower() != ".png":
         raise InputError(f"{path} must end in .png.")
     _require_folder(path)

@@ -10,6 +10,7 @@ from typing import Any
 
 import tomli_w
 
+from fecontact.arguments import as_path, require_kind
 from fecontact.errors import InputError
 from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
@@ -78,6 +79,8 @@ def write_case(
     InputError
         If ``frames`` is negative, or the file cannot be written.
     """
+    require_kind("write_case", Trajectory, trajectory=trajectory)
+    path = as_path(path, "a run")
     indices = frame_indices(trajectory.time, frames)
     folder = Path(path).parent
     root = folder if root is None else Path(root)
@@ -105,6 +108,7 @@ def read_case(path: str | Path) -> Case:
         If there is no such file, it is not HDF5, was not written by fecontact, holds no run, is
         damaged, or its system has parameters that this version does not know.
     """
+    path = as_path(path, "a run")
     with open_file(path, "basis") as file:
         if "trajectory" not in file:
             raise InputError(f"{path} holds a modal basis but no run; read it with "

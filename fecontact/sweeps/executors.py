@@ -120,11 +120,7 @@ def opened(executor: Executor | None, workers: int | None) -> Iterator[Pool]:
         If it is no executor, or called from a worker's import of the main script.
     """
     if executor is None:
-        count = cores() if workers is None else workers
-        most = _PER_CORE * cores()
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
-            raise InputError(f"workers = {count!r} must be a whole number from 1 to {most}, "
-                             f"{_PER_CORE} for each of the {cores()} cores.")
+        count = worker_count(workers)
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             raise SystemExit(1)  # the parent says what is wrong
         # Compiled here once, if need be, and not by every worker.
@@ -145,6 +141,15 @@ def _closing(pool: Pool) -> Iterator[Pool]:
         pool.close(at_once=True)
         raise
     pool.close(at_once=False)
+
+
+def worker_count(workers: int | None) -> int:
+    """Number of processes on this machine, one a core by default; InputError if out of range."""
+    count, most = cores() if workers is None else workers, _PER_CORE * cores()
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
+        raise InputError(f"workers = {count!r} must be a whole number from 1 to {most}, "
+                         f"{_PER_CORE} for each of the {cores()} cores.")
+    return count
 
 
 def cores() -> int:

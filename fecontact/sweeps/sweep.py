@@ -16,7 +16,7 @@ from fecontact.study import Study
 from fecontact.sweeps.bases import Bases
 from fecontact.sweeps.batch import Batch, Case, Row, make_basis
 from fecontact.sweeps.dispatch import LostError, results
-from fecontact.sweeps.executors import opened
+from fecontact.sweeps.executors import opened, worker_count
 from fecontact.sweeps.identity import case_keys
 from fecontact.sweeps.samples import Plan, plan
 from fecontact.sweeps.settings import SweepSettings, flat_axes
@@ -95,6 +95,7 @@ def sweep(
         After Ctrl-C; finished cases are kept.
     """
     study = study if isinstance(study, Study) else Study.read(study)
+    worker_count(workers)
     wanted = _settings(study, axes, settings)
     base = replace(study, sweep=None)
     vars(base).update({name: value for name, value in vars(study).items() if name[0] == "_"})
