@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats, as_integers, require_kind
 from fecontact.damping import Damping
 from fecontact.errors import InputError, choices, nearest
 from fecontact.field import Field, Quality
@@ -137,6 +138,7 @@ class ModalBasis:
 
         InputError if there is none, with those that there are.
         """
+        require_kind("A point", (str, int), point=point)
         if isinstance(point, int):
             if not 0 <= point < self.contact_nodes:
                 raise InputError(f"Contact node {point} does not exist; there are "
@@ -278,8 +280,13 @@ class ModalBasis:
             For a point that does not exist, or a damping that is negative or not finite.
         """
         damping = np.array(self.damping)
-        for point, values in dashpots.items():
-            for row, b in zip(self.T[self.point_index(point)], values, strict=False):
+        require_kind("with_dashpots", Mapping, dashpots=dashpots)
+        for point, given in dashpots.items():
+            values = as_floats(given, f"Dashpot at {point!r}: damping")
+            if values.shape != (2,):
+                raise InputError(f"Dashpot at {point!r}: damping must be two numbers, b_x and b_y, "
+                                 f"not an array of shape {values.shape}.")
+            for row, b in zip(self.T[self.point_index(point)], values.tolist(), strict=False):
                 if not 0.0 <= b < np.inf:
                     raise InputError(f"Dashpot at {point!r}: damping {b!r} must be finite and "
                                      f"zero or above.")
@@ -292,7 +299,7 @@ class ModalBasis:
         A block's tilting, say, is left out by leaving out its rigid rotation. Raises InputError
         for a mode that does not exist.
         """
-        chosen = np.unique(np.asarray(modes, dtype=int))
+        chosen = np.unique(as_integers(modes, "The modes to select"))
         if not chosen.size or len(chosen) != len(modes) or chosen[0] < 0 or (
                 chosen[-1] >= self.modes):
             raise InputError(f"modes {list(modes)} must be different numbers from 0 to "

@@ -8,9 +8,18 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.basis import ModalBasis
 from fecontact.damping import Damping
-from fecontact.errors import InputError, MeshError, choices, nearest, require_positive
+from fecontact.errors import (
+    InputError,
+    MeshError,
+    choices,
+    nearest,
+    require_finite,
+    require_positive,
+)
+from fecontact.memory import require_memory
 from fecontact.mesh import Mesh
 from fecontact.supports import check_supports, expansion, fixed_dofs
 
@@ -19,6 +28,10 @@ if TYPE_CHECKING:
     from fecontact.reduction import Reduction
 
 Array = NDArray[np.float64]
+
+# Unknowns of a cell by its corners and the degree, and memory for each to find modes [bytes].
+_UNKNOWNS = {(3, 1): 1, (3, 2): 4, (4, 1): 2, (4, 2): 8}
+_BYTES = {3: 7e3, 4: 9.5e3}
 
 
 @dataclass(frozen=True)
@@ -46,6 +59,7 @@ class Material:
 
     def __post_init__(self) -> None:
         require_positive("Material", youngs_modulus=self.youngs_modulus, density=self.density)
+        require_finite("Material", poisson_ratio=self.poisson_ratio)
         if not -1.0 < self.poisson_ratio < 0.5:
             raise InputError(f"Material: poisson_ratio = {self.poisson_ratio!r} must be above -1 "
                              f"and below 0.5.")
@@ -54,9 +68,10 @@ class Material:
     def named(cls, name: str) -> "Material":
         """'steel' or 'aluminium' with handbook values; InputError lists the names there are."""
         if name not in _MATERIALS:
-            raise InputError(f"There is no material '{name}'{nearest(name, _MATERIALS)}; named "
-                             f"materials are {choices(_MATERIALS)}, or give youngs_modulus, "
-                             f"poisson_ratio and density.")
+            raise InputError(f"There is no material '{name}'"
+                             f"{nearest(str(name), _MATERIALS)}; named materials are "
+                             f"{choices(_MATERIALS)}, or give youngs_modulus, poisson_ratio and "
+                             f"density.")
         return cls(*_MATERIALS[name])
 
 
@@ -100,11 +115,20 @@ class ElasticBody:
     fixed: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_kind("ElasticBody", Mesh, mesh=self.mesh)
+        require_kind("ElasticBody", Material, material=self.material)
+        require_kind("ElasticBody", Mapping, fixed=self.fixed)
+        for name, directions in self.fixed.items():
+            require_kind("ElasticBody: fixed", str, name=name, directions=directions)
         require_positive("ElasticBody", thickness=self.thickness)
         if self.plane not in ("stress", "strain"):
             raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")
         if self.degree not in (1, 2):
             raise InputError(f"ElasticBody: degree = {self.degree!r} must be 1 or 2.")
+        corners, degree = self.mesh.cells.shape[1], int(self.degree)
+        require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
+                       _UNKNOWNS[corners, degree] * _BYTES[corners],
+                       ", by a larger element_size, or triangles or degree = 1")
         check_supports(self)
         pieces = _pieces(self.mesh)
         if pieces > 1:

@@ -10,6 +10,7 @@ import hashlib
 import inspect
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 
 from numba import njit, types
 from numba.core import cgutils, sigutils
+from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
 from numba.extending import intrinsic
@@ -65,12 +67,52 @@ def _source_stamp(path: Path) -> str:
     return stamp.hexdigest()
 
 
+class _StoredCode(IndexDataCacheFile):  # type: ignore[misc]
+    """Compiled code on disk, made anew where it cannot be read.
+
+    Power cuts and full disks leave files that are cut short, and numba stops at them. Only such
+    files of this very function are removed. Code that cannot be stored is compiled again by the
+    next process.
+    """
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except OSError:
+            return {}
+        except Exception:  # unpickling damaged files fails in every way there is
+            _remove(self._index_path)
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        try:
+            return super()._load_data(name)
+        except OSError:
+            raise  # which numba takes as not stored
+        except Exception as error:
+            path = self._data_path(name)
+            _remove(path)
+            raise FileNotFoundError(path) from error
+
+    def save(self, key: Any, data: Any) -> None:
+        """Store code under a key, if that is possible."""
+        with suppress(OSError):
+            super().save(key, data)
+
+
+def _remove(path: str) -> None:
+    with suppress(OSError):
+        Path(path).unlink()
+
+
 def _stamp(compiled: Any, function: Callable[..., Any], module: str = "") -> None:
     """Key stored code by the sources it is made from, and by the module name it refers to."""
-    stored = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if stored is not None and hasattr(stored, "_source_stamp"):
-        stored._source_stamp = (stored._source_stamp,
-                                _source_stamp(Path(inspect.getfile(function))), module)
+    stored: Any = getattr(compiled, "_cache", None)
+    if isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
+        stored._cache_file = _StoredCode(
+            stored.cache_path, stored._impl.filename_base,
+            (stored._impl.locator.get_source_stamp(),
+             _source_stamp(Path(inspect.getfile(function))), module))
 
 
 def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:

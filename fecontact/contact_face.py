@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.points import Pieces, edge_weights, node_matrix, patch_rows
 
@@ -46,6 +47,7 @@ def contact_groups(
     """
     import scipy.sparse as sp
 
+    require_kind("modal_basis", (str, Sequence), contact=boundaries)
     names = (boundaries,) if isinstance(boundaries, str) else tuple(boundaries)
     each: tuple[Any, ...] = (tuple(counts) if isinstance(counts, list | tuple)
                              else (counts,) * len(names))

@@ -44,28 +44,46 @@ def nearest(name: str, names: Iterable[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
+# Beyond these, squares and products of a few values leave the range of floating-point numbers.
+_LEAST, _MOST = 1e-60, 1e60
+
+
 def require_positive(owner: str, **values: float) -> None:
-    """Raise :class:`InputError` unless every value is a finite number above zero."""
+    """Raise :class:`InputError` unless every value is a number from 1e-60 to 1e60."""
     for name, value in values.items():
         if not (_is_number(value) and 0.0 < value < float("inf")):
-            raise InputError(f"{owner}: {name} = {value!r} must be a finite number above zero.")
+            raise InputError(f"{owner}: {name} = {_shown(value)} must be a finite number above "
+                             f"zero.")
+        if not _LEAST <= value <= _MOST:
+            raise InputError(f"{owner}: {name} = {_shown(value)} must be a number from {_LEAST:g} "
+                             f"to {_MOST:g}.")
 
 
 def require_not_negative(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a finite number of at least zero."""
     for name, value in values.items():
         if not (_is_number(value) and 0.0 <= value < float("inf")):
-            raise InputError(f"{owner}: {name} = {value!r} must be a finite number, zero or above.")
+            raise InputError(f"{owner}: {name} = {_shown(value)} must be a finite number, zero or "
+                             f"above.")
 
 
 def require_finite(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a finite number."""
     for name, value in values.items():
         if not _is_number(value):
-            raise InputError(f"{owner}: {name} = {value!r} must be a number.")
+            raise InputError(f"{owner}: {name} = {_shown(value)} must be a number.")
         if not abs(value) < float("inf"):
-            raise InputError(f"{owner}: {name} = {value!r} must be finite.")
+            raise InputError(f"{owner}: {name} = {_shown(value)} must be finite.")
 
 
 def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _shown(value: object) -> str:
+    """A value in one line, cut to a length that fits into a sentence."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:
+        return "a number of thousands of digits"
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.arguments import require_kind
 from fecontact.errors import AnalysisError, InputError
 from fecontact.laws.fourier_series import FourierSeries
 from fecontact.laws.profile_base import Profile
@@ -25,6 +26,7 @@ def common_period(system: ContactSystem) -> float | None:
         If something is not periodic, or the periods have no common multiple up to 1000 of the
         longest.
     """
+    require_kind("common_period", ContactSystem, system=system)
     drive, ground = system.drive, system.ground
     given: list[tuple[str, Any]] = [
         (f"drive.motion_{axis}", motion)
@@ -63,6 +65,7 @@ def forcing_period(system: ContactSystem) -> float:
     AnalysisError
         As :func:`common_period`.
     """
+    require_kind("forcing_period", ContactSystem, system=system)
     period = common_period(system)
     if period is None:
         raise InputError("Nothing excites the system in time, so it has no period; give period, or "

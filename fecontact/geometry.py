@@ -17,12 +17,14 @@ from fecontact import system_libraries
 from fecontact.errors import InputError, MissingLibraryError
 from fecontact.grids import Grid, grid_of, nearest_line
 from fecontact.hole_rim import Rim
+from fecontact.memory import available_memory
 from fecontact.mesh import Mesh
 from fecontact.shapes import Beam, Block, Pendulum, Shape
 
 __all__ = ["MAX_CELLS", "Beam", "Block", "Pendulum", "Shape", "generate"]
 
 MAX_CELLS = 2_000_000
+_BYTES = 3000.0  # memory for a cell while Gmsh makes it
 
 _SIGACTION_BYTES = 512  # more than struct sigaction has on any system
 _GMSH_LOCK = threading.Lock()  # Gmsh has one global state
@@ -220,13 +222,14 @@ def _import_gmsh() -> Any:
 
 def _require_few_cells(shape: Shape, grid: Grid) -> None:
     count = _count_cells(shape, grid, shape.element_size)
-    if count > MAX_CELLS:
-        enough = shape.element_size * math.sqrt(count / MAX_CELLS)
-        while _count_cells(shape, grid, enough) > MAX_CELLS:
+    most = int(min(MAX_CELLS, available_memory() / _BYTES))
+    if count > most:
+        enough = shape.element_size * math.sqrt(count / most)
+        while _count_cells(shape, grid, enough) > most:
             enough *= 1.1
         raise InputError(
             f"{type(shape).__name__}: element_size = {shape.element_size!r} makes {count:.3g} "
-            f"elements, more than {MAX_CELLS}; take one of at least {1.1 * enough:.2g} m."
+            f"elements, more than {most}; take one of at least {1.1 * enough:.2g} m."
         )
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats, as_integers
 from fecontact.errors import MeshError, choices, nearest
 
 _FLAT = 1e-12  # area of a degenerate cell, as part of its squared sides
@@ -41,8 +42,8 @@ class Mesh:
     points: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        nodes = np.array(self.nodes, dtype=float)
-        cells = np.array(self.cells, dtype=np.int64)
+        nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
+        cells = np.array(as_integers(self.cells, "Mesh cells"))
         if nodes.ndim != 2 or nodes.shape[1] != 2:
             raise MeshError(f"Mesh nodes must have shape (N, 2), not {nodes.shape}.")
         if cells.ndim != 2 or cells.shape[1] not in (3, 4) or not len(cells):
@@ -69,7 +70,8 @@ class Mesh:
                 f"{np.flatnonzero(bad)[0]}."
             )
         boundaries = {name: _edges(name, edges) for name, edges in self.boundaries.items()}
-        points = {name: np.unique(np.array(which, np.int64)) for name, which in self.points.items()}
+        points = {name: np.unique(as_integers(which, f"The nodes of mesh point '{name}'"))
+                  for name, which in self.points.items()}
         for name, group in (*boundaries.items(), *points.items()):
             if not group.size:
                 raise MeshError(f"Mesh group '{name}' is empty.")

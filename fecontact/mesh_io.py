@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.errors import InputError, MeshError
+from fecontact.arguments import as_path, require_kind
+from fecontact.errors import InputError, MeshError, require_positive
 from fecontact.formats.groups import Box, named_boundaries, named_points
 from fecontact.formats.inp import read_inp
 from fecontact.formats.med import read_med
@@ -61,7 +62,8 @@ def read_mesh(
         If the file is not a plane mesh of first-order elements of one kind, or has no such group,
         edges or node.
     """
-    path = Path(path)
+    path = as_path(path, "a mesh")
+    require_positive(str(path), scale=scale)
     if not 0.0 < scale < np.inf:
         raise InputError(f"{path}: scale = {scale!r} (metres per unit of the file) must be a "
                          f"finite number above zero.")
@@ -89,7 +91,8 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
         If the name does not end in .msh, the file cannot be written, or a group's name holds a
         quotation mark or a line break.
     """
-    path = Path(path)
+    path = as_path(path, "a mesh")
+    require_kind("write_mesh", Mesh, mesh=mesh)
     if path.suffix.lower() != ".msh":
         raise InputError(f"{path}: meshes are written as Gmsh files; choose a name that ends in "
                          f".msh.")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody
 
@@ -79,6 +80,7 @@ def mode_convergence(
     progress : callable, optional
         Called with the number of bases done, and of all.
     """
+    require_kind("mode_convergence", ElasticBody, body=body)
     unknowns = len(body.expansion.indptr) - 1
     counts = [max(1, modes // 2), modes, 2 * modes, 4 * modes]
     counts = sorted({count for count in counts if count <= unknowns // 2} | {modes})

@@ -28,11 +28,14 @@ def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple
     Parameters
     ----------
     system : ContactSystem
+        What moves.
     times : (N,) array
         [s].
     states : (N, 2 m + n s) array
         y = [q, q', z].
 
+    Notes
+    -----
     Displacements of B, C, the contact nodes and further points are compared with the extent of
     these points and of the mesh, if there is one. How far all of them have moved along the ground
     together does not count: a body may slide as far as it likes.

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import as_floats, require_kind
 from fecontact.basis import ModalBasis
 from fecontact.contact_face import contact_groups
 from fecontact.craig_bampton import craig_bampton
 from fecontact.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.eigen import FreeSystem, backward_error, free_modes, strain_energies
-from fecontact.errors import InputError, choices, nearest
+from fecontact.errors import InputError, choices, nearest, require_finite
 from fecontact.field import Field, Quality
 from fecontact.flexibility import Flexibility, residual_modes
 from fecontact.points import Place, Rows, place_rows
@@ -41,7 +42,10 @@ def reduce_body(
     """Modal basis of a body; see :meth:`fecontact.body.ElasticBody.modal_basis`."""
     import scipy.sparse as sp
 
+    require_kind("points", Mapping, points=points)
+    require_finite("modal_basis", tolerance=tolerance)
     for name in points:
+        require_kind("points", str, name=name)
         if name in ("B", "C"):
             raise InputError(f"points: '{name}' is a name of its own; give it as {name}=...")
     if reduction not in get_args(Reduction):
@@ -64,7 +68,7 @@ def reduce_body(
     elastic = w > 0.0
     w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
     if not isinstance(damping, Rayleigh | LossFactor | float | int):
-        given = np.asarray(damping, dtype=float)
+        given = as_floats(damping, "The damping")
         if given.shape == (modes,) and len(w) > modes:
             damping = np.append(given, np.full(len(w) - modes, given[-1]))
     return ModalBasis(

@@ -20,6 +20,7 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
     """A study, with other values for some of its keys: texts ``ground.speed=0.1``."""
     with loading():
         from fecontact.study import Study
+        from fecontact.tables import parsed
     study = Study.read(file)
     values: dict[str, Any] = {}
     for change in changes or ():
@@ -32,6 +33,8 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
         except tomllib.TOMLDecodeError:
             # Texts come without quotes from a shell.
             values[name] = text
+        except (RecursionError, ValueError):
+            parsed(f"value = {text}", f"--set {name}")
     return study.with_(**values) if values else study
 
 

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
+from fecontact.arguments import require_kind
 from fecontact.contact_jacobian import jacobian
 from fecontact.errors import AnalysisError
 from fecontact.laws.contract import friction_law, signal
@@ -58,6 +59,7 @@ def static_equilibrium(
         If the body moves by more than its own size, or is pressed into the ground by more than a
         hundred times the height of its roughness.
     """
+    require_kind("static_equilibrium", ContactSystem, system=system)
     q = equilibrium(system, friction, time)
     warn_of_limits(system, time, np.concatenate([q, np.zeros(system.size - len(q))]),
                    "In equilibrium")

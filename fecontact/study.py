@@ -1,12 +1,12 @@
 """A whole study in one TOML file: from the geometry to the run and its pictures."""
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fecontact.arguments import as_path, require_kind
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody
 from fecontact.errors import InputError, choices, nearest
@@ -38,7 +38,9 @@ from fecontact.tables import (
     convert,
     from_table,
     located,
+    parsed,
     plain,
+    require_readable,
     shown,
     to_table,
 )
@@ -123,7 +125,7 @@ class Study:
             If there is no such file, it is not TOML, or it has unknown sections or keys, values
             of the wrong type or out of range.
         """
-        path = Path(path)
+        path = as_path(path, "a study")
         try:
             text = path.read_text(encoding="utf-8")
         except FileNotFoundError:
@@ -139,18 +141,18 @@ class Study:
     @classmethod
     def from_toml(cls, text: str, path: str | Path | None = None) -> "Study":
         """A study from TOML text; ``path`` says where it stands, see :meth:`read`."""
-        path = None if path is None else Path(path)
-        try:
-            tables = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{_title(path)} is not valid TOML: {error}.") from None
-        return cls.from_tables(tables, path)
+        path = None if path is None else as_path(path, "a study")
+        require_kind(_title(path), str, text=text)
+        return cls.from_tables(parsed(text, _title(path)), path)
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
         """A study from the tables of a TOML file; see :meth:`read`."""
         title = _title(path)
         folder = Path() if path is None else path.parent
+        if not isinstance(tables, Mapping):
+            raise InputError(f"{title} must be a table of sections, not {shown(tables)}.")
+        require_readable(tables, title)
         tables = {name: table if name == "geometry" else with_folder(table, folder)
                   for name, table in tables.items()}
         for name in tables:

@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from fecontact.errors import InputError, choices, require_positive
+from fecontact.errors import InputError, choices, require_finite, require_positive
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.problem import Settings
 
+# Pieces of an orbit and runs beneath a diagram; more is a slip of the pen.
+_MOST_PIECES, _MOST_RUNS = 10_000, 100_000
 _SWITCHES = ("Hopf", "period doubling", "branch point")
 
 
@@ -101,9 +103,17 @@ class BranchSettings:
             if kind not in _SWITCHES:
                 raise InputError(f"BranchSettings: switch = '{kind}' is not known; choose from "
                                  f"{choices(_SWITCHES)}.")
+        if self.start is not None:
+            require_finite("BranchSettings", start=self.start)
+        for name, most in (("intervals", _MOST_PIECES), ("segments", _MOST_PIECES),
+                           ("brute_force", _MOST_RUNS)):
+            if getattr(self, name) > most:
+                raise InputError(f"BranchSettings: {name} = {getattr(self, name)} must be at most "
+                                 f"{most}.")
         if self.range is None:
             return
         low, high = self.range
+        require_finite("BranchSettings: the range", low=low, high=high)
         if not low < high:
             raise InputError(f"BranchSettings: range = {list(self.range)} must be two values, the "
                              f"smaller one first.")

@@ -8,10 +8,17 @@ from typing import Any, Literal
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
 from fecontact.damping import Damping, LossFactor, Rayleigh
-from fecontact.errors import InputError, choices, require_not_negative, require_positive
+from fecontact.errors import (
+    InputError,
+    choices,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
 from fecontact.integrate.initial import RigidStart
 from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.mesh import Mesh
+from fecontact.output.frames import require_frame_rate, require_scale
 from fecontact.points import Patch
 from fecontact.tables import located
 
@@ -154,6 +161,10 @@ class BasisSettings:
         if any(count != "all" and count < 1 for count in counts):
             raise InputError(f"BasisSettings: contact_nodes = {self.contact_nodes} must be at "
                              f"least 1, or \"all\".")
+        for name in self.points:
+            if name.isdigit():
+                raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
+                                 f"go by number; choose a name with a letter.")
 
     def basis(self, body: ElasticBody) -> ModalBasis:
         """The modal basis of a body."""
@@ -283,13 +294,16 @@ class RenderSettings:
     def __post_init__(self) -> None:
         if self.frames < 1:
             raise InputError(f"RenderSettings: frames = {self.frames} must be at least 1.")
-        require_positive("RenderSettings", fps=self.fps)
+        require_frame_rate("RenderSettings", self.fps)
         width, height = self.size
         if width < 320 or height < 180 or width % 2 or height % 2:
             raise InputError(f"RenderSettings: size = {list(self.size)} must be an even width and "
                              f"height in pixels, at least [320, 180].")
         if self.scale is not None:
-            require_positive("RenderSettings", scale=self.scale)
+            require_scale("RenderSettings", self.scale)
+        for name in ("start", "end"):
+            if getattr(self, name) is not None:
+                require_finite("RenderSettings", **{name: getattr(self, name)})
         if self.start is not None and self.end is not None and not self.start <= self.end:
             raise InputError(f"RenderSettings: end = {self.end!r} must not be before start = "
                              f"{self.start!r}.")

@@ -60,14 +60,15 @@ class ContactSystem:
     Raises
     ------
     InputError
-        Without a normal law; for a part of another kind, laws for groups that the basis lacks, parameters or gaps of
-        another number than there are contact nodes, laws that :func:`require_sound` refuses, and
-        drives and loads at places that no mode moves in their direction.
+        Without a normal law; for a part of another kind, laws for groups that the basis lacks,
+        parameters or gaps of another number than there are contact nodes, laws that
+        :func:`require_sound` refuses, and drives and loads at places that no mode moves in their
+        direction.
     """
 
     basis: ModalBasis
     # Required, with a sentence that says more than Python's own.
-    normal: NormalLaw | Mapping[str, NormalLaw] = cast(Any, None)
+    normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
     friction: FrictionLaw | Mapping[str, FrictionLaw] = field(default_factory=ExponentialFriction)
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)

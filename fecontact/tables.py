@@ -2,6 +2,8 @@
 
 import json
 import re
+import sys
+import tomllib
 import types
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -27,6 +29,64 @@ PART_CLASSES: Mapping[str, type] = {
 }
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
+
+_DEEPEST = 30  # tables and lists within each other; studies need less than ten
+
+
+def parsed(text: str, title: str) -> dict[str, Any]:
+    """The tables of a TOML text.
+
+    Raises
+    ------
+    InputError
+        If it is not TOML, or more than a reader can be asked to take.
+    """
+    try:
+        return tomllib.loads(text.removeprefix("\ufeff"))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{title} is not valid TOML: {error}.") from None
+    except RecursionError:
+        raise _too_deep(title) from None
+    except ValueError:  # Python refuses to read whole numbers of thousands of digits
+        raise InputError(f"{title} holds a whole number of more than "
+                         f"{sys.get_int_max_str_digits()} digits; write it as 1e300, and not "
+                         f"above 1.8e308.") from None
+
+
+def require_readable(tables: Any, title: str) -> None:
+    """Check what no key may have: too many levels, names that are no texts, zero characters.
+
+    Raises
+    ------
+    InputError
+        With the key in question.
+    """
+    ahead: list[tuple[str, Any, int]] = [("", tables, 0)]
+    while ahead:
+        name, value, depth = ahead.pop()
+        if depth > _DEEPEST:
+            raise _too_deep(title)
+        if isinstance(value, Mapping):
+            for key, item in value.items():
+                if not isinstance(key, str):
+                    raise InputError(f"{title}: the key {key!r} must be a text.")
+                _require_no_zero(key, f"a key{f' of {name}' if name else ''}", title)
+                ahead.append((f"{name}.{key}" if name else key, item, depth + 1))
+        elif isinstance(value, list | tuple):
+            ahead += [(name, item, depth + 1) for item in value]
+        elif isinstance(value, str):
+            _require_no_zero(value, name, title)
+
+
+def _require_no_zero(text: str, name: str, title: str) -> None:
+    if "\0" in text:
+        raise InputError(f"{title}: {name} = {shown(text)} holds the zero character \\u0000, which "
+                         f"no name and no text may have; remove it.")
+
+
+def _too_deep(title: str) -> InputError:
+    return InputError(f"{title} has tables or lists within each other more than {_DEEPEST} levels "
+                      f"deep; studies need less than ten.")
 
 
 def from_table(cls: type[T], table: Any, where: str) -> T:
@@ -155,6 +215,9 @@ def convert(value: Any, hint: Any, where: str, key: str) -> Any:
                           else f"{where}: [{key}]")
     except _MismatchError:
         raise InputError(f"{where}: {key} = {shown(value)} must be {described(hint)}.") from None
+    except OverflowError:
+        raise InputError(f"{where}: {key} = {shown(value)} is too large; numbers reach "
+                         f"1.8e308.") from None
 
 
 @contextmanager
@@ -176,8 +239,14 @@ def shown(value: Any) -> str:
         value = value.tolist()
     try:
         text = json.dumps(value, ensure_ascii=False)
-    except (TypeError, ValueError):
-        text = repr(value)
+    except (TypeError, ValueError, RecursionError):
+        try:
+            text = repr(value)
+        except ValueError:  # whole numbers of thousands of digits
+            text = "a number of thousands of digits"
+        except RecursionError:
+            text = "[[...]]"
+    text = " ".join(text.split())
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
@@ -219,7 +288,8 @@ def _converted_to(value: Any, hint: Any, where: str) -> Any:
         return int(value)
     if hint in (str, bool, types.NoneType) and isinstance(value, hint):
         return value
-    if origin is Literal and value in args and not isinstance(value, bool):
+    if origin is Literal and isinstance(value, str | int) and value in args and not (
+            isinstance(value, bool)):
         return value
     if is_dataclass(hint):
         if isinstance(value, hint):  # type: ignore[arg-type]

@@ -151,4 +151,5 @@ def test_a_group_without_a_law_is_named():
         ContactSystem(basis(("left", "right")), RoughSurface(1e6, 1e-5),
                       friction={"left": JenkinsFriction(1e5, 0.4)})
     with pytest.raises(ValueError, match="contact group 'centre'"):
-        ContactSystem(basis(), RoughSurface(1e6, 1e-5), friction={"centre": JenkinsFriction(1e5, 0.4)})
+        ContactSystem(basis(), RoughSurface(1e6, 1e-5),
+                      friction={"centre": JenkinsFriction(1e5, 0.4)})

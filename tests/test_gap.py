@@ -59,7 +59,8 @@ def test_functions_sequences_and_numbers_are_taken():
     assert gap_values(1e-6, x) == 1e-6
     assert gap_values([0.0, 1e-6, 2e-6], x) == (0.0, 1e-6, 2e-6)
     assert gap_values(lambda place: 2.0 * place, x) == (0.0, 1.0, 2.0)
-    system = ContactSystem(rigid_mass(3, 0.01), RoughSurface(1e6, 1e-5), gap=lambda place: np.abs(place))
+    system = ContactSystem(rigid_mass(3, 0.01), RoughSurface(1e6, 1e-5),
+                           gap=lambda place: np.abs(place))
     np.testing.assert_allclose(system.arrays.gap, [0.01 / 3, 0.0, 0.01 / 3], atol=1e-18)
 
 

@@ -18,7 +18,8 @@ from fecontact.tables import from_table, to_table
 
 # Values for parameters that have no defaults.
 GIVEN = {
-    "stiffness": 1e6, "roughness_height": 1e-5, "restitution": 0.7, "reference_velocity": 0.1, "force": 14.0,
+    "stiffness": 1e6, "roughness_height": 1e-5, "restitution": 0.7,
+    "reference_velocity": 0.1, "force": 14.0,
     "decay_length": 1e-6, "nominal_area": 1e-4, "coefficient": 1e-9, "asperities": 1e4,
     "asperity_radius": 1e-5, "composite_modulus": 1e11, "height_deviation": 1e-6,
     "clearance": 1e-4, "wavelength": 1e-2, "amplitude": 1e-6, "amplitudes": (1e-6, 2e-6),

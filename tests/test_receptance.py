@@ -158,7 +158,8 @@ def test_inverse_of_the_dynamic_stiffness_of_all_degrees_of_freedom():
     M, K = body.mass.toarray(), body.stiffness.toarray()
     C = 3.0 * M + 2e-6 * K
     basis = ModalBasis.from_matrices(M, K, rows, damping=C)
-    system = ContactSystem(basis, SURFACE, drive=Drive(stiffness_x=1e7, stiffness_y=3e6, damping_x=400.0))
+    system = ContactSystem(basis, SURFACE,
+                           drive=Drive(stiffness_x=1e7, stiffness_y=3e6, damping_x=400.0))
     K[d - 2, d - 2] += 1e7
     K[d - 1, d - 1] += 3e6
     C[d - 2, d - 2] += 400.0

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.contact_motion import ContactMotion, Nodes
 from fecontact.analysis.periods import drive_period
+from fecontact.arguments import require_kind
 from fecontact.errors import AnalysisError, InputError, require_not_negative, require_positive
 from fecontact.integrate.trajectory import Trajectory
 
@@ -117,6 +118,7 @@ def find_impacts(
     AnalysisError
         If a contact took place between two output times; more of them are needed.
     """
+    require_kind("find_impacts", Trajectory, trajectory=trajectory)
     require_not_negative("find_impacts", shortest_flight=shortest_flight)
     motion = ContactMotion.of(trajectory, nodes)
     touching = (motion.force != 0.0).any(axis=1)
@@ -169,6 +171,7 @@ def find_rests(
     InputError, AnalysisError
         As :func:`find_impacts`; and without a drive if ``longer_than`` is left out.
     """
+    require_kind("find_rests", Trajectory, trajectory=trajectory)
     require_positive("find_rests", slower_than=slower_than)
     if longer_than is None:
         longer_than = 0.1 * drive_period(trajectory.system)

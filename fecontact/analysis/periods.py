@@ -6,6 +6,7 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system import ContactSystem
@@ -93,6 +94,7 @@ def strobed_states(
         If the system has no drive and no period is given, for values out of range, or if the run
         ends before.
     """
+    require_kind("strobed_states", Trajectory, trajectory=trajectory)
     system, t = trajectory.system, trajectory.time
     if period is None:
         period = drive_period(system)
@@ -204,6 +206,7 @@ def periodicity(
     InputError
         As :func:`strobed_states` and :func:`count_periods`, and for too few outputs per period.
     """
+    require_kind("periodicity", Trajectory, trajectory=trajectory)
     basis = trajectory.system.basis
     found = strobed_states(trajectory, period=period, start=start)
     late = trajectory.time >= _start(trajectory, start)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system import ContactSystem
@@ -60,6 +61,7 @@ def history(
         For a quantity, a point or an axis that does not exist, and for a quantity of contact nodes
         at a point that is none.
     """
+    require_kind("history", Trajectory, trajectory=trajectory)
     if quantity not in QUANTITIES:
         raise InputError(f"quantity = {quantity!r} is not known{nearest(str(quantity), QUANTITIES)}"
                          f"; choose from {choices(QUANTITIES)}.")

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, InputError, choices, nearest
 from fecontact.integrate.initial import Initial, initial_state
@@ -127,6 +128,7 @@ def frequency_response(
         Where the response is infinite: at frequency zero of a body that nothing holds, or at an
         undamped eigenfrequency; and if there is no equilibrium.
     """
+    require_kind("frequency_response", ContactSystem, body=body)
     basis = body.basis if isinstance(body, ContactSystem) else body
     if kind not in _POWERS:
         raise InputError(f"kind = {kind!r} must be one of {choices(_POWERS)}"

@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats
 from fecontact.errors import InputError, require_positive
 
 Array = NDArray[np.float64]
@@ -114,7 +115,7 @@ def evenly_sampled(
         For fewer than eight values, values that are not finite, times that do not ascend, and
         uneven times without ``resample``.
     """
-    t, x = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
+    t, x = as_floats(time, "The times of a spectrum"), as_floats(values, "Its values")
     if t.ndim != 1 or t.shape != x.shape or len(t) < 8:
         raise InputError(f"A spectrum needs times and values of one length, at least 8, not shapes "
                          f"{t.shape} and {x.shape}.")

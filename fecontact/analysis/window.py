@@ -1,9 +1,11 @@
 """A part of a run."""
 
 from dataclasses import replace
+from numbers import Real
 
 import numpy as np
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
 
@@ -27,7 +29,11 @@ def window(
     InputError
         If there are fewer than two output times between them.
     """
+    require_kind("window", Trajectory, trajectory=trajectory)
     t = trajectory.time
+    for name, value in (("start", start), ("end", end)):
+        if value is not None and not (isinstance(value, Real) and value == value):
+            raise InputError(f"{name} = {value!r} must be a time of the run.")
     first = float(t[0]) if start is None else float(start)
     last = float(t[-1]) if end is None else float(end)
     rounding = 1e-12 * max(abs(float(t[0])), abs(float(t[-1])))

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.forcing import forcing_period
 from fecontact.integrate.ensemble import strobe
@@ -103,6 +104,7 @@ def brute_force(
     InputError
         For values that do not ascend, or as :func:`fecontact.strobe`.
     """
+    require_kind("brute_force", ContactSystem, system=system)
     try:
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):

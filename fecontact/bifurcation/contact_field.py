@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.arguments import require_kind
 from fecontact.bifurcation import contact_field_kernels as kernels
 from fecontact.bifurcation.system_family import SystemFamily
 from fecontact.bifurcation.vector_field import Array, VectorField
@@ -181,4 +182,5 @@ def contact_field(
     InputError
         If there is no such parameter, or it has a value per node.
     """
+    require_kind("contact_field", ContactSystem, system=system)
     return ContactField(SystemFamily(system, parameters))

@@ -7,6 +7,7 @@ from numbers import Integral, Real
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import AnalysisError, FecontactError, InputError
 from fecontact.forcing import forcing_period
 from fecontact.integrate import stepping
@@ -94,6 +95,7 @@ def lyapunov_exponents(
     ----------
     G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9.
     """
+    require_kind("lyapunov_exponents", ContactSystem, system=system)
     for name, value, least in (("duration", duration, 0.0), ("interval", interval, 0.0)):
         if value is not None and not (isinstance(value, Real) and least < value < np.inf):
             raise InputError(f"{name} = {value!r} must be above zero [s].")

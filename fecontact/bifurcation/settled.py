@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.periods import count_periods
-from fecontact.errors import AnalysisError, InputError
+from fecontact.arguments import require_kind
+from fecontact.errors import AnalysisError, InputError, require_not_negative
 from fecontact.forcing import common_period
 from fecontact.integrate.initial import Initial
 from fecontact.integrate.simulate import simulate
@@ -66,6 +67,10 @@ def settled_motion(
     AnalysisError
         If the motion does not repeat, or comes to rest.
     """
+    require_kind("settled_motion", ContactSystem, system=system)
+    for name, value in (("transient", transient), ("longest_period", longest_period)):
+        if value is not None:
+            require_not_negative("settled_motion", **{name: value})
     excitation = common_period(system)
     if excitation is None:
         if transient is None or longest_period is None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.contact_kernels import SystemArrays
 from fecontact.errors import FecontactError, InputError
 from fecontact.system import ContactSystem
@@ -41,6 +42,8 @@ class SystemFamily:
     def __init__(
         self, system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str]
     ) -> None:
+        require_kind("parameters", ContactSystem, system=system)
+        require_kind("parameters", Iterable, names=parameters)
         given = (parameters if isinstance(parameters, Mapping)
                  else dict.fromkeys([parameters] if isinstance(parameters, str) else parameters))
         self.base = system

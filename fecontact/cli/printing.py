@@ -1,9 +1,11 @@
 """What commands print: results on stdout, complaints on stderr."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
+_LONGEST = 300  # letters of a word in a message
 
 def show(renderable: Any) -> None:
     """Print a table."""
@@ -34,6 +36,16 @@ def note_age(file: Path, current: bool) -> None:
 
 
 def complain(message: str, code: int) -> int:
-    """Print an error; the exit code that goes with it."""
-    print(f"error: {message}", file=sys.stderr)
+    """Print an error in one line; the exit code that goes with it."""
+    print(f"error: {_one_line(message)}", file=sys.stderr)
     return code
+
+
+def _one_line(message: str) -> str:
+    """A message without line breaks and without what a terminal would take for commands.
+
+    Names of files and keys, which stand in it, may hold either.
+    """
+    text = " ".join(line.strip() for line in message.splitlines())
+    text = re.sub(rf"(\S{{{_LONGEST}}})\S+", r"\1...", text)
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)

@@ -26,7 +26,8 @@ def init(
 
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
-    if file.exists() and not force:
+    # Resolved, because none/../study.toml is there once the folder of the new file is made.
+    if file.resolve().exists() and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
     say(f"{file} is written; next: fecontact run {file}")
@@ -95,6 +96,7 @@ def run(
     --resume goes on from there.
     """
     from fecontact.console import output_folder, progress_bar, waiting
+    from fecontact.locks import locked
     from fecontact.report import notes, run_table
     from fecontact.results import read_study, write_run
 
@@ -102,7 +104,10 @@ def run(
     t_end = described.t_end
     with waiting("Compiling, once after an installation"):
         from fecontact.integrate import control  # noqa: F401
-    with output_folder(output or described.results) as folder:
+    with (output_folder(output or described.results) as folder,
+          locked(folder / f".{described.name}.lock",
+                 f"Another run is writing {folder / described.name}.vtkhdf; wait for it, or choose "
+                 f"another folder with -o.")):
         with waiting("Computing modes"):
             described.system()
         checkpoint = folder / f"{described.name}.checkpoint"

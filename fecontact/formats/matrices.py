@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import as_path
 from fecontact.errors import InputError, choices, nearest
 from fecontact.formats.abaqus_matrix import read_abaqus_matrix
 from fecontact.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
@@ -75,7 +76,7 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     InputError
         If there is no such file or matrix, or the file is damaged or of another kind.
     """
-    path = Path(path)
+    path = as_path(path, "a matrix")
     readers = {".mtx": _read_mtx, ".mm": _read_mtx, ".mat": _read_mat, ".npz": _read_npz,
                ".npy": _read_npy}
     if path.suffix.lower() not in readers:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_path
 from fecontact.errors import InputError
 from fecontact.formats.uff_sets import (
     coordinates,
@@ -173,7 +174,7 @@ def read_uff(path: str | Path) -> UffModes:
         If there is no such file, it is damaged or holds no modes, or a mode is not in
         displacements, or far from real.
     """
-    path = Path(path)
+    path = as_path(path, "modes")
     sets = data_sets(path)
     try:
         return _modes(sets, str(path))

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats, require_kind
 from fecontact.errors import InputError
 from fecontact.forcing import forcing_period
 from fecontact.integrate import stepping
@@ -208,7 +209,8 @@ def _members(
     systems: ContactSystem | Sequence[ContactSystem], initial: Any, times: ArrayLike,
 ) -> tuple[list[ContactSystem], Callable[[int], Array], Array]:
     """One system and row of times for each run, and a function that gives its initial state."""
-    instants = np.array(times, dtype=float)
+    require_kind("ensemble", (ContactSystem, Sequence), systems=systems)
+    instants = np.array(as_floats(times, "times"))
     single = isinstance(systems, ContactSystem)
     members = [systems] if isinstance(systems, ContactSystem) else list(systems)
     if not members or not all(isinstance(system, ContactSystem) for system in members):
@@ -222,7 +224,7 @@ def _members(
         raise InputError(f"The states of all systems must have the same size, not {sorted(sizes)}.")
     if many is not None and len(many) != count:
         raise InputError(f"There are {len(many)} initial states for {count} systems.")
-    if instants.ndim == 1 or len(instants) == 1:
+    if instants.ndim == 1 or (instants.ndim and len(instants) == 1):
         instants = np.tile(instants, (count, 1))
     if instants.ndim != 2 or len(instants) != count or instants.shape[1] < 1 or (
             not np.isfinite(instants).all() or not (np.diff(instants, axis=1) > 0.0).all()):

@@ -7,6 +7,7 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, finish, start
@@ -111,6 +112,7 @@ def sensitivity(
     AnalysisError
         If the run could not reach its end.
     """
+    require_kind("sensitivity", ContactSystem, system=system)
     times = output_times(t_start, t_end, outputs)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")

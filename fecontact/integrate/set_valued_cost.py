@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.set_valued import integrate_set_valued
@@ -82,6 +83,7 @@ def smoothing_cost(
     AnalysisError
         If there is no equilibrium to start from.
     """
+    require_kind("smoothing_cost", ContactSystem, system=system)
     if not isinstance(outputs, int) or outputs < 20:
         raise InputError(f"smoothing_cost: outputs = {outputs!r} must be at least 20.")
     state = initial_state(system, initial, 0.0)

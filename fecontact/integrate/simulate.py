@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_path
 from fecontact.contact_energy import POWERS
 from fecontact.contact_kernels import PENETRATION
 from fecontact.errors import InputError, ModelWarning, choices, nearest
 from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.memory import require_memory
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -25,6 +27,8 @@ _DEEP = 100.0
 # Growth of energy without a source, relative to the largest energy, that is an error, and the
 # output times that are looked at for it.
 _GROWTH, _LOOKS = 1e-2, 200
+# Shortest run [s], and in spacings of floating-point numbers at its times.
+_SHORTEST, _SPACINGS = 1e-100, 1e5
 
 METHODS = ("Rodas5P", "Radau", "BDF", "LSODA", "CVODE", "set-valued")
 
@@ -107,6 +111,8 @@ def simulate(
         raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")
     if t_start is None:
         t_start = float(initial.time[-1]) if isinstance(initial, Trajectory) else 0.0
+    if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
+        require_memory("outputs", int(outputs), _row_size(system))
     times = output_times(t_start, t_end, outputs)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
@@ -122,6 +128,11 @@ def simulate(
         raise InputError(f"A checkpoint is for method = 'Rodas5P' alone, not '{method}'.")
     if events is not None and method != "Rodas5P":
         raise InputError(f"Events are for method = 'Rodas5P' alone, not '{method}'.")
+    if checkpoint is not None and not as_path(checkpoint, "a checkpoint").parent.is_dir():
+        raise InputError(f"checkpoint = {str(checkpoint)!r} cannot be written: there is no folder "
+                         f"{Path(checkpoint).parent}.")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress = {progress!r} must be a function of the time reached.")
     watched = as_watched(events)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory):
@@ -193,6 +204,13 @@ def _checked(run: Trajectory, method: str, rtol: float) -> Status:
     return Status.ENERGY_GREW if grown and run.status is Status.FINISHED else run.status
 
 
+def _row_size(system: ContactSystem) -> float:
+    """Memory for an output time [bytes]: states and work, copied once, and contact quantities."""
+    n = system.basis.contact_nodes
+    states = 2 * system.basis.modes + n * system.memory
+    return 8.0 * (2 * (states + len(POWERS) + n) + 10 * n)
+
+
 def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
     """Warn of a start so deep in the ground that a wrong unit is more likely than a wish."""
     depth = float(system.contact_history(np.array([time]), state[None])[0, :, PENETRATION].max())
@@ -214,10 +232,20 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float
     if not (isinstance(t_start, Real) and isinstance(t_end, Real)
             and -np.inf < t_start < t_end < np.inf):
         raise InputError(f"t_end = {t_end!r} must be a finite time after t_start = {t_start!r}.")
+    latest = max(abs(t_start), abs(t_end))
+    if t_end - t_start < max(_SHORTEST, _SPACINGS * float(np.spacing(latest))):
+        raise InputError(f"t_end = {t_end!r} is too near t_start = {t_start!r} for steps in "
+                         f"between: floating-point numbers cannot tell their times apart; end "
+                         f"later.")
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         if outputs < 2:
             raise InputError(f"outputs = {outputs} must be at least 2.")
-        return np.linspace(t_start, t_end, int(outputs))
+        times = np.linspace(t_start, t_end, int(outputs))
+        if not (np.diff(times) > 0.0).all():
+            raise InputError(f"outputs = {outputs} are too many from t_start = {t_start!r} to "
+                             f"t_end = {t_end!r}: floating-point numbers cannot tell so many "
+                             f"times apart; end later or take fewer outputs.")
+        return times
     try:
         times = np.array(outputs, dtype=float)
     except (TypeError, ValueError):

@@ -290,8 +290,7 @@ class Trajectory:
 
     @cached_property
     def energies(self) -> Energies:
-        """Energies, work and losses of the run; infinite or NaN where they are beyond all numbers.
-        """
+        """Energies, work and losses of the run; not finite where they are beyond all numbers."""
         with np.errstate(over="ignore", invalid="ignore"):
             return self._energies()
 

@@ -185,6 +185,8 @@ def response_figure(
     What is linearised about an unstable state is not what a measurement would show: the legend
     says so.
     """
+    if not responses:
+        raise InputError("responses = [] holds nothing to draw; give at least one.")
     if not any(response.values.any() for response in responses):
         raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
                          f"{_place(responses[0].excitations[0])}; choose another point or "

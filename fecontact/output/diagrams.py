@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.output.diagram_extras import DOTS, draw_beneath, draw_insets, main_axis
 from fecontact.output.figures import DASHES, distinct_colours, new_figure
@@ -75,7 +76,10 @@ def plot_branches(
     """
     from fecontact.bifurcation.branch import Branch
 
+    require_kind("plot_branches", (Branch, Sequence), branches=branches)
     several = [branches] if isinstance(branches, Branch) else list(branches)
+    for branch in several:
+        require_kind("plot_branches", Branch, branch=branch)
     if not several:
         raise InputError("branches = [] holds nothing to draw; give at least one Branch.")
     return save_figure(path, lambda: branches_figure(several, y, x, x_label, y_label, names,

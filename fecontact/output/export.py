@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.arguments import as_path
 from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.dataset import columns, coordinates, to_xarray, variables
@@ -138,6 +139,7 @@ def export_run(
 
 def _whole(path: str | Path, write: Callable[[Path], None]) -> Path:
     """Let a file be written beside its place, and put it there when it is complete."""
+    path = as_path(path, "a table")
     with replaced(path) as part:
         write(part)
-    return Path(path)
+    return path

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.quantities import Point, point_name
 from fecontact.analysis.resolved import Resolved, resolved
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.contact_states import STATE_COLOURS, state_names
@@ -89,6 +90,7 @@ def add_note(figure: "Figure", drawn: Resolved) -> None:
 
 def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Figure":
     """Displacements and velocities of points, and the sums of the contact forces, over time."""
+    require_kind("plot_history", Sequence, points=points)
     points = tuple(points) or _usual_points(trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory

@@ -1,15 +1,20 @@
 """Fields over the body at chosen times, for files and pictures."""
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError
+from fecontact.arguments import require_kind
+from fecontact.errors import InputError, require_positive
 from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+
+_SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
+_LARGEST = 1e12  # factor of displacements; they are drawn in single precision
 
 
 def frame_indices(
@@ -31,6 +36,9 @@ def frame_indices(
     InputError
         If ``frames`` is not such a number, or no output time lies between start and end.
     """
+    for name, value in (("start", start), ("end", end)):
+        if value is not None and not (isinstance(value, Real) and value == value):
+            raise InputError(f"{name} = {value!r} must be a time of the run.")
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 0:
         raise InputError(f"frames = {frames!r} must be a whole number, zero or above.")
     first = 0 if start is None else int(np.searchsorted(time, start, side="left"))
@@ -48,8 +56,23 @@ def frame_indices(
     return chosen[np.unique(nearest)]
 
 
+def require_frame_rate(owner: str, fps: float) -> None:
+    """Raise :class:`InputError` unless movies can have so many frames a second."""
+    if not (isinstance(fps, Real) and not isinstance(fps, bool) and _SLOWEST <= fps <= _FASTEST):
+        raise InputError(f"{owner}: fps = {fps!r} must be a number from {_SLOWEST:g} to "
+                         f"{_FASTEST:g} frames a second.")
+
+
+def require_scale(owner: str, scale: float) -> None:
+    """Raise :class:`InputError` unless displacements can be drawn larger by this factor."""
+    require_positive(owner, scale=scale)
+    if scale > _LARGEST:
+        raise InputError(f"{owner}: scale = {scale!r} must be at most {_LARGEST:g}.")
+
+
 def require_field(trajectory: Trajectory) -> Field:
     """The modes over the body; InputError if the modal basis holds none."""
+    require_kind("require_field", Trajectory, trajectory=trajectory)
     field = trajectory.system.basis.field
     if field is None:
         raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "

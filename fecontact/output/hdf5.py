@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.arguments import as_path
 from fecontact.basis import ModalBasis
 from fecontact.console import held_back_interrupt
 from fecontact.errors import InputError
@@ -95,7 +96,7 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
     """
     import h5py
 
-    path = Path(path)
+    path = as_path(path, "a file of results")
     if not path.is_file():
         raise InputError(f"{path} does not exist.")
     try:

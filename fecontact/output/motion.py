@@ -7,7 +7,7 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError, choices, nearest, require_positive
+from fecontact.errors import InputError, choices, nearest
 from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.contact_states import state_names
@@ -16,6 +16,7 @@ from fecontact.output.frames import (
     contact_forces,
     displacement,
     require_field,
+    require_scale,
     von_mises,
 )
 from fecontact.output.units import round_125
@@ -60,7 +61,7 @@ class Motion:
             raise InputError(f"colour = '{self.colour}' is not known"
                              f"{nearest(self.colour, COLOURS)}; choose from {choices(COLOURS)}.")
         if self.given_scale is not None:
-            require_positive("The deformation", scale=self.given_scale)
+            require_scale("The deformation", self.given_scale)
 
     @cached_property
     def field(self) -> Field:

@@ -1,6 +1,7 @@
 """Moving pictures of a run: MP4, numbered PNG files, or a single still."""
 
 import glob
+import os
 import re
 import subprocess
 from collections.abc import Callable, Iterator
@@ -11,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import as_path
 from fecontact.console import held_back_interrupt
-from fecontact.errors import InputError, MissingLibraryError, require_positive
+from fecontact.errors import InputError, MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.frames import frame_indices, require_field
+from fecontact.output.frames import frame_indices, require_field, require_frame_rate
 from fecontact.output.furniture import Furniture
 from fecontact.output.motion import Colour, Motion
 from fecontact.output.probe import require_rendering
@@ -25,6 +27,7 @@ Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
 _SMALLEST = (320, 180)
+_MOVING, _STILL = 2, 4  # pixels rendered for each of a movie and of a still, in both directions
 # In the head of a picture, by which it is known as one of this package's.
 _SOFTWARE = ("Software", "fecontact")
 _OURS = "\0".join(_SOFTWARE).encode()
@@ -92,12 +95,12 @@ def render(
     MissingLibraryError
         If this computer cannot render pictures or encode movies; the message says what to install.
     """
-    path = Path(path)
+    path = as_path(path, "a movie")
     movie = path.suffix.lower() == ".mp4"
     if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
         raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
                          f"folder.")
-    require_positive("A movie", fps=fps)
+    require_frame_rate("A movie", fps)
     _require_size(size)
     require_field(trajectory)
     indices = frame_indices(trajectory.time, frames, start, end)
@@ -106,7 +109,7 @@ def render(
     motion = Motion(trajectory, indices, colour, scale)
     lasting = float(motion.times[-1] - motion.times[0])
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
-    require_rendering()
+    require_rendering(size, _MOVING)
     with (held_back_interrupt() as check,
           _movie_file(path, size, fps) if movie else _numbered_files(path) as take):
         for done, image in enumerate(_images(motion, size, title, slowness), start=1):
@@ -152,7 +155,7 @@ def picture(
     InputError, MissingLibraryError
         See :func:`render`.
     """
-    path = Path(path)
+    path = as_path(path, "a picture")
     if path.suffix.lower() != ".png":
         raise InputError(f"{path} must end in .png.")
     _require_folder(path)
@@ -162,7 +165,7 @@ def picture(
                                                                             - time)))
     chosen = frame_indices(trajectory.time, _STILL_FRAMES)
     motion = Motion(trajectory, np.union1d(chosen, [at]), colour, scale)
-    require_rendering()
+    require_rendering(size, _STILL)
     frame = int(np.searchsorted(motion.indices, at))
     (image,) = _images(motion, size, title, None, only=frame)
     with replaced(path) as part:
@@ -175,7 +178,7 @@ def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: 
     """Pictures (height, width, 3) of all frames of a motion, or of one."""
     furniture = Furniture(motion, *size, title, slowness)
     scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
-                  fineness=2 if only is None else 4)
+                  fineness=_MOVING if only is None else _STILL)
     with scene:
         for frame in range(len(motion.indices)) if only is None else (only,):
             yield furniture.around(scene.image(frame), frame)
@@ -194,7 +197,8 @@ def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
                                   f"imageio-ffmpeg, or write .png pictures.") from None
     with replaced(path) as part:
         writer = imageio_ffmpeg.write_frames(
-            str(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
+            # Names with colons or a leading hyphen would be protocols and options of ffmpeg.
+            os.path.abspath(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
             pix_fmt_out="yuv420p", ffmpeg_log_level="error",
             output_params=["-movflags", "+faststart"])
         try:
@@ -240,8 +244,9 @@ def _is_ours(picture: Path) -> bool:
 
 def _require_readable(ffmpeg: str, movie: Path) -> None:
     """Raise OSError for a movie cut short: the encoder's exit status is not passed on."""
-    done = subprocess.run([ffmpeg, "-v", "error", "-i", str(movie), "-frames:v", "1", "-f", "null",
-                           "-"], capture_output=True, check=False, stdin=subprocess.DEVNULL)
+    done = subprocess.run([ffmpeg, "-v", "error", "-i", os.path.abspath(movie), "-frames:v", "1",
+                           "-f", "null", "-"], capture_output=True, check=False,
+                          stdin=subprocess.DEVNULL)
     if done.returncode != 0:
         raise OSError("the encoder did not finish; the disk may be full")
 

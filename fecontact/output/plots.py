@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from fecontact.arguments import require_kind
 from fecontact.basis import ModalBasis
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.mode_convergence import ModeConvergence
@@ -29,6 +30,7 @@ def plot_history(trajectory: Trajectory, path: str | Path, points: Sequence[Poin
     InputError
         For a point that does not exist, another suffix, or a file that cannot be written.
     """
+    require_kind("plot_history", Trajectory, trajectory=trajectory)
     return _save(path, lambda: figures.history_figure(trajectory, points))
 
 
@@ -54,6 +56,7 @@ def plot_phase(
         For a point or an axis that does not exist, another suffix, or a file that cannot be
         written.
     """
+    require_kind("plot_phase", Trajectory, trajectory=trajectory)
     return _save(path, lambda: figures.phase_figure(trajectory, point, axis))
 
 
@@ -77,6 +80,7 @@ def plot_contact_map(trajectory: Trajectory, path: str | Path) -> Path:
     InputError
         For another suffix, or a file that cannot be written.
     """
+    require_kind("plot_contact_map", Trajectory, trajectory=trajectory)
     return _save(path, lambda: figures.contact_map_figure(trajectory))
 
 
@@ -95,6 +99,7 @@ def plot_energies(trajectory: Trajectory, path: str | Path) -> Path:
     InputError
         For another suffix, or a file that cannot be written.
     """
+    require_kind("plot_energies", Trajectory, trajectory=trajectory)
     return _save(path, lambda: figures.energies_figure(trajectory))
 
 
@@ -116,6 +121,7 @@ def plot_modes(basis: ModalBasis, path: str | Path, *, count: int = 12) -> Path:
         For a basis without shapes, a count below one, another suffix, or a file that cannot be
         written.
     """
+    require_kind("plot_modes", ModalBasis, basis=basis)
     return _save(path, lambda: modes_figure(basis, count))
 
 

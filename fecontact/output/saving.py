@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fecontact.arguments import as_path
 from fecontact.errors import InputError
 from fecontact.output.figures import STYLE
 from fecontact.whole_files import replaced
@@ -22,7 +23,7 @@ def save_figure(path: str | Path, figure: Callable[[], "Figure"]) -> Path:
     InputError
         For another suffix, or a file that cannot be written.
     """
-    path = Path(path)
+    path = as_path(path, "a plot")
     if path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{path} must end in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}.")
     if not path.parent.is_dir():

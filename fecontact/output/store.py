@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from fecontact.arguments import as_path, require_kind
 from fecontact.basis import ModalBasis
 from fecontact.contact_energy import POWERS
 from fecontact.contact_kernels import GROUND_RATE
@@ -89,6 +90,8 @@ def write_case(
     InputError
         If ``frames`` is negative, or the file cannot be written.
     """
+    require_kind("write_case", Trajectory, trajectory=trajectory)
+    path = as_path(path, "a run")
     indices = frame_indices(trajectory.time, frames)
     folder = Path(path).parent
     root = folder if root is None else Path(root)
@@ -127,6 +130,7 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
         damaged, its system has parameters that this version does not know, or its ground, drive
         or load needs code that is not trusted.
     """
+    path = as_path(path, "a run")
     with open_file(path, "basis") as file:
         if "trajectory" not in file:
             raise InputError(f"{path} holds a modal basis but no run; read it with "

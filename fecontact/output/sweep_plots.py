@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.output import sweep_figures
 from fecontact.output.saving import save_figure
@@ -36,6 +37,7 @@ def plot_sweep(
         For a summary or parameter that does not exist, a sweep of one case, another suffix, or a
         file that cannot be written.
     """
+    require_kind("plot_sweep", SweepTable, table=table)
     for column in (name, *(over or ())):
         table.column(column)
     if name not in table.values:

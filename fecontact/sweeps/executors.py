@@ -3,6 +3,7 @@
 import contextlib
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -14,6 +15,8 @@ from fecontact.errors import AnalysisError, InputError, MissingLibraryError
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 PATIENCE = 10.0  # with a scheduler [s]
+_PER_CORE = 32  # worker processes at most; more would only wait for each other
+_ADDRESS = re.compile(r"(?:\w+://)?(?:\[[0-9a-fA-F:.%]+\]|[^\s\[\]:/]+):(\d+)")
 
 
 class Pool:
@@ -117,9 +120,7 @@ def opened(executor: Executor | None, workers: int | None) -> Iterator[Pool]:
         If it is no executor, or called from a worker's import of the main script.
     """
     if executor is None:
-        count = cores() if workers is None else workers
-        if count < 1:
-            raise InputError(f"workers = {count} must be at least 1.")
+        count = worker_count(workers)
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             raise SystemExit(1)  # the parent says what is wrong
         # Compiled here once, if need be, and not by every worker.
@@ -140,6 +141,15 @@ def _closing(pool: Pool) -> Iterator[Pool]:
         pool.close(at_once=True)
         raise
     pool.close(at_once=False)
+
+
+def worker_count(workers: int | None) -> int:
+    """Number of processes on this machine, one a core by default; InputError if out of range."""
+    count, most = cores() if workers is None else workers, _PER_CORE * cores()
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
+        raise InputError(f"workers = {count!r} must be a whole number from 1 to {most}, "
+                         f"{_PER_CORE} for each of the {cores()} cores.")
+    return count
 
 
 def cores() -> int:
@@ -165,9 +175,13 @@ def dask_executor(address: str, timeout: float | None = None) -> Iterator[Execut
     MissingLibraryError
         If Dask is not installed.
     InputError
-        If no scheduler answers there.
+        If that is no address, or no scheduler answers there.
     """
     timeout = PATIENCE if timeout is None else timeout
+    found = _ADDRESS.fullmatch(address) if isinstance(address, str) else None
+    if found is None or not 0 < int(found[1]) < 2**16:
+        raise InputError(f"dask = {address!r} is not the address of a scheduler; give one like "
+                         f"tcp://node1:8786, with a port from 1 to 65535.")
     try:
         from distributed import Client
     except ImportError:

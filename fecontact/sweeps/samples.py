@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
+from fecontact.memory import require_memory, shown_count
 from fecontact.sweeps.settings import Axis, Distribution, Range, SweepSettings
 
 Array = NDArray[np.float64]
 
 _MOST = 10_000_000  # cases; more than that is a slip of the pen
+_BYTES = 2000.0  # memory for the values, the key and the row of a case
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,9 @@ def plan(settings: SweepSettings) -> Plan:
     for name, axis in axes.items():
         if isinstance(axis, tuple) and not axis:
             raise InputError(f"[sweep.axes]: {name} has no values; give at least one.")
+        if isinstance(axis, Range) and axis.count is not None and axis.count > _MOST:
+            raise InputError(f"[sweep.axes]: {name} has count = {shown_count(axis.count)} values; "
+                             f"at most {_MOST:,} are possible.")
     names = tuple(axes)
     if settings.method in ("grid", "list"):
         given = [_values(name, axis, settings.method) for name, axis in axes.items()]
@@ -64,6 +69,7 @@ def plan(settings: SweepSettings) -> Plan:
         if math.prod(counts) > _MOST:
             raise InputError(f"[sweep]: the grid has {math.prod(counts):,} cases; at most "
                              f"{_MOST:,} are possible, so take fewer values or draw samples.")
+        require_memory("[sweep.axes]: the number of cases", math.prod(counts), _BYTES)
         index = np.indices(counts).reshape(len(counts), -1).T
         return Plan(names, tuple(tuple(values[k] for values, k in zip(given, row, strict=True))
                                  for row in index.tolist()), counts)
@@ -71,7 +77,9 @@ def plan(settings: SweepSettings) -> Plan:
         raise InputError(f"[sweep]: method = '{settings.method}' needs samples, the number of "
                          f"cases to draw.")
     if settings.samples > _MOST:
-        raise InputError(f"[sweep]: samples = {settings.samples:,} must be at most {_MOST:,}.")
+        raise InputError(f"[sweep]: samples = {shown_count(settings.samples)} must be at most "
+                         f"{_MOST:,}.")
+    require_memory("[sweep]: samples", settings.samples, _BYTES)
     parts = _draw(settings, len(names), settings.samples)
     columns = [_at(name, axis, parts[:, k]) for k, (name, axis) in enumerate(axes.items())]
     return Plan(names, tuple(zip(*columns, strict=True)))

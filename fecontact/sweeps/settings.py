@@ -3,12 +3,17 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Real
+from types import NoneType
 from typing import Any, Literal
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices, require_positive
 
 _SUMMARIES = ("largest_displacement", "stick_fraction", "mean_normal_force", "peak_normal_force",
               "friction_power")
+
+_MOST_PERIODS = 100_000  # that are kept of a case
 
 _PARAMETERS: Mapping[str, tuple[str, ...]] = {
     "normal": ("mean", "std"),
@@ -43,6 +48,10 @@ class Range:
     spacing: Literal["linear", "log"] = "linear"
 
     def __post_init__(self) -> None:
+        require_kind("Range", Real, start=self.start, end=self.end)
+        require_kind("Range", (int, NoneType), count=self.count)
+        if self.spacing not in ("linear", "log"):
+            raise InputError(f"Range: spacing = {self.spacing!r} must be 'linear' or 'log'.")
         if not (math.isfinite(self.start) and math.isfinite(self.end)):
             raise InputError(f"Range: start = {self.start!r} and end = {self.end!r} must be "
                              f"finite.")
@@ -96,6 +105,7 @@ class Distribution:
             raise InputError(f"Distribution: '{self.distribution}' takes the keys "
                              f"{choices(needed)}, not {choices(given)}.")
         for name, value in given.items():
+            require_kind("Distribution", Real, **{name: value})
             if not math.isfinite(value):
                 raise InputError(f"Distribution: {name} = {value!r} must be finite.")
         require_positive("Distribution", **{name: value for name, value in given.items()
@@ -141,10 +151,11 @@ class Strobing:
     axis: Literal["x", "y"] = "x"
 
     def __post_init__(self) -> None:
+        require_kind("Strobing", int, transient=self.transient, keep=self.keep)
         if self.transient < 0:
             raise InputError(f"Strobing: transient = {self.transient} must be zero or above.")
-        if self.keep < 1:
-            raise InputError(f"Strobing: keep = {self.keep} must be at least 1.")
+        if not 1 <= self.keep <= _MOST_PERIODS:
+            raise InputError(f"Strobing: keep = {self.keep} must be from 1 to {_MOST_PERIODS}.")
 
 
 Value = bool | int | float | str | tuple[float, ...]
@@ -197,6 +208,7 @@ class SweepSettings:
     strobe: Strobing | None = None
 
     def __post_init__(self) -> None:
+        require_kind("SweepSettings", Mapping, axes=self.axes)
         for name, count in (("samples", self.samples), ("batch", self.batch)):
             if count is not None and count < 1:
                 raise InputError(f"SweepSettings: {name} = {count} must be at least 1.")

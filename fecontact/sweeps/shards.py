@@ -7,7 +7,6 @@ not at all and never changed.
 import contextlib
 import hashlib
 import json
-import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fecontact.basis import ModalBasis
-from fecontact.errors import InputError
+from fecontact.locks import locked
 from fecontact.stored import DamagedError, from_json, reading
 from fecontact.sweeps.batch import Row, case_file
 from fecontact.whole_files import clear_leftovers, replaced
@@ -113,29 +112,10 @@ class Store:
         InputError
             If another sweep is at work there.
         """
-        try:
-            import fcntl
-        except ImportError:  # Windows: content-named shards alone keep sweeps apart
+        busy = (f"Another sweep is at work in {self.folder}; wait for it, or choose another "
+                f"folder.")
+        with locked(self.folder / ".lock", busy, keep=True):
             yield
-            return
-        path = self.folder / ".lock"
-        try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-        except OSError as error:
-            raise InputError(f"{path} cannot be written "
-                             f"({(error.strerror or str(error)).lower()}).") from None
-        try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise InputError(f"Another sweep is at work in {self.folder}; wait for it, or "
-                                 f"choose another folder.") from None
-            except OSError:  # file systems without locks
-                yield
-                return
-            yield
-        finally:
-            os.close(descriptor)
 
 
 def _require_row(row: Any) -> None:

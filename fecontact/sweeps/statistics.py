@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats, require_kind
 from fecontact.errors import InputError
 from fecontact.sweeps.table import SweepTable
 
@@ -69,7 +70,7 @@ def statistics(
     """
     from scipy import stats
 
-    x = np.array(values, dtype=float)
+    x = as_floats(values, "The values of statistics").ravel()
     x = x[np.isfinite(x)]
     if len(x) < 3:
         raise InputError(f"Statistics need at least 3 cases that went well, not {len(x)}.")
@@ -116,6 +117,7 @@ def sobol_indices(
     InputError
         If the cases are not those of such a sweep, or too few went well.
     """
+    require_kind("sobol_indices", SweepTable, table=table)
     names = tuple(table.parameters)
     first, total, samples = indices_of(table.column(name), len(names), confidence=confidence,
                                           seed=seed)

@@ -16,7 +16,7 @@ from fecontact.study import Study
 from fecontact.sweeps.bases import Bases
 from fecontact.sweeps.batch import Batch, Case, Row, make_basis
 from fecontact.sweeps.dispatch import LostError, results
-from fecontact.sweeps.executors import opened
+from fecontact.sweeps.executors import opened, worker_count
 from fecontact.sweeps.identity import case_keys
 from fecontact.sweeps.samples import Plan, plan
 from fecontact.sweeps.settings import SweepSettings, flat_axes
@@ -95,6 +95,7 @@ def sweep(
         After Ctrl-C; finished cases are kept.
     """
     study = study if isinstance(study, Study) else Study.read(study)
+    worker_count(workers)
     wanted = _settings(study, axes, settings)
     base = replace(study, sweep=None)
     vars(base).update({name: value for name, value in vars(study).items() if name[0] == "_"})
@@ -119,8 +120,10 @@ def sweep(
         work.require_points(rows)
         if retry:
             rows = {key: row for key, row in rows.items() if not row["reason"]}
+        finished = False
         try:
             _compute(work, store, rows, executor, workers, progress)
+            finished = True
         except FecontactError as error:
             done = sum(case.key in rows for case in work.cases)
             if not done:
@@ -128,9 +131,11 @@ def sweep(
             raise type(error)(f"{error} {done} of {len(work.cases)} cases are kept in {place}; go "
                               f"on with --resume (resume=True).") from None
         finally:
-            with contextlib.suppress(InputError):
-                work.table(rows, place).write(place / "index.csv")
-    return work.table(rows, place)
+            table = work.table(rows, place)
+            # Where something else went wrong, that is what must be said.
+            with contextlib.nullcontext() if finished else contextlib.suppress(InputError):
+                table.write(place / "index.csv")
+    return table
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import as_path
 from fecontact.errors import InputError, choices, nearest
 from fecontact.sweeps.shards import write_whole
 
@@ -148,7 +149,7 @@ def read_table(path: str | Path) -> SweepTable:
     InputError
         If there is no such file, or it is no such table.
     """
-    path = Path(path)
+    path = as_path(path, "a table")
     try:
         with path.open(encoding="utf-8", newline="") as file:
             head, *rows = csv.reader(file)

@@ -166,11 +166,12 @@ def test_a_law_can_be_compared_and_hashed():
     ({"stiffness": np.array(3.0)}, None),
 ])
 def test_values_are_checked(values, message):
+    values = {"stiffness": 1e6, "roughness_height": R, **values}
     if message is None:
-        assert RoughSurface(**{"stiffness": 1e6, "roughness_height": R, **values}).table(np.ones(1))[0, 0] == 3.0
+        assert RoughSurface(**values).table(np.ones(1))[0, 0] == 3.0
         return
     with pytest.raises(InputError, match=message):
-        RoughSurface(**{"stiffness": 1e6, "roughness_height": R, **values})
+        RoughSurface(**values)
 
 
 def test_number_of_values_per_node_is_checked():

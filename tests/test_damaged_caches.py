@@ -1,0 +1,84 @@
+"""Compiled code on disk that is cut short, empty or garbage: compiled again, never a crash."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+MODULE = '''
+from fecontact.compiled import compile_law, f8, kernel
+
+
+@kernel(f8(f8))
+def doubled(x):
+    return 2.0 * x
+
+
+def halved(x):
+    return 0.5 * x
+
+
+LAW = compile_law(f8(f8), "f(x) -> y", halved)
+assert doubled(3.0) == 6.0
+assert LAW.address
+hits = sum(doubled.stats.cache_hits.values()), LAW._compiled.cache_hits
+print(*hits)
+'''
+
+
+def hits(folder):
+    """Whether kernel and law were found on disk by a new process."""
+    done = subprocess.run([sys.executable, "-c", "import own_kernels"], cwd=folder, check=False,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+DAMAGES = {
+    "cut": lambda content: content[: len(content) // 2],
+    "cut at the end": lambda content: content[:-1],
+    "head alone": lambda content: content[:3],
+    "empty": lambda content: b"",
+    "zeros": lambda content: bytes(len(content)),
+    "text": lambda content: b"hello",
+}
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_code_is_compiled_again(tmp_path, stored, suffix, damage):
+    for path in stored.rglob("*"):
+        if path.is_file():
+            copy = tmp_path / path.relative_to(stored)
+            copy.parent.mkdir(exist_ok=True)
+            copy.write_bytes(path.read_bytes())
+    other = tmp_path / "__pycache__" / f"mine{suffix}"
+    other.write_bytes(b"of somebody else")
+    own = [path for path in other.parent.glob(f"*{suffix}") if path != other]
+    assert len(own) == 2
+    for path in own:
+        path.write_bytes(DAMAGES[damage](path.read_bytes()))
+    assert hits(tmp_path) == ["0", "0"]
+    assert other.read_bytes() == b"of somebody else"
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    folder = Path(tmp_path_factory.mktemp("kernels"))
+    (folder / "own_kernels.py").write_text(MODULE)
+    assert hits(folder) == ["0", "0"]
+    assert hits(folder) == ["1", "1"]
+    return folder
+
+
+def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path):
+    """Folders stand where numba would put its index: neither read nor written."""
+    (tmp_path / "own_kernels.py").write_text(MODULE)
+    assert hits(tmp_path) == ["0", "0"]
+    assert hits(tmp_path) == ["1", "1"]
+    for path in (tmp_path / "__pycache__").glob("*.nbi"):
+        path.unlink()
+        path.mkdir()
+    assert hits(tmp_path) == ["0", "0"]
