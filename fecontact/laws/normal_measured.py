@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,7 +135,7 @@ class MeasuredSurface(RoughSurface):
     @property
     def _bed(self) -> "_Bed":
         """The parameters that may differ from node to node."""
-        return _Bed(self.stiffness, self.roughness_height, self.damping)
+        return _Bed(self.stiffness, cast(PerNode, self.roughness_height), self.damping)
 
     @classmethod
     def from_heights(
