@@ -74,7 +74,7 @@ def located_between(
             kind = str(details.get("kind", name))
             rest = {key: value for key, value in details.items() if key != "kind"}
             if off > 0.0:
-                rest |= {"located": False, "parameter_error": off * _rate(problem, here, there)}
+                rest |= {"located": False, "parameter_error": off * _rate(here, there, row)}
             found.append(BranchPoint(at.u, at.tangent, at.values, kind, rest))
     met: Solution | None = None
     for sign, bound in zip((-1.0, 1.0), settings.bounds, strict=True):
@@ -104,9 +104,9 @@ def located_between(
     return end, found
 
 
-def _rate(problem: Problem, here: Solution, there: Solution) -> float:
-    """Change of the parameter over a length along the branch, at the most."""
-    return max(abs(float(here.tangent[-1])), abs(float(there.tangent[-1])))
+def _rate(here: Solution, there: Solution, row: Array) -> float:
+    """Change of the parameter over a length along the row, at the most."""
+    return max(abs(float(at.tangent[-1]) / float(row @ at.tangent)) for at in (here, there))
 
 
 def _change(
@@ -133,7 +133,7 @@ def _change(
             high, at = middle, reached
     return BranchPoint(at.u, at.tangent, at.values, UNRESOLVED, {
         "unstable_before": counts[0], "unstable_after": counts[1],
-        "parameter_error": (high - low) * _rate(problem, here, there)})
+        "parameter_error": (high - low) * _rate(here, there, row)})
 
 
 def _jumped(

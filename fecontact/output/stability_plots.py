@@ -97,7 +97,8 @@ def eigenvalues_figure(
     upper.set_ylabel("frequency [Hz]")
     lower.set_ylabel("growth rate [1/s]")
     lower.set_xlabel(x_label or parameter_label(branch.name))
-    lower.set_xlim(values.min(), values.max())
+    if values.min() < values.max():
+        lower.set_xlim(values.min(), values.max())
     figure.align_ylabels([upper, lower])
     return figure
 

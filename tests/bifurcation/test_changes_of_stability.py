@@ -20,6 +20,7 @@ from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.vector_field import VectorField
+from fecontact.output.stability_plots import plot_eigenvalues
 
 CHANGES = {"fold": {-1, 1}, "branch point": {-1, 0, 1}, "period doubling": {-1, 1},
            "Hopf": {-2, 2}, "Neimark-Sacker": {-2, 2}}
@@ -170,9 +171,10 @@ def test_a_start_on_a_bound_that_heads_outwards_is_all(start, direction):
     assert (np.diff(both.parameter) * direction > 0.0).all()
 
 
-def test_equilibria_and_orbits_that_start_on_a_bound():
+def test_equilibria_that_start_on_a_bound(tmp_path):
     field = two_mass_field(20.0, 0.05)
     out = equilibrium_branch(field, "ground.speed", bounds=(0.05, 8.0), direction=-1.0)
     assert (len(out), out.status) == (1, Status.BOUND)
+    assert plot_eigenvalues(out, tmp_path / "one.png").exists()
     there = equilibrium_branch(field, "ground.speed", bounds=(0.05, 8.0), direction=-1.0, both=True)
     assert there.parameter[[0, -1]] == pytest.approx([8.0, 0.05], rel=1e-12)

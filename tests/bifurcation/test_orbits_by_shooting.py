@@ -1,6 +1,7 @@
 """What begins on branches by shooting, driven systems, and settled motions as starts."""
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
 from fecontact.bifurcation.observation import motion_of, observe
 from fecontact.bifurcation.orbit_output import orbit_history
-from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
+from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.settled import settled_motion
 from fecontact.bifurcation.shooting_branch import orbits_by_shooting
@@ -62,6 +63,23 @@ def test_doubled_orbits_agree_with_collocation(two_masses):
         observe(field, twice, 1), observe(field, wanted, 1)))
     for name in ("observed_minimum", "observed_maximum"):
         assert low[name] == pytest.approx(high[name], rel=1e-4)
+
+
+def test_events_agree_with_collocation(two_masses):
+    """Where the period has a certain value: of two discretisations, each with steps of its own."""
+    field, _, orbits = two_masses
+    near = max((at for at in orbits.points if at.parameter < 7.6), key=lambda at: at.parameter)
+    beyond = min((at for at in orbits.points if at.parameter > 7.7), key=lambda at: at.parameter)
+    wanted = (near.values["period"] + beyond.values["period"]) / 2.0
+    settings = Settings(step=0.02, points=10, stop_at=["period"],
+                        events={"period": lambda values: values["period"] - wanted})
+    motion = orbit_history(near, 4, 2000)
+    options = {"values": field.values_with(B=near.parameter), "bounds": (7.0, 8.3),
+               "period": near.values["period"], "settings": settings}
+    places = [follow(field, "B", *motion, **options).of_kind("period")[0].parameter
+              for follow in (orbits_by_shooting, partial(orbits_from_motion, intervals=100))]
+    assert near.parameter < places[0] < beyond.parameter
+    assert places[0] == pytest.approx(places[1], rel=1e-8)
 
 
 def test_orbits_of_a_hopf_point_agree_with_collocation(two_masses):
