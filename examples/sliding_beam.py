@@ -77,7 +77,7 @@ def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
     """Print the convergence, draw energies, contact and wear, and film the beam."""
     folder.mkdir(parents=True, exist_ok=True)
     beam = body(5e-3 if quick else 2.5e-3)
-    finest = run(system(beam, 40 if quick else 160))
+    finest = run(system(beam, 20 if quick else 160))
     print("nodes   error of motion   of wear along the face")
     for nodes in (5, 10) if quick else (5, 10, 20, 40, 80):
         of_motion, of_wear = error(run(system(beam, nodes)), finest)
@@ -85,7 +85,7 @@ def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
 
     complete = run(system(beam, modes=12 if quick else 30, reduction="residual", tolerance=0.02))
     print("\nmodes   error of motion   with residual vectors (coordinates)")
-    for modes in (4, 6) if quick else (4, 6, 8, 12, 20, 30):
+    for modes in (6,) if quick else (4, 6, 8, 12, 20, 30):
         plain = run(system(beam, modes=modes))
         residual = run(system(beam, modes=modes, reduction="residual", tolerance=0.05))
         print(f"{modes:5d}   {error(plain, complete)[0]:15.2%}   "

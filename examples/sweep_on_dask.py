@@ -6,6 +6,7 @@ processes on this machine. Whatever happens to workers, the table is that of an 
 Usage: python examples/sweep_on_dask.py [--quick]
 """
 
+import shutil
 import socket
 import subprocess
 import sys
@@ -35,9 +36,10 @@ def main(quick: bool = False) -> None:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     address = f"tcp://127.0.0.1:{port}"
+    folder = tempfile.mkdtemp()
     scheduler = start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port))
-    workers = [start("distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny")
-               for _ in range(2)]
+    workers = [start("distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny",
+                     "--local-directory", f"{folder}/workers") for _ in range(2)]
     study = fc.Study.read(STUDY).with_(**{"simulation.t_end": 12.0, "simulation.outputs": 1201,
                                           "sweep.after": 9.0})
 
@@ -48,12 +50,14 @@ def main(quick: bool = False) -> None:
             print(f"{done} of {total} cases are done; one of the two workers is killed")
 
     try:
-        with tempfile.TemporaryDirectory() as folder, fc.dask_executor(address, 30.0) as executor:
-            table = fc.sweep(study, axes, executor, folder=folder, progress=show)
+        with fc.dask_executor(address, 30.0) as executor:
+            table = fc.sweep(study, axes, executor, folder=f"{folder}/sweep", progress=show)
     finally:
         for process in (*workers, scheduler):
             process.kill()
             process.wait()
+        # Workers that are killed leave theirs behind.
+        shutil.rmtree(folder, ignore_errors=True)
     amplitude = table.grid("amplitude_x")
     print(f"{len(table)} cases, {len(table.failed)} failed")
     speeds = np.unique(table.column("ground.speed"))

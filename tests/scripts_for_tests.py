@@ -38,8 +38,8 @@ def run_script(script, arguments, folder, monkeypatch, capsys):
         runpy.run_path(str(script), run_name="__main__")
         printed = capsys.readouterr().out
     assert files_of(script.parent) == before
-    left = [name for name in files_of(scratch) if not name.startswith("fecontact_reference_")]
-    assert not left
+    left = {name for name in files_of(scratch) if not name.startswith("fecontact_reference_")}
+    assert left == set()
     return printed, files_of(home)
 
 

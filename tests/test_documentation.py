@@ -1,4 +1,4 @@
-"""The README and the pages of docs: their code runs, their tables are read, their commands parse."""
+"""The README and the pages of docs: code runs, tables are read, commands parse."""
 
 import re
 import shlex

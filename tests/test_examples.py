@@ -10,7 +10,7 @@ from fecontact.output.store import read_case
 
 # Spring of the drive and elastic mode with the contact held: w^2 of the one motion that is left.
 _w = 2.0 * np.pi * 30.0
-HELD_HZ = np.sqrt((0.5**2 * 0.0 + _w**2 + 5610.0 / 5.632 * (0.5 + 0.5) ** 2) / 1.25) / (2 * np.pi)
+HELD_HZ = np.sqrt((_w**2 + 5610.0 / 5.632 * (0.5 + 0.5) ** 2) / 1.25) / (2.0 * np.pi)
 
 # Arguments; patterns, numbers and tolerances; files.
 EXAMPLES = {
@@ -22,7 +22,8 @@ EXAMPLES = {
     # The middle fifth carries most of 5 kN; both tables as in docs/convergence.md.
     "contact_convergence": ((), [(r"^\| 10 \| 10 \|[^|]*\| (\S+) \|", 20.71, 0.01),
                                  (r"^\| 5 \| 20 \|[^|]*\| (\S+) \|", 20.43, 0.01)], set()),
-    "squeal": (("out",), [(r"coefficient of (\S+) on", 0.3108, 2e-4), (r"at (\S+) Hz,", 646.0, 0.1)],
+    "squeal": (("out",), [(r"coefficient of (\S+) on", 0.3108, 2e-4),
+                          (r"at (\S+) Hz,", 646.0, 0.1)],
                {"out/squeal_map.png", "out/squeal_modes.png"}),
     # As printed by Sextro: 7.09 and 8.09; the others see the example itself.
     "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
@@ -47,7 +48,7 @@ EXAMPLES = {
     "beam_stick_slip": (("out.png",), [(r"stable above (\S+) mm/s", 8.3365, 1e-3),
                                        (r"50.0000 mm/s: (\S+) ms", 55.619, 2e-3),
                                        (r"run at 50 mm/s: (\S+) ms", 55.619, 2e-3)], {"out.png"}),
-    "sliding_beam": (("out",), [(r"off by (\S+)\.$", 0.0, 1e-8), (r"^   10 +(\S+)%", 4.2, 0.5)],
+    "sliding_beam": (("out",), [(r"off by (\S+)\.$", 0.0, 1e-8), (r"^   10 +(\S+)%", 4.0, 1.0)],
                      {f"out/{name}" for name in ("energies.png", "contact.png", "history.png",
                                                  "friction-work.png", "sliding-beam.mp4")}),
     "sweep_on_dask": ((), [(r"^(\d+) cases, 0 failed", 4.0, 0.0)], set()),
