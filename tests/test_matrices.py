@@ -1,6 +1,8 @@
 """Files of matrices: one body in every format, what each format allows, and damaged files."""
 
 import importlib.util
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -303,3 +305,93 @@ def test_other_files():
         read_matrix("K.op4")
     with pytest.raises(InputError, match=r"K\.mtx: there is no such file"):
         read_matrix("K.mtx")
+
+
+def _npz(path, form, **arrays):
+    np.savez(path, format=form.encode(), shape=np.array(arrays.pop("shape", (3, 3))), **arrays)
+
+
+def _hdf5(path, jc, ir, data, rows=3):
+    with h5py.File(path, "w") as file:
+        group = file.create_group("K")
+        group.attrs["MATLAB_sparse"] = np.uint64(rows)
+        for name, values in (("jc", jc), ("ir", ir), ("data", data)):
+            group[name] = values
+
+
+_ONES = np.ones(3)
+_STARTS = np.array([0, 1, 2, 3], dtype=np.int32)
+UNSOUND = {
+    "csr-high.npz": lambda path: _npz(path, "csr", data=_ONES, indptr=_STARTS, indices=np.array(
+        [0, 1, 100_000_000], dtype=np.int32)),
+    "csr-negative.npz": lambda path: _npz(path, "csr", data=_ONES, indptr=_STARTS, indices=np.array(
+        [0, 1, -50_000_000], dtype=np.int32)),
+    "csc-starts.npz": lambda path: _npz(path, "csc", data=_ONES, indices=np.arange(3), indptr=(
+        np.array([0, 900_000_000, 2, 3], dtype=np.int32))),
+    "bsr.npz": lambda path: _npz(path, "bsr", data=np.ones((3, 1, 1)), indptr=_STARTS, indices=(
+        np.array([0, 1, 70_000_000], dtype=np.int32))),
+    "coo.npz": lambda path: _npz(path, "coo", data=_ONES, row=np.array([0, 1, 10**8]),
+                                 col=np.arange(3)),
+    "dia.npz": lambda path: _npz(path, "dia", data=np.ones((1, 3)), offsets=np.array([10**8])),
+    "wide.npz": lambda path: _npz(path, "csr", shape=(3, 10**13), data=_ONES, indptr=_STARTS,
+                                  indices=np.arange(3)),
+    "long.npz": lambda path: _npz(path, "coo", shape=(10**13, 10**13), data=_ONES,
+                                  row=np.arange(3), col=np.arange(3)),
+    "high.mat": lambda path: _hdf5(path, _STARTS, np.array([0, 1, 10**8]), _ONES),
+    "starts.mat": lambda path: _hdf5(path, np.array([0, 5 * 10**8, 2, 3]), np.arange(3), _ONES),
+    "rows.mat": lambda path: _hdf5(path, _STARTS, np.arange(3), _ONES, rows=10**15),
+    "count.mtx": lambda path: path.write_text(
+        f"%%MatrixMarket matrix coordinate real general\n3 3 {10**12}\n1 1 1.0\n"),
+    "dense.mtx": lambda path: path.write_text(
+        "%%MatrixMarket matrix array real general\n1000000 1000000\n1.0\n"),
+    "beyond.mtx": lambda path: path.write_text(
+        "%%MatrixMarket matrix coordinate real general\n3 3 1\n9 1 1.0\n"),
+    "size.mtx": lambda path: path.write_text(
+        f"%%MatrixMarket matrix coordinate real general\n{10**12} {10**12} 1\n1 1 1.0\n"),
+    "large.mtx": lambda path: path.write_text(f"1 1 1.0\n{10**15} {10**15} 1.0\n"),
+    "infinite.mtx": lambda path: path.write_text("1 1 1.0\n1e300 inf 1.0\n"),
+    "label.mtx": lambda path: path.write_text("1, 1, 1, 1, 1.0\n1e17, 1, 1e17, 1, 1.0\n"),
+    "header.npy": lambda path: path.write_bytes(_npy_header((10**6, 10**6))),
+    "negative.npy": lambda path: path.write_bytes(_npy_header((-3, 3)) + bytes(72)),
+}
+
+
+def _npy_header(shape):
+    text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return np.lib.format.magic(1, 0) + len(text).to_bytes(2, "little") + text.encode()
+
+
+_READ = """
+import resource, sys
+from fecontact import InputError, read_matrix
+resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))
+for path in sys.argv[1:]:
+    try:
+        matrix = read_matrix(path).matrix
+        print("read", abs(matrix).sum(), matrix.T.tocsr().sum())
+    except InputError as error:
+        print(error)
+"""
+
+
+def test_unsound_matrices_are_refused_before_they_are_used(tmp_path):
+    """In a process of its own: compiled code would write where such indices point."""
+    for name, write in UNSOUND.items():
+        write(tmp_path / name)
+    done = subprocess.run(
+        [sys.executable, "-c", _READ, *(str(tmp_path / name) for name in UNSOUND)],
+        capture_output=True, text=True, check=False, timeout=100,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])})
+    assert done.returncode == 0, done.stderr[-500:]
+    lines = done.stdout.splitlines()
+    assert len(lines) == len(UNSOUND)
+    for name, line in zip(UNSOUND, lines, strict=True):
+        assert line.startswith(f"{tmp_path / name}"), line
+        assert "MemoryError" not in line
+
+
+@pytest.mark.parametrize("form", ["csr", "csc", "bsr", "coo", "dia"])
+def test_sound_sparse_matrices_of_all_forms_are_read(tmp_path, form):
+    matrix = sp.random_array((6, 6), density=0.4, rng=np.random.default_rng(1)) + sp.eye_array(6)
+    sp.save_npz(tmp_path / "k.npz", matrix.asformat(form))
+    assert np.array_equal(read_matrix(tmp_path / "k.npz").matrix.toarray(), matrix.toarray())
