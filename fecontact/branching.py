@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.contact_field import ContactField, contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
-from fecontact.bifurcation.observation import observe, shot
+from fecontact.bifurcation.observation import motion_of, observe, shot
 from fecontact.bifurcation.problem import Settings
 from fecontact.console import waiting
 from fecontact.errors import FecontactError
+from fecontact.model_limits import limits_exceeded, warn_of_limits
 
 if TYPE_CHECKING:
     from fecontact.study_branch import BranchSettings
@@ -28,6 +29,8 @@ _EQUILIBRIA = "steady sliding"
 _FINE = 0.02
 # Amplitudes of the first orbit that count as one in the length of a step.
 _SIZE = 10.0
+# Points of a branch that are held against the limits of the model.
+_LOOKS = 12
 
 
 @dataclass
@@ -97,12 +100,29 @@ def follow_branches(
             result.notes.append(f"The branch '{task.title}' was not followed: {error}")
             continue
         result.found[task.title] = observe(result.contact_field, branch, *result.observe)
+        warn_of_limits(_limits_exceeded(result.contact_field, branch), f"On '{task.title}'")
         if branch.status is Status.INTERRUPTED:
             result.interrupted = True
             break
         if task.generation < wanted.generations:
             tasks.extend(_tasks_beyond(result.contact_field, branch, task, wanted))
     return result
+
+
+def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
+    """Where a branch first leaves what the model holds for, at some of its points."""
+    values = np.array(branch.attributes["parameter_values"], dtype=float)
+    for place in np.unique(np.linspace(0, len(branch) - 1, _LOOKS).astype(int)):
+        point = branch.points[place]
+        values[field.index(branch.name)] = point.parameter
+        if "period" in point.values:
+            times, states = motion_of(field, branch, point)
+        else:
+            times, states = np.zeros(1), np.atleast_2d(point.values["state"])
+        found = limits_exceeded(field.system(values), times, states)
+        if found:
+            yield from (f"at {branch.name} = {point.parameter:.6g} {one}" for one in found)
+            return
 
 
 class _Task(NamedTuple):

@@ -4,12 +4,14 @@ A wrong unit, or a load that nothing carries, shows in these first.
 """
 
 import warnings
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.contact_kernels import PENETRATION
 from fecontact.errors import ModelWarning
+from fecontact.laws.contract import NormalLaw
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -44,10 +46,10 @@ def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple
     return tuple(sentence for sentence in found if sentence)
 
 
-def warn_of_limits(system: ContactSystem, time: float, state: Array, what: str) -> None:
-    """Give a ModelWarning for each of :func:`limits_exceeded` by one state."""
-    for sentence in limits_exceeded(system, np.array([time]), state[None]):
-        warnings.warn(f"{what}: {sentence}", ModelWarning, stacklevel=3)
+def warn_of_limits(sentences: Iterable[str], what: str) -> None:
+    """Give a ModelWarning for each of the sentences; ``what`` begins them: 'In this run'."""
+    for sentence in sentences:
+        warnings.warn(f"{what} {sentence}", ModelWarning, stacklevel=3)
 
 
 def _too_far(system: ContactSystem, states: Array) -> str | None:
@@ -76,27 +78,25 @@ def _too_far(system: ContactSystem, states: Array) -> str | None:
 
 
 def _too_deep(system: ContactSystem, times: Array, states: Array) -> str | None:
-    rough_faces = [law for _, _, law in system.law_groups("normal")
-                   if hasattr(law, "roughness_height")]
-    if not rough_faces:
+    rough = [(nodes, law.roughness_height) for nodes, _, law in system.law_groups("normal")
+             if isinstance(law, NormalLaw) and hasattr(law, "roughness_height")]
+    if not rough:
         return None
     penetration = np.zeros(system.basis.contact_nodes)
     for first in range(0, len(times), _BLOCK):
         part = slice(first, first + _BLOCK)
         history = system.contact_history(times[part], states[part])
         penetration = np.maximum(penetration, history[:, :, PENETRATION].max(axis=0))
-    worst, node, rough = 0.0, 0, 1.0
-    for nodes, _, law in system.law_groups("normal"):
-        height = getattr(law, "roughness_height", None)
-        if height is None:
-            continue
+    worst, node, worst_height = 0.0, 0, 1.0
+    for nodes, height in rough:
         heights = np.broadcast_to(np.asarray(height, dtype=float), penetration[nodes].shape)
         relative = penetration[nodes] / heights
         if relative.max() > worst:
             k = int(np.argmax(relative))
-            worst, node, rough = float(relative[k]), nodes.start + k, float(heights[k])
+            worst, node, worst_height = float(relative[k]), nodes.start + k, float(heights[k])
     if worst <= DEEPEST:
         return None
-    return (f"contact node {node} is {worst * rough:.2g} m deep in the ground, {worst:.2g} times "
-            f"its roughness height of {rough:.2g} m; above {DEEPEST:g} times the asperities are "
-            f"crushed, so look whether load, stiffness and units are right.")
+    return (f"contact node {node} is {worst * worst_height:.2g} m deep in the ground, "
+            f"{worst:.2g} times its roughness height of {worst_height:.2g} m; above {DEEPEST:g} "
+            f"times the asperities are crushed, so look whether load, stiffness and units are "
+            f"right.")

@@ -101,6 +101,7 @@ def stored_run(file: Path, trust: bool = False) -> StoredRun:
     """
     with loading():
         from fecontact.laws.names import law_files
+        from fecontact.model_limits import warn_of_limits
         from fecontact.output.store import read_case
         from fecontact.study import Study
         from fecontact.study_sections import RenderSettings
@@ -113,6 +114,7 @@ def stored_run(file: Path, trust: bool = False) -> StoredRun:
             raise InputError(f"{path} does not exist; run the study first: fecontact run {file}")
         known = law_files(study.tables())
         case = read_case(path, trust=trust or known)
+        warn_of_limits(case.trajectory.limits_exceeded, "In this run")
         return StoredRun(path, case.trajectory, study.render,
                          _same_run(study, case.study, trust or known))
     case = read_case(file, trust=trust)
@@ -122,6 +124,7 @@ def stored_run(file: Path, trust: bool = False) -> StoredRun:
     except FecontactError:
         # A run with a study that this version does not know can still be drawn.
         settings = RenderSettings()
+    warn_of_limits(case.trajectory.limits_exceeded, "In this run")
     return StoredRun(file, case.trajectory, settings)
 
 

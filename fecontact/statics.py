@@ -10,7 +10,7 @@ from fecontact.errors import AnalysisError
 from fecontact.laws.contract import friction_law, signal
 from fecontact.laws.signals import Constant
 from fecontact.memory_states import settled
-from fecontact.model_limits import warn_of_limits
+from fecontact.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -61,8 +61,8 @@ def static_equilibrium(
     """
     require_kind("static_equilibrium", ContactSystem, system=system)
     q = equilibrium(system, friction, time)
-    warn_of_limits(system, time, np.concatenate([q, np.zeros(system.size - len(q))]),
-                   "In equilibrium")
+    state = np.concatenate([q, np.zeros(system.size - len(q))])
+    warn_of_limits(limits_exceeded(system, np.array([time]), state[None]), "In equilibrium")
     return q
 
 

@@ -1,13 +1,15 @@
 """From a command line to an exit code: errors are one sentence, without a traceback."""
 
 import sys
+import warnings
+from typing import Any
 
 from cyclopts import CycloptsError
 
 from fecontact.cli.app import app
 from fecontact.cli.printing import complain
 from fecontact.console import INTERRUPTED, ending_signals, interrupted_code
-from fecontact.errors import FecontactError
+from fecontact.errors import FecontactError, ModelWarning
 
 
 def main() -> None:
@@ -22,9 +24,23 @@ def execute(tokens: list[str]) -> int:
     after Ctrl-C, 143 after SIGTERM and 129 after SIGHUP. Errors are one sentence on stderr;
     ``--debug`` shows where they come from.
     """
-    with ending_signals():
+    with ending_signals(), warnings.catch_warnings():
+        warnings.simplefilter("default", ModelWarning)
+        warnings.showwarning = _show_warning(warnings.showwarning)
         code = _execute(tokens)
         return interrupted_code() if code == INTERRUPTED else code
+
+
+def _show_warning(otherwise: Any) -> Any:
+    """Warnings of limits as lines for people, without the place in the code."""
+
+    def show(message: Any, category: Any, *rest: Any, **more: Any) -> None:
+        if issubclass(category, ModelWarning):
+            print(f"warning: {message}", file=sys.stderr)
+        else:
+            otherwise(message, category, *rest, **more)
+
+    return show
 
 
 def _execute(tokens: list[str]) -> int:

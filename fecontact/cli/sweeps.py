@@ -84,6 +84,7 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int
                 with contextlib.suppress(InputError):  # too few base samples went well
                     show(_sensitivity_table(table, name, settings.seed))
     _complain(failed)
+    _warn({case: one for case, one in enumerate(table.warnings) if one})
     with waiting("Drawing"):
         pictures = _draw(table, settings, folder)
     say_written(folder / "index.csv", *pictures)
@@ -101,6 +102,14 @@ def _complain(failed: Mapping[int, str]) -> None:
         print(f"failed: case{'s' * (len(numbers) > 1)} {few}{more}: {reason}", file=sys.stderr)
     if len(cases) > _SHOWN:
         print(f"failed: for {len(cases) - _SHOWN} more reasons, see the table", file=sys.stderr)
+
+
+def _warn(warnings: Mapping[int, str]) -> None:
+    """One line on the cases that leave the limits of the model, with what the first says."""
+    if warnings:
+        first = min(warnings)
+        print(f"warning: {len(warnings)} of the cases leave the limits of the model, see the "
+              f"column 'warning' of the table; case {first}: {warnings[first]}", file=sys.stderr)
 
 
 def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:

@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.arguments import as_path
 from fecontact.contact_energy import POWERS
 from fecontact.contact_kernels import PENETRATION
-from fecontact.errors import InputError, ModelWarning, choices, nearest
+from fecontact.errors import InputError, choices, nearest
 from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.memory import require_memory
+from fecontact.model_limits import warn_of_limits
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -181,8 +182,7 @@ def simulate(
         memory=states[:, 2 * m :] if system.memory else None, **rest)
     if status in (Status.FINISHED, Status.EVENT):
         trajectory = replace(trajectory, status=_checked(trajectory, method, rtol))
-    for sentence in trajectory.limits_exceeded:
-        warnings.warn(f"In this run {sentence}", ModelWarning, stacklevel=2)
+    warn_of_limits(trajectory.limits_exceeded, "In this run")
     return trajectory
 
 

@@ -5,6 +5,7 @@ do. Workers import neither Gmsh nor VTK nor matplotlib, unless they are to make 
 """
 
 import pickle
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any, NotRequired, TypedDict, cast
 
 from fecontact.basis import ModalBasis
-from fecontact.errors import AnalysisError, FecontactError
+from fecontact.errors import AnalysisError, FecontactError, ModelWarning
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.parameters import with_parameters
 from fecontact.study import Study
@@ -35,6 +36,7 @@ class Row(TypedDict):
     values: dict[str, float]
     reason: str
     points: NotRequired[list[float]]  # displacements once per period
+    warning: NotRequired[str]  # where the run leaves the limits of the model
 
 
 @dataclass(frozen=True)
@@ -149,12 +151,18 @@ def _row(batch: Batch, base: Study, case: Case, summaries: dict[float, Functions
         return Row(case=case.key, values={}, reason=f"{type(error).__name__}: {error}")
     if batch.files is not None:
         _write(batch, case, study, trajectory)
-    return Row(case=case.key, values=values, reason="")
+    row = Row(case=case.key, values=values, reason="")
+    if trajectory.limits_exceeded:
+        row["warning"] = " ".join(f"In this run {one}" for one in trajectory.limits_exceeded)
+    return row
 
 
 def _run(batch: Batch, base: Study, case: Case) -> tuple[Trajectory, Study]:
     study = prepared(batch, base, case)
-    trajectory = study.run()
+    with warnings.catch_warnings():
+        # They go into the row.
+        warnings.simplefilter("ignore", ModelWarning)
+        trajectory = study.run()
     if trajectory.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
     if trajectory.status not in (Status.FINISHED, Status.EVENT):

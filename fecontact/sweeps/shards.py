@@ -122,6 +122,7 @@ def _require_row(row: Any) -> None:
     """Raise DamagedError unless a stored row is a whole one."""
     if not (isinstance(row, dict) and row.keys() >= Row.__required_keys__
             and isinstance(row["case"], str) and isinstance(row["reason"], str)
+            and isinstance(row.get("warning", ""), str)
             and isinstance(row["values"], dict) and isinstance(row.get("points", []), list)
             and all(isinstance(value, int | float)
                     for value in (*row["values"].values(), *row.get("points", [])))):

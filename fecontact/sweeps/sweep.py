@@ -187,7 +187,8 @@ class _Work:
                              for row in found]) for name in self.settings.summaries},
             [case.key for case in self.cases],
             [None if row is None else row["reason"] for row in found],
-            shape=self.plan.shape, folder=folder, strobed=self._strobed(found))
+            shape=self.plan.shape, folder=folder, strobed=self._strobed(found),
+            warnings=["" if row is None else row.get("warning", "") for row in found])
 
     def require_points(self, rows: Mapping[str, Row]) -> None:
         """Raise InputError if a stored case has another number of points than is kept of each."""

@@ -18,7 +18,7 @@ from fecontact.sweeps.shards import write_whole
 
 Array = NDArray[np.float64]
 
-_BEFORE, _AFTER = ("case", "key"), ("status", "reason")
+_BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,8 @@ class SweepTable:
         Where the sweep is kept.
     strobed : (N, K) array or None
         Displacements once per period, of a sweep that strobes; NaN for cases that failed.
+    warnings : (N,) sequence of str
+        Where runs leave what the model holds for; empty for those that do not.
     """
 
     parameters: Mapping[str, Sequence[Any]]
@@ -50,6 +52,7 @@ class SweepTable:
     shape: tuple[int, ...] | None = None
     folder: Path | None = field(default=None, compare=False)
     strobed: Array | None = None
+    warnings: Sequence[str] = ()
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -105,7 +108,7 @@ class SweepTable:
         return self.column(name).reshape(self.shape)
 
     def write(self, path: str | Path) -> Path:
-        """Write the table as CSV: case, key, parameters, summaries, status and reason.
+        """Write the table as CSV: case, key, parameters, summaries, status, reason, warning.
 
         Numbers have all their digits: reading gives them back to the last bit. Strobed
         displacements go to ``NAME-strobed.csv``, one line a case.
@@ -117,7 +120,7 @@ class SweepTable:
         for k, (key, reason) in enumerate(zip(self.keys, self.reasons, strict=True)):
             status = "missing" if reason is None else "failed" if reason else "finished"
             writer.writerow([k, key, *(_text(column[k]) for column in columns), status,
-                             reason or ""])
+                             reason or "", self.warnings[k] if self.warnings else ""])
         write_whole(Path(path), text.getvalue())
         if self.strobed is not None:
             lines = "".join(f"{k},{','.join(map(_text, row))}\n"
@@ -164,7 +167,8 @@ def read_table(path: str | Path) -> SweepTable:
             columns["key"],
             [None if status == "missing" else reason
              for status, reason in zip(columns["status"], columns["reason"], strict=True)],
-            folder=path.parent, strobed=_read_strobed(_strobed_file(path), len(rows)))
+            folder=path.parent, strobed=_read_strobed(_strobed_file(path), len(rows)),
+            warnings=columns["warning"])
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; run the sweep first.") from None
     except InputError:
