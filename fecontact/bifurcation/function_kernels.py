@@ -38,6 +38,8 @@ _TINY = 1e-30
 _WIDEST, _CHECK = 2.1e-3, 2.3e-4
 # Halvings of the widest step: enough for a function that changes over 1e-9 of the scale.
 _LEVELS = 36
+# Places beside the state at which the rounding of the rates is measured.
+_PROBES = 16
 # Relative error of the complex step that is let pass.
 _RIGHT = 1e-7
 _EPS = 2.220446049250313e-16
@@ -49,7 +51,7 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
 
     Central differences over steps h that are halved again and again, extrapolated to order six.
     The error is the change from order four to order six, and rounding; the step with the least
-    counts, for each rate. What lies between x - h and x + h is seen by f at x: a second difference
+    counts, for each rate, and is kept in orders[3]. What lies between x - h and x + h is seen by f at x: a second difference
     that does not fall with h^2 shows a function that changes over less than h.
     """
     value, h = moved[at], _WIDEST * size
@@ -76,13 +78,40 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
                 - 16.0 * _EPS * size_f
             off = abs(of_six - of_four) + noise + max(unseen, 0.0) / h
             if level > 1 and off < error[i]:
-                best[i], error[i] = of_six, off
+                best[i], error[i], orders[3, i] = of_six, off, h
             if not off <= 2.0 * noise:
                 done = False
             orders[0, i], orders[1, i], orders[2, i] = of_two, of_four, 0.25 * second
         if done:
             break
         h *= 0.5
+    moved[at] = value
+
+
+@helper
+def _roughness(function, t, y, q, moved, at, size, above, below, orders):  # type: ignore[no-untyped-def]
+    """Fill orders[0] with how much the rates jump beside x: their rounding, cancellation included.
+
+    It shows in second differences over steps, 1e-6 and less, over which the function is straight.
+    """
+    value, h = moved[at], _WIDEST * size
+    for i in range(len(above)):
+        orders[0, i] = 0.0
+    for sample in range(_PROBES):
+        place, part = value + h, 1e-9 * 4.0 ** (sample % 6) * size
+        moved[at] = place
+        function(t, y, q, above)
+        for i in range(len(above)):
+            orders[1, i] = -2.0 * above[i]
+        moved[at] = place + part
+        function(t, y, q, above)
+        moved[at] = place - part
+        function(t, y, q, below)
+        for i in range(len(above)):
+            jump = abs(above[i] + below[i] + orders[1, i])
+            if jump > orders[0, i]:
+                orders[0, i] = jump
+        h *= -0.4
     moved[at] = value
 
 
@@ -106,12 +135,22 @@ def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, 
     if right:
         return False
     _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, best, error)
+    wrong, largest = False, 0.0
+    for i in range(len(f)):
+        off = abs(column[i] - best[i])
+        if error[i] < np.inf:
+            largest = max(largest, abs(best[i]))
+            if not off <= 4.0 * error[i] + _RIGHT * abs(best[i]):
+                wrong = True
+    if not wrong:
+        return False
+    _roughness(function, t, y, q, moved, at, size, above, below, orders)
     wrong = False
     for i in range(len(f)):
-        if not error[i] < np.inf:
-            continue
         off = abs(column[i] - best[i])
-        if not off <= 4.0 * error[i] + _RIGHT * abs(best[i]):
+        # A derivative that is zero but for rounding is another one in complex arithmetic.
+        rough = 4.0 * error[i] + 16.0 * orders[0, i] / orders[3, i] + 64.0 * _EPS * largest
+        if error[i] < np.inf and not off <= rough + _RIGHT * abs(best[i]):
             column[i] = best[i]
             wrong = True
     return wrong
@@ -151,7 +190,7 @@ def complex_steps(  # type: ignore[no-untyped-def]
     d, k = x.shape[1], len(p)
     above, below, best, error, column, y = (room[0, :d], room[1, :d], room[2, :d], room[3, :d],
                                             room[4, :d], room[5, :d])
-    orders, q = room[6:9], room[9, :k]
+    orders, q = room[6:10], room[10, :k]
     z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]
     q[:] = p
     for a in range(k):
@@ -197,7 +236,7 @@ def differences(  # type: ignore[no-untyped-def]
     x, p, f, room = borrowed(x), borrowed(p), borrowed(f), borrowed(room)
     d, k = x.shape[1], len(p)
     above, below, best, error, y = room[0, :d], room[1, :d], room[2, :d], room[3, :d], room[5, :d]
-    orders, q = room[6:9], room[9, :k]
+    orders, q = room[6:10], room[10, :k]
     q[:] = p
     for n in range(len(t)):
         for i in range(d):
@@ -220,4 +259,4 @@ def differences(  # type: ignore[no-untyped-def]
 def rooms(states: int, parameters: int) -> tuple[Array, NDArray[np.complex128]]:
     """Room for the work on one place, real and complex."""
     widest = max(states, parameters)
-    return np.empty((10, widest)), np.empty((3, widest), dtype=complex)
+    return np.empty((11, widest)), np.empty((3, widest), dtype=complex)
