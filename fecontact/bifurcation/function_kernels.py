@@ -52,11 +52,13 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
     Central differences over steps h that are halved again and again, extrapolated to order six.
     The error is the change from order four to order six, and rounding; the step with the least
     counts, for each rate, and is kept in orders[3]. What lies between x - h and x + h is seen by f at x: a second difference
-    that does not fall with h^2 shows a function that changes over less than h.
+    that does not fall with h^2 shows a function that changes over less than h. Once a rate has
+    converged, the first step at which its error grows is the last one: over shorter ones only
+    rounding is seen, and none at all where it keeps f from changing.
     """
     value, h = moved[at], _WIDEST * size
     for i in range(len(f)):
-        best[i], error[i] = np.nan, np.inf
+        best[i], error[i], orders[4, i] = np.nan, np.inf, 0.0
     for level in range(_LEVELS):
         moved[at] = value + h
         function(t, y, q, above)
@@ -65,7 +67,10 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
         width = (value + h) - (value - h)
         if not width > 0.0:
             break
-        done = level > 1
+        done, largest = level > 1, 0.0
+        for i in range(len(f)):
+            if abs(best[i]) > largest:
+                largest = abs(best[i])
         for i in range(len(f)):
             change = above[i] - below[i]
             of_two = change / width
@@ -77,9 +82,11 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
             unseen = abs(second - orders[2, i]) - 0.1 * abs(orders[2, i]) - 0.01 * abs(change) \
                 - 16.0 * _EPS * size_f
             off = abs(of_six - of_four) + noise + max(unseen, 0.0) / h
-            if level > 1 and off < error[i]:
+            if off > 2.0 * error[i] and error[i] <= 1e-6 * abs(best[i]) + 1e-12 * largest:
+                orders[4, i] = 1.0
+            if level > 1 and off < error[i] and orders[4, i] == 0.0:
                 best[i], error[i], orders[3, i] = of_six, off, h
-            if not off <= 2.0 * noise:
+            if not (off <= 2.0 * noise or orders[4, i] == 1.0):
                 done = False
             orders[0, i], orders[1, i], orders[2, i] = of_two, of_four, 0.25 * second
         if done:
@@ -149,7 +156,7 @@ def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, 
     for i in range(len(f)):
         off = abs(column[i] - best[i])
         # A derivative that is zero but for rounding is another one in complex arithmetic.
-        rough = 4.0 * error[i] + 16.0 * orders[0, i] / orders[3, i] + 64.0 * _EPS * largest
+        rough = 4.0 * error[i] + 16.0 * orders[0, i] / orders[3, i] + 1e-12 * largest
         if error[i] < np.inf and not off <= rough + _RIGHT * abs(best[i]):
             column[i] = best[i]
             wrong = True
@@ -190,7 +197,7 @@ def complex_steps(  # type: ignore[no-untyped-def]
     d, k = x.shape[1], len(p)
     above, below, best, error, column, y = (room[0, :d], room[1, :d], room[2, :d], room[3, :d],
                                             room[4, :d], room[5, :d])
-    orders, q = room[6:10], room[10, :k]
+    orders, q = room[6:11], room[11, :k]
     z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]
     q[:] = p
     for a in range(k):
@@ -236,7 +243,7 @@ def differences(  # type: ignore[no-untyped-def]
     x, p, f, room = borrowed(x), borrowed(p), borrowed(f), borrowed(room)
     d, k = x.shape[1], len(p)
     above, below, best, error, y = room[0, :d], room[1, :d], room[2, :d], room[3, :d], room[5, :d]
-    orders, q = room[6:10], room[10, :k]
+    orders, q = room[6:11], room[11, :k]
     q[:] = p
     for n in range(len(t)):
         for i in range(d):
@@ -259,4 +266,4 @@ def differences(  # type: ignore[no-untyped-def]
 def rooms(states: int, parameters: int) -> tuple[Array, NDArray[np.complex128]]:
     """Room for the work on one place, real and complex."""
     widest = max(states, parameters)
-    return np.empty((11, widest)), np.empty((3, widest), dtype=complex)
+    return np.empty((12, widest)), np.empty((3, widest), dtype=complex)

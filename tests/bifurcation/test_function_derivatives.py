@@ -104,6 +104,10 @@ def narrow(t, x, p, out):
     out[0] = p[0] * math.exp(-1e6 * abs(x[0])) * x[0]
 
 
+def offset(t, x, p, out):
+    out[0] = p[0] * ((math.fabs(x[0]) + 1e5) - 1e5)
+
+
 CATALOGUE = [
     (cube, lambda x: 3.0 * x**2),
     (fourth, lambda x: 4.0 * x**3),
@@ -167,6 +171,13 @@ def test_what_goes_wrong_on_the_way_is_said():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         strict.derivatives(np.zeros(2), x[::2].copy(), field.values)
+
+
+def test_rounding_is_no_derivative_of_zero():
+    """Over steps shorter than the rounding of 1e5 the function does not change at all."""
+    field = VectorField.from_function(offset, {"p": 1.5}, 1)
+    _, J, _ = field.derivatives(np.zeros(2), np.array([[0.3], [-1.7]]), field.values)
+    assert J[:, 0, 0] == pytest.approx([1.5, -1.5], rel=1e-7)
 
 
 def falling(t, x, p, out):
