@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.elimination import Factors
-from fecontact.bifurcation.multiplier_tests import multiplier_tests
+from fecontact.bifurcation.multiplier_tests import FLAT, multiplier_tests
 from fecontact.bifurcation.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.transitions import transitions
 from fecontact.errors import AnalysisError
@@ -61,12 +61,15 @@ class Floquet:
         """Whether all disturbances die away."""
         return self.unstable == 0
 
-    def tests(self, tangent: Array) -> dict[str, float]:
-        """Test functions of special points of a branch with this tangent, parameter last."""
+    def tests(self, slope: float) -> dict[str, float]:
+        """Test functions of special points of a branch.
+
+        ``slope`` is that of the parameter along it, in widths of the diagram.
+        """
         doubling, unit, torus = self.products
         # At a fold a multiplier passes one as well, but there the parameter turns.
         return {"period doubling": doubling, "torus": torus,
-                "branch point": float(np.sign(tangent[-1])) * unit}
+                "branch point": -unit if slope <= -FLAT else unit}
 
     @property
     def products(self) -> tuple[float, float, float]:

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 _EXACT = 1e-10
 # A branch leaves the cubic through two of its points by less than this part of what it bends.
 _OFF, _ROUGH = 0.2, 1e-7
+# Distance of a fold from a branch point below which both are one, in the precision of either.
+_BESIDE = 30.0
 
 
 def changed(here: Solution, there: Solution) -> list[str]:
@@ -49,7 +51,11 @@ def located_between(
     of the parameter is passed that no solution between the two meets.
     """
     found = []
+    rounding = set(problem.unresolved((here.tangent, there.tangent), (here.values, there.values),
+                                      (here.tests, there.tests)))
     for name in changed(here, there):
+        if name in rounding:
+            continue
         located = _zero(problem, here, there, settings, _test_value(name),
                         here.tests[name], there.tests[name], problem.precision, row)
         if name == "branch point" and strict and _jumped(problem, here, there, located, row):
@@ -69,7 +75,8 @@ def located_between(
             if located is None:
                 return None
             found.append(BranchPoint(located.u, located.tangent, located.values))
-    found = _without_turns(found, row, 1e-4 * float(row @ (there.u - here.u)))
+    near = max(1e-4, _BESIDE * problem.precision)
+    found = _without_turns(found, row, near * float(row @ (there.u - here.u)))
     return sorted(found, key=lambda point: float(row @ (point.u - here.u)))
 
 

@@ -15,6 +15,7 @@ from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.interpolation import equidistributed
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
+from fecontact.bifurcation.same_orbit import HALVING
 from fecontact.bifurcation.vector_field import VectorField, require_field
 from fecontact.errors import FecontactError, InputError
 
@@ -200,9 +201,13 @@ def _followed(
         "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
         "periods": problem.periods}
     name = list(field.parameters)[problem.free]
+    stops = [settings.stop_at] if isinstance(settings.stop_at, str) else list(settings.stop_at)
+    ended = replace(settings, stop_at=[*stops, HALVING])
     # What is special is located once more below, on a mesh of its own.
-    branch = follow(replace(problem, limits=limits, precision=1e-3), u, settings, name=name,
+    branch = follow(replace(problem, limits=limits, precision=1e-3), u, ended, name=name,
                     tangent=tangent, attributes=attributes, **options)
+    if branch.points[-1].kind == HALVING and HALVING not in stops:
+        branch = replace(branch, status=Status.CLOSED)
     points = list(branch.points)
     try:
         for index, point in enumerate(branch.points):

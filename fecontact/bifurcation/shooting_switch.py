@@ -15,13 +15,12 @@ from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.same_orbit import HALVING
 from fecontact.bifurcation.shooting import Shooting, Shot, shooting_from
 from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
 
-# How a branch of doubled orbits ends that comes back to single ones.
-_HALVING = "period halving"
 # Part of their largest distance below which the two halves of an orbit come together. Closer to
 # single orbits Newton's method finds either, as both solve the equations.
 _CLOSE = 0.1
@@ -119,7 +118,7 @@ def doubled_by_shooting(
                   "segments": len(twice.mesh) - 1}
     stops = [chosen.stop_at] if isinstance(chosen.stop_at, str) else list(chosen.stop_at)
     twice, start, tangent = twice.adapted(start + chosen.step * tangent, tangent)
-    found = follow(twice, start, replace(chosen, stop_at=[*stops, _HALVING]), name=branch.name,
+    found = follow(twice, start, replace(chosen, stop_at=[*stops, HALVING]), name=branch.name,
                    tangent=tangent, attributes=attributes)
     return _ended(found, problem, chosen)
 
@@ -153,13 +152,13 @@ class _Doubled(Shooting):
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         first, second = _halves(u, self.common)
         along = self.weights()[: len(first)] * self.apart @ (first - second)
-        return {**super().tests(u, linearisation, tangent), _HALVING: float(
+        return {**super().tests(u, linearisation, tangent), HALVING: float(
             along / (self.length(self.apart) * self.largest) - _CLOSE)}
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        return {} if kind == _HALVING else super().examine(kind, u, linearisation, tangent)
+        return {} if kind == HALVING else super().examine(kind, u, linearisation, tangent)
 
 
 def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
@@ -175,7 +174,7 @@ def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
     if not len(close):
         return branch
     points = branch.points[: close[0] + 1]
-    branch = replace(branch, status=Status.STOPPED, message="")
+    branch = replace(branch, status=Status.CLOSED, message="")
     before, last = points[-2:]
     # The parameter is even in what parts the halves.
     one, other = sizes[close[0] - 1 : close[0] + 1] ** 2
@@ -191,7 +190,7 @@ def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
     closest = min(near, key=lambda point: abs(point.parameter - there))
     start, tail = closest.u[:-common], closest.u[-common:].copy()
     tail[:-1] *= 2.0
-    end = replace(last, kind=_HALVING, u=np.concatenate([start, start, tail]), values={
+    end = replace(last, kind=HALVING, u=np.concatenate([start, start, tail]), values={
         **last.values, "period": 2.0 * closest.values["period"],
         "multipliers": closest.values["multipliers"] ** 2})
     return replace(branch, points=(*points[:-1], end))
