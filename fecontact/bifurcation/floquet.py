@@ -16,6 +16,8 @@ from fecontact.errors import AnalysisError
 Array = NDArray[np.float64]
 
 _NEAR = 1e-2  # distance of a critical multiplier from the circle, at a point located coarsely
+# Error of the trivial multiplier from which on the mesh is too coarse for any.
+_LOST = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +88,8 @@ class Floquet:
         A torus bifurcation gets its name, Neimark-Sacker, and the angle of the pair.
         """
         mu = self.others
+        if kind in ("period doubling", "torus") and self.trivial_error > _LOST:
+            return None
         if kind == "period doubling":
             return {} if np.abs(mu + 1.0).min() <= _NEAR else None
         if kind != "torus":

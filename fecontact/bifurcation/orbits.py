@@ -80,11 +80,16 @@ def orbits_from_hopf(
     state = np.ascontiguousarray(point.u[:-1])
     chosen = settings_of(settings, bounds)
     sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    start = orbit_starts.from_hopf(
-        field, values, free, state, float(point.details["angular_frequency"]),
-        point.details["eigenvector"], intervals, degree,
-        np.append(sizes, width_of(width, chosen, point.parameter)))
-    return _followed(start, chosen, limits)
+    widths = np.append(sizes, width_of(width, chosen, point.parameter))
+    for amplitude in orbit_starts.AMPLITUDES:
+        start = orbit_starts.from_hopf(
+            field, values, free, state, float(point.details["angular_frequency"]),
+            point.details["eigenvector"], intervals, degree, widths, amplitude)
+        try:
+            return _followed(start, chosen, limits)
+        except FecontactError as error:
+            failed = error
+    raise failed
 
 
 def orbits_from_motion(

@@ -74,19 +74,24 @@ def hopf_orbits_by_shooting(
     state = np.ascontiguousarray(point.u[:-1])
     chosen = settings_of(settings, bounds)
     sizes, _ = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    found, u, leaving = orbit_starts.from_hopf(
-        field, values, free, state, float(point.details["angular_frequency"]),
-        point.details["eigenvector"], 50, 4,
-        np.append(sizes, width_of(width, chosen, point.parameter)))
-    problem, start = shooting_from(found, u, segments, rtol)
-    shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
-    tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
-    attributes = {"state_names": list(field.state_names),
-                  "parameter_names": list(field.parameters), "parameter_values": values,
-                  "scales": problem.scales, "segments": segments, "periods": 1, "rtol": rtol}
-    return follow(problem, start, chosen, name=branch.name,
-                  tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
-                  attributes=attributes)
+    widths = np.append(sizes, width_of(width, chosen, point.parameter))
+    for amplitude in orbit_starts.AMPLITUDES:
+        found, u, leaving = orbit_starts.from_hopf(
+            field, values, free, state, float(point.details["angular_frequency"]),
+            point.details["eigenvector"], 50, 4, widths, amplitude)
+        problem, start = shooting_from(found, u, segments, rtol)
+        shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
+        tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
+        attributes = {"state_names": list(field.state_names),
+                      "parameter_names": list(field.parameters), "parameter_values": values,
+                      "scales": problem.scales, "segments": segments, "periods": 1, "rtol": rtol}
+        try:
+            return follow(problem, start, chosen, name=branch.name,
+                          tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
+                          attributes=attributes)
+        except FecontactError as error:
+            failed = error
+    raise failed
 
 
 def doubled_by_shooting(
