@@ -20,7 +20,8 @@ class Status(Enum):
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
     STOPPED = "The branch reached a point at which it was to stop."
-    CLOSED = "The branch came back to its start."
+    CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
+              "again.")
     STALLED = ("The steps became too small to go on; what was computed until then is kept. Look "
                "whether the solution changes abruptly here, or start with smaller steps.")
     INTERRUPTED = "The continuation was interrupted; what was computed until then is kept."

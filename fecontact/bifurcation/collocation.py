@@ -17,7 +17,9 @@ from fecontact.bifurcation.interpolation import (
     rule,
 )
 from fecontact.bifurcation.linearised import Linearised
+from fecontact.bifurcation.multiplier_tests import unresolved
 from fecontact.bifurcation.problem import Problem
+from fecontact.bifurcation.same_orbit import HALVING, halves_meet, in_phase, same_heading
 from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
 
@@ -194,8 +196,13 @@ class Collocation(Problem):
         self, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, float]:
         """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
-        found: dict[str, float] = linearisation.floquet.tests(tangent)
+        found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
         return found
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """See :func:`fecontact.bifurcation.multiplier_tests.unresolved`."""
+        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
+        return unresolved((first, last), values, tests)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, mesh and the extremes of the states."""
@@ -214,10 +221,24 @@ class Collocation(Problem):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        """Details of a special point; None for a neutral saddle."""
+        """Details of a special point; None for a neutral saddle.
+
+        A branch point at which a doubled orbit becomes a single one is a period halving.
+        """
         from fecontact.bifurcation.orbit_normal_forms import examined
 
+        if kind == "branch point" and halves_meet(self, u, tangent):
+            return {"kind": HALVING}
         return examined(kind, self, u, linearisation, self.precision < 1e-6)
+
+    def met_again(
+        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array
+    ) -> Array | None:
+        """See :meth:`Problem.met_again`: on this mesh, in the phase of ``like``."""
+        if not (isinstance(origin, Collocation)
+                and same_heading(self.weights(), tangent, heading, self.common)):
+            return None
+        return in_phase(self, origin._on_other_mesh(self.mesh, [u])[0], like)
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Along the tangent, and bent like the step before."""

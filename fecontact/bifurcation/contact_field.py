@@ -18,6 +18,8 @@ from fecontact.system import ContactSystem
 _DIRECTIONS = ("x", "y", "rotation")
 # Step of central differences in a parameter, relative to its value.
 _STEP = 2e-4
+# A value on its way through zero counts as so much of its base value at least.
+_LEAST = 1e-3
 # Arrays that decide on what is given in time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
@@ -35,9 +37,7 @@ class ContactField(VectorField):
         self.state_names = (*(f"q{i}" for i in modes), *(f"q{i}'" for i in modes),
                             *(f"z{j}.{k + 1}" for j in range(base.basis.contact_nodes)
                               for k in range(base.memory)))
-        self._affine = [False] * len(self.parameters)
-        self._calls = [0] * len(self.parameters)
-        self._moves: list[tuple[float, float] | None] = [None] * len(self.parameters)
+        self._sizes = np.where(self.values != 0.0, np.abs(self.values), 1.0)
         varying = family.varying
         self._constant_period = varying is not None and not self._moves_forcing(varying)
 
@@ -80,18 +80,12 @@ class ContactField(VectorField):
     def _parameter_derivative(
         self, t: Array, x: Array, values: Array, index: int, f: Array
     ) -> Array:
-        """df/dp (N, d): one difference where f is affine in p, else of fourth order."""
+        """df/dp (N, d): a central difference where f is affine in p, else of fourth order."""
         h = self._step(values, index)
-        above = self._beside(t, x, values, index, h)
-        # Seven times out of eight what was found is trusted: a wrong guess here could only slow
-        # Newton's method down.
-        self._calls[index] += 1
-        if self._affine[index] and self._calls[index] % 8:
-            return np.asarray((above - f) / h)
-        below = self._beside(t, x, values, index, -h)
-        curvature = np.abs(above - f - (f - below)).max(initial=0.0)
-        self._affine[index] = curvature <= 1e-14 * np.abs(f).max(initial=0.0)
-        if self._affine[index]:
+        above, below = (self._beside(t, x, values, index, step) for step in (h, -h))
+        # Decided anew each time: derivatives are functions of the place, whatever was asked before.
+        curvature = np.abs(above + below - 2.0 * f).max(initial=0.0)
+        if curvature <= 1e-14 * np.abs(f).max(initial=0.0):
             return np.asarray((above - below) / (2.0 * h))
         total = 8.0 * (above - below)
         total -= self._beside(t, x, values, index, 2.0 * h)
@@ -106,7 +100,7 @@ class ContactField(VectorField):
     def _step(self, values: Array, index: int) -> float:
         """Small beside the value, and beside the widths of the laws where it moves the ground."""
         value = abs(float(values[index]))
-        h = _STEP * (value if value > 0.0 else 1.0)
+        h = _STEP * max(value, _LEAST * float(self._sizes[index]))
         speed, gap = self._moved(values, index, h)
         base = self._family.base
         if speed > 0.0:
@@ -116,14 +110,11 @@ class ContactField(VectorField):
         return max(h, 1e-8 * value)
 
     def _moved(self, values: Array, index: int, h: float) -> tuple[float, float]:
-        """Rates of the ground's motion and of the gaps with a parameter; found once."""
-        known = self._moves[index]
-        if known is None:
-            here, there = self._family.arrays(values), self._family.beside(values, index, h)
-            speed, gap = (float(np.abs(getattr(there, name) - getattr(here, name)).max()) / h
-                          for name in ("ground_motion_parameters", "gap"))
-            known = self._moves[index] = (speed, gap)
-        return known
+        """Rates of the ground's motion and of the gaps with a parameter."""
+        here, there = self._family.arrays(values), self._family.beside(values, index, h)
+        return (float(np.abs(there.ground_motion_parameters
+                             - here.ground_motion_parameters).max()) / h,
+                float(np.abs(there.gap - here.gap).max()) / h)
 
     def forcing_period(self, values: Array) -> float | None:
         """Common period [s] of drive, loads and ground; None where nothing depends on time.

@@ -32,6 +32,9 @@ _BEYOND = 1.2
 # Relative distance from a bound at which a start lies on it.
 _ON_BOUND = 1e-13
 
+# Distance in the diagram at which the start of a branch, found on another mesh, is met again.
+_AGAIN = 1e-5
+
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
 
@@ -79,7 +82,7 @@ def continuation(
     yield BranchPoint(start.u, start.tangent, start.values)
     if _leaves(start, settings):
         return End(Status.BOUND)
-    here, step, count, message, fixed_mesh = start, settings.step, 1, "", True
+    here, step, count, message, origin = start, settings.step, 1, "", problem
     stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
     before: Solution | None = None
     halved, whole = 0, step
@@ -106,7 +109,7 @@ def continuation(
                     return End(Status.STOPPED)
                 if located.kind is None:
                     return End(Status.BOUND)
-            if fixed_mesh and count > 2 and _passes(problem, here, there, start):
+            if count > 2 and _passes(problem, here, there, origin, start):
                 yield BranchPoint(start.u, start.tangent, start.values)
                 return End(Status.CLOSED)
             yield BranchPoint(there.u, there.tangent, there.values)
@@ -122,7 +125,7 @@ def continuation(
             problem, moved, turned = adapted
             turned = turned / norm(problem, turned)
             if not np.array_equal(moved, here.u):
-                fixed_mesh, before = False, None
+                before = None
             here = Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
     return End(Status.POINTS)
 
@@ -203,14 +206,17 @@ def _next_step(
     return min(factor * step, settings.largest_step)
 
 
-def _passes(problem: Problem, here: Solution, there: Solution, start: Solution) -> bool:
+def _passes(
+    problem: Problem, here: Solution, there: Solution, origin: Problem, start: Solution
+) -> bool:
     """Whether the start of the branch lies on the step from here to there."""
     weights = problem.weights()
-    if len(start.u) != len(here.u) or float(weights * here.tangent @ start.tangent) < 0.9:
+    row = weights * here.tangent
+    length = float(row @ (there.u - here.u))
+    away = min(abs(float(start.u[-1] - end.u[-1])) for end in (here, there))
+    if away * np.sqrt(weights[-1]) > length:
         return False
-    length = float(weights * here.tangent @ (there.u - here.u))
-    along = float(weights * here.tangent @ (start.u - here.u))
-    if not 0.0 < along <= length:
+    again = problem.met_again(origin, start.u, start.tangent, here.u, here.tangent)
+    if again is None or not 0.0 < (along := float(row @ (again - here.u))) <= length:
         return False
-    aside = start.u - between(here, there, along, problem.weights() * here.tangent)
-    return norm(problem, aside) < 1e-2 * length
+    return norm(problem, again - between(here, there, along, row)) < 1e-2 * length + _AGAIN

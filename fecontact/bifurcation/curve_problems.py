@@ -141,8 +141,10 @@ class FoldCurve(PlaneCurve):
         v, w = linearisation.made["v"], linearisation.made["w"]
         w = w / (np.linalg.norm(w * self.scales) * np.linalg.norm(v / self.scales))
         quadratic = linearisation.made["curvature"][:, : len(v)] @ v
-        return {"cusp": float(w @ quadratic), "Bogdanov-Takens": float(w @ v),
-                "zero-Hopf": pair_test(_others(linearisation.jacobian, 0.0, 1))}
+        found = {"cusp": float(w @ quadratic), "Bogdanov-Takens": float(w @ v)}
+        if len(v) > 2:
+            found["zero-Hopf"] = pair_test(_others(linearisation.jacobian, 0.0, 1))
+        return found
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
@@ -211,9 +213,12 @@ class HopfCurve(PlaneCurve):
         J = scaled(linearisation.jacobian, self.scales)
         J = J / np.abs(J).max()
         sign = np.linalg.slogdet(J)[0]
-        return {"Bogdanov-Takens": square, "Bautin": self._lyapunov(u, linearisation),
-                "double Hopf": pair_test(_others(linearisation.jacobian, square, 2)),
-                "zero-Hopf": float(sign * np.linalg.svd(J, compute_uv=False)[-1])}
+        found = {"Bogdanov-Takens": square, "Bautin": self._lyapunov(u, linearisation),
+                 "double Hopf": pair_test(_others(linearisation.jacobian, square, 2))}
+        # With two states an eigenvalue of zero is one of the pair.
+        if len(J) > 2:
+            found["zero-Hopf"] = float(sign * np.linalg.svd(J, compute_uv=False)[-1])
+        return found
 
     def _lyapunov(self, u: Array, linearisation: _Augmented) -> float:
         """First Lyapunov coefficient, computed once; NaN beyond a Bogdanov-Takens point."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.elimination import Factors
-from fecontact.bifurcation.multiplier_tests import multiplier_tests
+from fecontact.bifurcation.multiplier_tests import FLAT, multiplier_tests
 from fecontact.bifurcation.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.transitions import transitions
 from fecontact.errors import AnalysisError
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 # the most.
 _ROUNDING, _WORST = 1e-8, 0.1
 _NEAR = 1e-2  # distance of a critical multiplier from the circle, at a point located coarsely
+# Error of the trivial multiplier from which on the mesh is too coarse for any.
+_LOST = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +77,15 @@ class Floquet:
         """Whether all disturbances die away."""
         return self.unstable == 0
 
-    def tests(self, tangent: Array) -> dict[str, float]:
-        """Test functions of special points of a branch with this tangent, parameter last."""
+    def tests(self, slope: float) -> dict[str, float]:
+        """Test functions of special points of a branch.
+
+        ``slope`` is that of the parameter along it, in widths of the diagram.
+        """
         doubling, unit, torus = self.products
         # At a fold a multiplier passes one as well, but there the parameter turns.
         return {"period doubling": doubling, "torus": torus,
-                "branch point": float(np.sign(tangent[-1])) * unit}
+                "branch point": -unit if slope <= -FLAT else unit}
 
     @property
     def products(self) -> tuple[float, float, float]:
@@ -97,6 +102,8 @@ class Floquet:
         A torus bifurcation gets its name, Neimark-Sacker, and the angle of the pair.
         """
         mu = self.others
+        if kind in ("period doubling", "torus") and self.trivial_error > _LOST:
+            return None
         if kind == "period doubling":
             return {} if np.abs(mu + 1.0).min() <= _NEAR else None
         if kind != "torus":

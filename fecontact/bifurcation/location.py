@@ -21,6 +21,8 @@ _OFF, _ROUGH = 0.2, 1e-7
 _JUMP = 1e-3
 # Solutions from which Newton's method begins where it fails from the cubic between two points.
 _GUESSES = 3
+# Distance of a fold from a branch point below which both are one, in the precision of either.
+_BESIDE = 30.0
 
 
 def changed(here: Solution, there: Solution) -> list[str]:
@@ -58,7 +60,11 @@ def located_between(
     is passed that no solution between the two meets.
     """
     found = []
+    rounding = set(problem.unresolved((here.tangent, there.tangent), (here.values, there.values),
+                                      (here.tests, there.tests)))
     for name in changed(here, there):
+        if name in rounding:
+            continue
         event = name in settings.events
         zero = _zero(problem, here, there, settings, _test_value(name), here.tests[name],
                      there.tests[name], problem.event_precision if event else problem.precision,
@@ -88,8 +94,9 @@ def located_between(
         met = zero[0]
     end = met or there
     length = float(row @ (end.u - here.u))
+    near = max(1e-4, _BESIDE * problem.precision)
     found = _without_turns([point for point in found if float(row @ (point.u - here.u)) <= length],
-                           row, 1e-4 * float(row @ (there.u - here.u)))
+                           row, near * float(row @ (there.u - here.u)))
     if settings.locate:
         count = counted(problem, here, end, found, settings.events)
         if count is None and strict:

@@ -13,6 +13,11 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
+# Parts of the terms of l1, and of what a change of the Jacobian by itself over the scales would make
+# of it, that are rounding.
+_CANCELLED, _CONSTANT = 1e-9, 1e-15
+
+
 @dataclass(frozen=True)
 class Hopf:
     """A Hopf point.
@@ -26,7 +31,8 @@ class Hopf:
     first_lyapunov : float
         l1, Kuznetsov's (5.62): negative where stable orbits are born (supercritical).
     error : float
-        Difference of two formulas for the derivatives.
+        Difference of two formulas for the derivatives, and what rounding leaves of the terms that
+        add up to l1: at a centre they cancel.
     """
 
     angular_frequency: float
@@ -93,20 +99,26 @@ def hopf(
     w = eigenvalue.imag
     along, across = (bend(field, x, values, part, scales)
                      for part in (np.ascontiguousarray(q.real), np.ascontiguousarray(q.imag)))
-    fine, coarse = (_first_lyapunov(J[0], w, q, p, one, other)
-                    for one, other in zip(along, across, strict=True))
-    return Hopf(w, q, fine, abs(fine - coarse))
+    (fine, terms), (coarse, _) = (_first_lyapunov(J[0], w, q, p, one, other)
+                                  for one, other in zip(along, across, strict=True))
+    # A Jacobian that changes by less than its rounding over the scales is constant.
+    constant = (np.abs(J[0] * scales / scales[:, None]).max() / w
+                * float(np.linalg.norm(q / scales)) ** 2)
+    error = abs(fine - coarse) + _CANCELLED * terms + _CONSTANT * float(constant)
+    return Hopf(w, q, fine, error)
 
 
 def _first_lyapunov(
     J: Array, w: float, q: ComplexArray, p: ComplexArray, along: Bend, across: Bend
-) -> float:
+) -> tuple[float, float]:
+    """First Lyapunov coefficient, and the sum of the sizes of all terms in it."""
     B = along.first + 1j * across.first
     cubic = (along.second + across.second) @ q
     mean = np.linalg.solve(J, (B @ q.conj()).real)
     double = np.linalg.solve(2j * w * np.eye(len(J)) - J, B @ q)
     total = np.vdot(p, cubic - 2.0 * B @ mean + B.conj() @ double)
-    return float(total.real) / (2.0 * w)
+    size = np.abs(p) @ (np.abs(cubic) + np.abs(B) @ (2.0 * np.abs(mean) + np.abs(double)))
+    return float(total.real) / (2.0 * w), float(size) / (2.0 * w)
 
 
 def null_vectors(J: Array) -> tuple[Array, Array]:

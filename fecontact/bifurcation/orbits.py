@@ -14,9 +14,10 @@ from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
+from fecontact.bifurcation.same_orbit import HALVING
 from fecontact.bifurcation.sharpening import ROUGHLY, SHARPENED, sharpened
 from fecontact.bifurcation.vector_field import VectorField, require_field
-from fecontact.errors import InputError
+from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
 
@@ -79,11 +80,16 @@ def orbits_from_hopf(
     state = np.ascontiguousarray(point.u[:-1])
     chosen = settings_of(settings, bounds)
     sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    start = orbit_starts.from_hopf(
-        field, values, free, state, float(point.details["angular_frequency"]),
-        point.details["eigenvector"], intervals, degree,
-        np.append(sizes, width_of(width, chosen, point.parameter)))
-    return _followed(start, chosen, limits)
+    widths = np.append(sizes, width_of(width, chosen, point.parameter))
+    for amplitude in orbit_starts.AMPLITUDES:
+        start = orbit_starts.from_hopf(
+            field, values, free, state, float(point.details["angular_frequency"]),
+            point.details["eigenvector"], intervals, degree, widths, amplitude)
+        try:
+            return _followed(start, chosen, limits)
+        except FecontactError as error:
+            failed = error
+    raise failed
 
 
 def orbits_from_motion(
@@ -200,9 +206,13 @@ def _followed(
         "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
         "periods": problem.periods}
     name = list(field.parameters)[problem.free]
+    stops = [settings.stop_at] if isinstance(settings.stop_at, str) else list(settings.stop_at)
+    ended = replace(settings, stop_at=[*stops, HALVING])
     # What is special is located once more below, on a mesh of its own.
-    branch = follow(replace(problem, limits=limits, precision=ROUGHLY), u, settings, name=name,
+    branch = follow(replace(problem, limits=limits, precision=ROUGHLY), u, ended, name=name,
                     tangent=tangent, attributes=attributes, **options)
+    if branch.points[-1].kind == HALVING and HALVING not in stops:
+        branch = replace(branch, status=Status.CLOSED)
     points = list(branch.points)
     try:
         for index, point in enumerate(branch.points):

@@ -11,6 +11,8 @@ from fecontact.errors import InputError, require_positive
 
 Array = NDArray[np.float64]
 
+_PARALLEL = 0.9  # cosine between directions that count as the same
+
 
 class Linearisation(Protocol):
     """The equations about some u."""
@@ -100,6 +102,25 @@ class Problem(Protocol):
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
         """The problem on a better mesh, with u and tangent on it, after each step; None to stay."""
         return None
+
+    def met_again(
+        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array
+    ) -> Array | None:
+        """The start u of the branch in the unknowns of this problem; None where it goes elsewhere.
+
+        ``origin`` is the problem at the start, and ``tangent`` the direction there; ``like`` and
+        ``heading`` are those of the point that was reached, on this problem.
+        """
+        if len(u) != len(like) or float(self.weights() * heading @ tangent) < _PARALLEL:
+            return None
+        return u
+
+    def unresolved(
+        self, tangents: tuple[Array, Array], values: tuple[Mapping[str, Any], Mapping[str, Any]],
+        tests: tuple[Mapping[str, float], Mapping[str, float]],
+    ) -> Iterable[str]:
+        """Kinds whose tests change sign between two neighbouring points by rounding alone."""
+        return ()
 
 
 @dataclass(frozen=True)

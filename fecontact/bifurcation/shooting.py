@@ -15,6 +15,7 @@ from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.floquet import Floquet, floquet_of
 from fecontact.bifurcation.interpolation import interpolate
+from fecontact.bifurcation.multiplier_tests import unresolved
 from fecontact.bifurcation.problem import Problem
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.ensemble import ensemble
@@ -158,7 +159,12 @@ class Shooting(Problem):
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
-        return linearisation.floquet.tests(tangent)
+        return linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """See :func:`fecontact.bifurcation.multiplier_tests.unresolved`."""
+        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
+        return unresolved((first, last), values, tests)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""

@@ -15,13 +15,12 @@ from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.same_orbit import HALVING
 from fecontact.bifurcation.shooting import Shooting, Shot, shooting_from
 from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
 
-# How a branch of doubled orbits ends that comes back to single ones.
-_HALVING = "period halving"
 # Part of their largest distance below which the two halves of an orbit come together. Closer to
 # single orbits Newton's method finds either, as both solve the equations.
 _CLOSE = 0.1
@@ -75,19 +74,24 @@ def hopf_orbits_by_shooting(
     state = np.ascontiguousarray(point.u[:-1])
     chosen = settings_of(settings, bounds)
     sizes, _ = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    found, u, leaving = orbit_starts.from_hopf(
-        field, values, free, state, float(point.details["angular_frequency"]),
-        point.details["eigenvector"], 50, 4,
-        np.append(sizes, width_of(width, chosen, point.parameter)))
-    problem, start = shooting_from(found, u, segments, rtol)
-    shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
-    tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
-    attributes = {"state_names": list(field.state_names),
-                  "parameter_names": list(field.parameters), "parameter_values": values,
-                  "scales": problem.scales, "segments": segments, "periods": 1, "rtol": rtol}
-    return follow(problem, start, chosen, name=branch.name,
-                  tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
-                  attributes=attributes)
+    widths = np.append(sizes, width_of(width, chosen, point.parameter))
+    for amplitude in orbit_starts.AMPLITUDES:
+        found, u, leaving = orbit_starts.from_hopf(
+            field, values, free, state, float(point.details["angular_frequency"]),
+            point.details["eigenvector"], 50, 4, widths, amplitude)
+        problem, start = shooting_from(found, u, segments, rtol)
+        shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
+        tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
+        attributes = {"state_names": list(field.state_names),
+                      "parameter_names": list(field.parameters), "parameter_values": values,
+                      "scales": problem.scales, "segments": segments, "periods": 1, "rtol": rtol}
+        try:
+            return follow(problem, start, chosen, name=branch.name,
+                          tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
+                          attributes=attributes)
+        except FecontactError as error:
+            failed = error
+    raise failed
 
 
 def doubled_by_shooting(
@@ -119,7 +123,7 @@ def doubled_by_shooting(
                   "segments": len(twice.mesh) - 1}
     stops = [chosen.stop_at] if isinstance(chosen.stop_at, str) else list(chosen.stop_at)
     twice, start, tangent = twice.adapted(start + chosen.step * tangent, tangent)
-    found = follow(twice, start, replace(chosen, stop_at=[*stops, _HALVING]), name=branch.name,
+    found = follow(twice, start, replace(chosen, stop_at=[*stops, HALVING]), name=branch.name,
                    tangent=tangent, attributes=attributes)
     return _ended(found, problem, chosen)
 
@@ -153,13 +157,13 @@ class _Doubled(Shooting):
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         first, second = _halves(u, self.common)
         along = self.weights()[: len(first)] * self.apart @ (first - second)
-        return {**super().tests(u, linearisation, tangent), _HALVING: float(
+        return {**super().tests(u, linearisation, tangent), HALVING: float(
             along / (self.length(self.apart) * self.largest) - _CLOSE)}
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        return {} if kind == _HALVING else super().examine(kind, u, linearisation, tangent)
+        return {} if kind == HALVING else super().examine(kind, u, linearisation, tangent)
 
 
 def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
@@ -175,7 +179,7 @@ def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
     if not len(close):
         return branch
     points = branch.points[: close[0] + 1]
-    branch = replace(branch, status=Status.STOPPED, message="")
+    branch = replace(branch, status=Status.CLOSED, message="")
     before, last = points[-2:]
     # The parameter is even in what parts the halves.
     one, other = sizes[close[0] - 1 : close[0] + 1] ** 2
@@ -191,7 +195,7 @@ def _ended(branch: Branch, single: Shooting, settings: Settings) -> Branch:
     closest = min(near, key=lambda point: abs(point.parameter - there))
     start, tail = closest.u[:-common], closest.u[-common:].copy()
     tail[:-1] *= 2.0
-    end = replace(last, kind=_HALVING, u=np.concatenate([start, start, tail]), values={
+    end = replace(last, kind=HALVING, u=np.concatenate([start, start, tail]), values={
         **last.values, "period": 2.0 * closest.values["period"],
         "multipliers": closest.values["multipliers"] ** 2})
     return replace(branch, points=(*points[:-1], end))

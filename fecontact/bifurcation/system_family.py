@@ -2,7 +2,8 @@
 
 Making a system and its arrays takes some 0.2 ms of Python. Most arrays are affine in each
 parameter (or constant); where that is found to hold, they are interpolated between the corners of a
-box in which it was checked, and the box grows with the values asked for.
+box in which it was checked. Which box it is depends on the values alone, not on those asked for
+before: boxes about the base values, each twice as wide as the one before.
 """
 
 from collections import OrderedDict
@@ -26,6 +27,8 @@ _KEPT = 64
 # More corners than these take longer to make than they save.
 _MOST_PARAMETERS = 4
 _RELATIVE = 1e-12
+# Values more doublings away from the base values are not interpolated.
+_MOST_LEVELS = 50
 
 
 class SystemFamily:
@@ -56,9 +59,13 @@ class SystemFamily:
         self._size = system.size
         values = np.array(list(self.parameters.values()), dtype=float)
         self._latest: tuple[bytes, SystemArrays] | None = None
-        self._corners: _Corners | None = None
+        self._boxes: dict[tuple[int, ...], _Corners | None] = {}
+        self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
+        self._base, self._width = values, np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
+        self._first: _Corners | None = None
         if 0 < len(values) <= _MOST_PARAMETERS:
-            self._corners = _first_corners(self, values)
+            self.system(values)
+            self._first = self._box((0,) * len(values))
         self._fixed = self.system(values).arrays if not len(values) else None
 
     def system(self, values: Array) -> ContactSystem:
@@ -92,9 +99,7 @@ class SystemFamily:
         key = values.tobytes()
         if self._latest is not None and self._latest[0] == key:
             return self._latest[1]
-        corners = self._corners
-        if corners is not None and not corners.hold(values):
-            self._corners = corners = corners.grown(self, values)
+        corners = self._corners_of(values)
         found = self.system(values).arrays if corners is None else corners.at(values)
         self._latest = (key, found)
         return found
@@ -103,18 +108,65 @@ class SystemFamily:
         """Arrays for one value changed by a small step, which may leave the allowed range."""
         moved = values.copy()
         moved[index] += step
-        if self._corners is not None:
-            self.arrays(values)
-        if self._corners is None:
-            return self.system(moved).arrays
-        return self._corners.at(moved)
+        corners = None if self._fixed is not None else self._corners_of(values)
+        return self.system(moved).arrays if corners is None else corners.at(moved)
+
+    def _corners_of(self, values: Array) -> "_Corners | None":
+        """The box for these values; None where they are not interpolated."""
+        if self._first is None:
+            return None
+        levels = tuple(_level(value - base, width) for value, base, width in zip(
+            values.tolist(), self._base.tolist(), self._width.tolist(), strict=True))
+        if any(abs(level) > _MOST_LEVELS for level in levels):
+            return None
+        corners = self._box(levels)
+        return corners if corners is not None and corners.hold(values) else None
+
+    def _box(self, levels: tuple[int, ...]) -> "_Corners | None":
+        """The box of so many doublings in each parameter; None where nothing is affine in it."""
+        if levels not in self._boxes:
+            low, high = np.array([self._interval(index, level)
+                                  for index, level in enumerate(levels)]).T
+            try:
+                made = _corners(self, low, high)
+            except (_NotAffineError, FecontactError):
+                made = None
+            self._boxes[levels] = made
+        return self._boxes[levels]
+
+    def _interval(self, index: int, level: int) -> tuple[float, float]:
+        """Values of one parameter about its base value, as far as its range allows."""
+        key = (index, level)
+        if key not in self._intervals:
+            base, width = float(self._base[index]), float(self._width[index])
+            far = base + np.copysign(1.0, level) * width * 2.0 ** (abs(level) - 1 if level else 0)
+            # Many ranges end at zero.
+            ends = [end for end in (far, 0.0) if self._allowed(index, end)
+                    and abs(end - base) <= abs(far - base)]
+            beside = base - np.copysign(1.0, level) * width
+            if not self._allowed(index, beside):
+                beside = base
+            end = ends[0] if ends else base
+            if end == beside:
+                end = base + np.copysign(1.0, level) * width
+            self._intervals[key] = (min(end, beside), max(end, beside))
+        return self._intervals[key]
+
+    def _allowed(self, index: int, value: float) -> bool:
+        values = self._base.copy()
+        values[index] = value
+        try:
+            self.system(values)
+        except FecontactError:
+            return False
+        return True
 
     @property
     def varying(self) -> frozenset[str] | None:
         """Names of the arrays that depend on the parameters; None where that is not known."""
         if self._fixed is not None:
             return frozenset()
-        return None if self._corners is None else self._corners.varying
+        return None if self._first is None else self._first.varying
 
 
 class _Corners:
@@ -174,37 +226,17 @@ class _Corners:
                 return False
         return True
 
-    def grown(self, family: SystemFamily, values: Array) -> "_Corners | None":
-        """A box twice as wide that holds the values too; None where nothing is affine there."""
-        family.system(values)  # raises for values out of range
-        width = self.high - self.low
-        for more in (1.0, 0.1, 0.0):
-            low = np.where(values < self.low, values - more * width, self.low)
-            high = np.where(values > self.high, values + more * width, self.high)
-            try:
-                return _corners(family, low, high)
-            except _NotAffineError:
-                return None
-            except FecontactError:
-                continue
-        return None
-
 
 class _NotAffineError(Exception):
     pass
 
 
-def _first_corners(family: SystemFamily, values: Array) -> _Corners | None:
-    family.system(values)
-    width = np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
-    for below, above in ((1.0, 1.0), (0.0, 1.0), (1.0, 0.0)):
-        try:
-            return _corners(family, values - below * width, values + above * width)
-        except _NotAffineError:
-            return None
-        except FecontactError:
-            continue
-    return None
+def _level(off: float, width: float) -> int:
+    """Least n, with the sign of ``off``, for which |off| lies within 2^(|n| - 1) widths."""
+    if abs(off) <= width:
+        return 0 if off >= 0.0 else -1
+    doublings = int(np.ceil(np.log2(abs(off) / width))) if np.isfinite(off) else _MOST_LEVELS
+    return (doublings + 1) * (1 if off > 0.0 else -1)
 
 
 def _corners(family: SystemFamily, low: Array, high: Array) -> _Corners:

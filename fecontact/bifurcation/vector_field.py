@@ -106,14 +106,20 @@ class VectorField(ABC):
         jacobian : callable, optional
             ``g(t, x, p, out)`` that fills out (d, d) with df_i/dx_j.
         differentiation : 'automatic', 'complex' or 'differences'
-            How derivatives that are not given are formed. 'complex' is the complex step, exact to
-            round-off; the function must be analytic and accept complex numbers (``numpy``
-            functions instead of those of ``math``; no comparisons, abs, sign, min or max of
-            states). 'differences' are central ones of fourth order with steps of 2e-4 of the
-            larger of the state and its scale. 'automatic' is complex wherever the function allows
-            it, else differences; see :attr:`differentiation` of the result.
+            How derivatives that are not given are formed. 'differences' are central ones,
+            extrapolated to order six, over steps that are halved, from 2e-3 of the larger of the
+            state and its scale on, until truncation is below rounding: good to some 1e-11 of the
+            rates over the scale, with kinks and steep laws beside the state too. 'complex' is the
+            complex step, exact to round-off for functions that are analytic and accept complex
+            numbers (``numpy`` functions instead of those of ``math``; no comparisons, abs, sign,
+            min or max of states, no powers of negative numbers). It is compared with differences
+            wherever it is used, and refused where it is wrong by more than 1e-7. 'automatic' is
+            complex if that is right at samples of either sign around zero, up to twice the
+            scales, else differences; see :attr:`differentiation` of the result. Where it turns
+            out wrong later, as functions do that overflow, differences take its place there, with
+            a warning.
         scales : sequence, optional
-            Typical size (d,) of each state; one by default.
+            Typical size (d,) of each state; one by default. Smaller states are fine.
         period : callable, optional
             Period in t from the parameters by name, for a function that depends on t.
 
@@ -121,6 +127,7 @@ class VectorField(ABC):
         ------
         InputError
             If the function cannot be compiled, or does not allow the differentiation asked for.
+            With 'complex', derivatives raise :class:`AnalysisError` where it turns out wrong.
         """
         from fecontact.bifurcation.function_field import function_field
 

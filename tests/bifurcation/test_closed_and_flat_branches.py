@@ -1,0 +1,200 @@
+"""Branches that close, and branches on which the parameter rests: what is special on them."""
+
+import numpy as np
+import pytest
+from systems_for_bifurcations import two_mass_field, two_mass_jacobian
+
+from fecontact.bifurcation.branch import Status
+from fecontact.bifurcation.curves import hopf_curve
+from fecontact.bifurcation.equilibria import find_equilibrium
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
+from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.vector_field import VectorField
+
+
+def island(t, x, p, out):
+    # r' = r (1/4 - p^2 - (r^2 - 1)^2): circles with p^2 + (r^2 - 1)^2 = 1/4.
+    square = x[0] * x[0] + x[1] * x[1]
+    rise = 0.25 - p[0] * p[0] - (square - 1.0) * (square - 1.0)
+    out[0] = rise * x[0] - (2.0 + 0.5 * x[0]) * x[1]
+    out[1] = rise * x[1] + (2.0 + 0.5 * x[0]) * x[0]
+
+
+def circle(radius, period):
+    t = np.linspace(0.0, period, 800)
+    return t, np.stack([radius * np.cos(2.0 * np.pi * t / period),
+                        radius * np.sin(2.0 * np.pi * t / period)], axis=1)
+
+
+@pytest.mark.parametrize("largest", [0.02, 0.05])
+def test_an_island_of_orbits_is_gone_round_once(largest):
+    """The phase has moved on when the branch comes back, and the mesh is another one."""
+    field = VectorField.from_function(island, {"p": 0.1}, 2)
+    square = 1.0 + np.sqrt(0.24)
+    t, x = circle(np.sqrt(square), 2.0 * np.pi / np.sqrt(4.0 - 0.25 * square))
+    branch = orbits_from_motion(field, "p", t, x, period=t[-1], bounds=(-1.0, 1.0),
+                                intervals=20, settings=Settings(largest_step=largest))
+    assert branch.status is Status.CLOSED
+    assert [point.kind for point in branch.special] == ["fold", "fold"]
+    assert [point.parameter for point in branch.special] == pytest.approx([0.5, -0.5], abs=1e-8)
+    assert branch.points[-1].parameter == pytest.approx(0.1, abs=1e-9)
+    assert (branch.points[-1].u == branch.points[0].u).all()
+    # Every size of orbit once: the radius goes down and up again.
+    radius = branch.column("maximum")[:, 0]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(radius))))
+    assert len(turns) == 2
+
+
+def band(t, x, p, out):
+    # A circle of radius one; across it, in axes that turn by half a turn per round,
+    # xi' = (1/20 - q^2) xi - 0.7 xi^3 and eta' = -eta.
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, a, z = x[0] / r, x[1] / r, r - 1.0, x[2]
+    square = a * a * (1.0 + C) / 2.0 + z * z * (1.0 - C) / 2.0 + a * z * S
+    along = 0.05 - p[0] * p[0] - 0.7 * square
+    mean, half = (along - 1.0) / 2.0, (along + 1.0) / 2.0
+    radial = -z + mean * a + half * (C * a + S * z)
+    out[0] = radial * C - 2.0 * r * S
+    out[1] = radial * S + 2.0 * r * C
+    out[2] = a + mean * z + half * (S * a - C * z)
+
+
+def test_a_loop_of_doubled_orbits_ends_where_it_is_single():
+    field = VectorField.from_function(band, {"q": -0.4}, 3)
+    t, x = circle(1.0, np.pi)
+    single = orbits_from_motion(field, "q", t, np.column_stack([x, 0.0 * t]), period=np.pi,
+                                bounds=(-0.5, 0.5), intervals=20, scales=np.ones(3))
+    first, last = single.of_kind("period doubling")
+    assert [first.parameter, last.parameter] == pytest.approx(np.array([-1.0, 1.0])
+                                                              * np.sqrt(0.05), abs=1e-8)
+    loop = orbits_beyond(field, single, first, bounds=(-0.5, 0.5))
+    assert loop.status is Status.CLOSED
+    assert [point.kind for point in loop.special] == ["period halving"]
+    assert loop.points[-1].kind == "period halving"
+    assert loop.points[-1].parameter == pytest.approx(last.parameter, abs=1e-6)
+    assert (np.diff(loop.parameter) > 0.0).all()
+
+
+def fork(t, x, p, out):
+    square = x[0] * x[0] + x[1] * x[1]
+    out[0] = (1.0 - square) * x[0] - 2.0 * x[1]
+    out[1] = (1.0 - square) * x[1] + 2.0 * x[0]
+    out[2] = (p[0] - x[2] * x[2] + 0.1 * x[0]) * x[2]
+
+
+@pytest.mark.parametrize("largest", [0.01, 0.02, 0.03, 0.05])
+def test_no_fold_beside_a_fork(largest):
+    """The bent branch turns at the pitchfork, at p = 0 where the mean growth of z is zero."""
+    from scipy.integrate import solve_ivp
+
+    field = VectorField.from_function(fork, {"p": 0.5}, 3)
+    run = solve_ivp(lambda t, x: field.rates(np.zeros(1), x[None], field.values)[0], (0.0, 60.0),
+                    [1.0, 0.0, 0.7], rtol=1e-9, atol=1e-11, dense_output=True)
+    t = np.linspace(50.0, 60.0, 3000)
+    branch = orbits_from_motion(
+        field, "p", t, run.sol(t).T, period=np.pi, bounds=(-0.5, 0.6), intervals=20,
+        direction=-1.0, scales=np.ones(3), settings=Settings(largest_step=largest))
+    assert [point.kind for point in branch.special] == ["branch point"]
+    assert branch.special[0].parameter == pytest.approx(0.0, abs=1e-5)
+
+
+def canard(t, x, p, out):
+    out[0] = 100.0 * (x[1] - x[0] * x[0] * x[0] / 3.0 + x[0])
+    out[1] = p[0] - x[0]
+
+
+def test_no_folds_on_a_canard():
+    """The whole explosion of van der Pol's orbits lies within 1e-9 of one parameter."""
+    field = VectorField.from_function(canard, {"a": 1.2}, 2)
+    rest = equilibrium_branch(field, "a", [1.2, 1.2**3 / 3.0 - 1.2], bounds=(0.8, 1.3),
+                              direction=-1.0)
+    orbits = orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=(0.8, 1.3),
+                              intervals=100, settings=Settings(points=200))
+    # Asymptotically 1 - eps / 8 - 3 eps^2 / 32, eps = 0.01 (Zvonkin and Shubin 1984).
+    assert orbits.parameter[-1] == pytest.approx(1.0 - 0.01 / 8.0 - 3e-4 / 32.0, abs=2e-6)
+    assert not orbits.special
+
+
+def pendulum(t, x, p, out):
+    out[0] = x[1]
+    out[1] = -x[0] - 0.5 * np.sin(x[0]) + p[0] * x[1]
+
+
+def test_a_conservative_family_has_no_special_points():
+    field = VectorField.from_function(pendulum, {"a": 0.1}, 2)
+    rest = equilibrium_branch(field, "a", bounds=(-0.5, 0.5), direction=-1.0)
+    centre, = rest.of_kind("Hopf")
+    assert centre.details["criticality"] == "undecided"
+    orbits = orbits_from_hopf(field, rest, centre, bounds=(-0.5, 0.5), intervals=50,
+                              settings=Settings(points=150))
+    assert np.abs(orbits.parameter).max() < 1e-8
+    assert orbits.points[-1].values["maximum"][0] > 10.0
+    assert not orbits.special
+
+
+def lotka(t, x, p, out):
+    out[0] = x[0] * (1.0 - x[1]) + p[0] * (x[0] - 1.0)
+    out[1] = x[1] * (x[0] - 1.0)
+
+
+def test_terms_that_cancel_decide_nothing():
+    """Lotka's equations have closed orbits only: l1 is zero, its terms are of the order of one."""
+    field = VectorField.from_function(lotka, {"a": -0.1}, 2)
+    point, = equilibrium_branch(field, "a", [1.0, 1.0], bounds=(-0.3, 0.3)).of_kind("Hopf")
+    assert abs(point.details["first_lyapunov"]) < 1e-12
+    assert point.details["criticality"] == "undecided"
+
+
+def takens(t, x, p, out):
+    out[0] = x[1]
+    out[1] = p[0] + p[1] * x[1] + x[0] * x[0] + x[0] * x[1]
+
+
+@pytest.mark.parametrize("k", [39, 59])
+def test_two_states_have_no_zero_hopf_point(k):
+    field = VectorField.from_function(takens, {"b": -1.0 - 0.013 * k, "c": 1.5}, 2)
+    rest = equilibrium_branch(field, "c", [-np.sqrt(1.0 + 0.013 * k), 0.0], bounds=(0.2, 1.9),
+                              direction=-1.0)
+    curve = hopf_curve(field, ("c", "b"), rest.of_kind("Hopf")[0],
+                       bounds={"c": (-2.0, 2.0), "b": (-3.0, 1.0)},
+                       settings=Settings(points=200, largest_step=0.02 + 0.003 * k))
+    assert [point.kind for point in curve.special] == ["Bogdanov-Takens"]
+
+
+def test_orbits_of_a_strong_hopf_point():
+    """l1 is 934: the orbits keep the eigenvector's shape at amplitudes of some 1e-4 only."""
+    field = two_mass_field(20.0, 0.06)
+    near = Settings(step=0.005, largest_step=0.01)
+    rest = equilibrium_branch(field, "ground.speed", find_equilibrium(field),
+                              bounds=(0.05, 0.12), settings=near)
+    point = rest.of_kind("Hopf")[0]
+    eigenvalues = np.linalg.eigvals(two_mass_jacobian(20.0, point.parameter))
+    assert np.abs(eigenvalues.real).min() < 1e-8
+    orbits = orbits_from_hopf(field, rest, point, bounds=(0.05, 8.0), intervals=100,
+                              settings=Settings(points=20))
+    assert orbits.points[0].parameter == pytest.approx(point.parameter, rel=1e-3)
+    assert orbits.points[0].values["period"] == pytest.approx(
+        2.0 * np.pi / np.abs(eigenvalues[np.abs(eigenvalues.real).argmin()].imag), rel=3e-3)
+    # Subcritical: unstable, on the side where sliding is stable.
+    assert orbits.points[0].values["unstable"] == 1
+
+
+def test_the_same_call_gives_the_same_branch():
+    field = two_mass_field(20.0, 1.0)
+
+    def branches():
+        rest = equilibrium_branch(field, "ground.speed", bounds=(0.3, 8.0))
+        return rest, orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=(0.3, 8.0),
+                                      settings=Settings(points=60))
+
+    first, again = branches(), branches()
+    x = np.zeros((1, 4))
+    for value in (1e-3, 40.0, 1.0, 7.0):  # whatever is asked for in between
+        field.derivatives(np.zeros(1), x, field.values * value, (0, 1))
+    third = branches()
+    for one, other, later in zip(first, again, third, strict=True):
+        assert len(one) == len(other) == len(later)
+        for a, b, c in zip(one, other, later, strict=True):
+            assert (a.u == b.u).all()
+            assert (a.u == c.u).all()

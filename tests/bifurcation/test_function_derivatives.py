@@ -1,0 +1,226 @@
+"""Derivatives of vector fields from functions, against closed forms.
+
+The complex step loses them in many ways: powers of negative bases lie on a branch cut, abs and sign
+drop the imaginary part, hyperbolic functions overflow where the real ones do not.
+"""
+
+import math
+import warnings
+
+import numba
+import numpy as np
+import pytest
+
+from fecontact.bifurcation.equilibria import find_equilibrium
+from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.orbits import orbits_from_hopf
+from fecontact.bifurcation.vector_field import VectorField
+from fecontact.errors import AnalysisError, InputError
+
+size_of = numba.njit(lambda x: abs(x))
+
+
+@numba.njit
+def far(x):
+    return size_of(x) * x
+
+
+def cube(t, x, p, out):
+    out[0] = p[0] * x[0]**3
+
+
+def fourth(t, x, p, out):
+    out[0] = p[0] * x[0]**4
+
+
+def inverse(t, x, p, out):
+    out[0] = p[0] * x[0]**-1
+
+
+def power(t, x, p, out):
+    out[0] = p[0] * np.power(x[0], 5)
+
+
+def of_lambda(t, x, p, out):
+    size = lambda y: abs(y)  # noqa: E731
+    out[0] = p[0] * size(x[0]) * x[0]
+
+
+def of_inner_function(t, x, p, out):
+    def size(y):
+        return np.sqrt(np.abs(y)**2)
+    out[0] = p[0] * size(x[0]) * x[0]
+
+
+def of_other_functions(t, x, p, out):
+    out[0] = p[0] * far(x[0])
+
+
+def tangent(t, x, p, out):
+    out[0] = p[0] * np.tanh(1000.0 * x[0])
+
+
+def hyperbola(t, x, p, out):
+    out[0] = p[0] / np.cosh(800.0 * x[0])
+
+
+def logistic(t, x, p, out):
+    out[0] = p[0] / (1.0 + np.exp(-900.0 * x[0]))
+
+
+def larger(t, x, p, out):
+    out[0] = p[0] * np.maximum(x[0], 0.25) * x[0]
+
+
+def larger_of_python(t, x, p, out):
+    out[0] = p[0] * max(x[0], 0.25) * x[0]
+
+
+def by_where(t, x, p, out):
+    out[0] = p[0] * np.where(x[0] > 0.0, x[0], 2.0 * x[0]).item()
+
+
+def by_comparison(t, x, p, out):
+    out[0] = p[0] * (x[0] if x[0] > 0.0 else 2.0 * x[0])
+
+
+def signed(t, x, p, out):
+    out[0] = p[0] * np.sign(x[0]) * x[0] * x[0]
+
+
+def cast(t, x, p, out):
+    out[0] = p[0] * float(x[0]) * x[0]
+
+
+def real_part(t, x, p, out):
+    out[0] = p[0] * x[0].real * x[0]
+
+
+def steep(t, x, p, out):
+    out[0] = p[0] * math.atan(1e6 * x[0])
+
+
+def narrow(t, x, p, out):
+    out[0] = p[0] * math.exp(-1e6 * abs(x[0])) * x[0]
+
+
+def offset(t, x, p, out):
+    out[0] = p[0] * ((math.fabs(x[0]) + 1e5) - 1e5)
+
+
+CATALOGUE = [
+    (cube, lambda x: 3.0 * x**2),
+    (fourth, lambda x: 4.0 * x**3),
+    (inverse, lambda x: -1.0 / x**2),
+    (power, lambda x: 5.0 * x**4),
+    (of_lambda, lambda x: 2.0 * abs(x)),
+    (of_inner_function, lambda x: 2.0 * abs(x)),
+    (of_other_functions, lambda x: 2.0 * abs(x)),
+    (tangent, lambda x: 1000.0 * (1.0 - np.tanh(1000.0 * x)**2)),
+    (hyperbola, lambda x: -800.0 * np.tanh(800.0 * x) / np.cosh(np.clip(800.0 * x, -700, 700))),
+    (logistic, lambda x: 225.0 / np.cosh(np.clip(450.0 * x, -300, 300))**2),
+    (larger, lambda x: np.where(x > 0.25, 2.0 * x, 0.25)),
+    (larger_of_python, lambda x: np.where(x > 0.25, 2.0 * x, 0.25)),
+    (by_where, lambda x: np.where(x > 0.0, 1.0, 2.0)),
+    (by_comparison, lambda x: np.where(x > 0.0, 1.0, 2.0)),
+    (signed, lambda x: 2.0 * abs(x)),
+    (cast, lambda x: 2.0 * x),
+    (real_part, lambda x: 2.0 * x),
+    (steep, lambda x: 1e6 / (1.0 + (1e6 * x)**2)),
+    (narrow, lambda x: np.exp(-1e6 * abs(x)) * (1.0 - 1e6 * abs(x))),
+]
+PLACES = np.array([-2.1, -1.0, -0.5, -1e-3, -3e-6, 1e-6, 2e-4, 0.3, 1.7])
+
+
+@pytest.mark.parametrize(("function", "slope"), CATALOGUE)
+def test_derivatives_are_those_of_the_closed_form(function, slope):
+    """To state and parameter; and what is found is said: no warning is needed."""
+    field = VectorField.from_function(function, {"p": 1.5}, 1)
+    x = PLACES[:, None].copy()
+    f, J, P = field.derivatives(np.zeros(len(x)), x, field.values, (0,))
+    exact = 1.5 * slope(PLACES)
+    near = 1e-9 * np.abs(exact) + 1e-11 * np.abs(f[:, 0] / PLACES) + 1e-100
+    assert (np.abs(J[:, 0, 0] - exact) <= near).all()
+    assert P[:, 0, 0] == pytest.approx(f[:, 0] / 1.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("function", [case[0] for case in CATALOGUE[:11] + CATALOGUE[14:17]
+                                      if case[0] is not larger])
+def test_the_complex_step_is_refused_where_it_is_wrong(function):
+    with pytest.raises(InputError, match=r"does not get .* right|complex step|complex numbers"):
+        VectorField.from_function(function, {"p": 1.5}, 1, differentiation="complex")
+
+
+def moved(t, x, p, out):
+    out[0] = np.tanh(x[0] - p[0])
+
+
+def test_what_goes_wrong_on_the_way_is_said():
+    """Right around the scale, but 800 of them away complex numbers overflow."""
+    field = VectorField.from_function(moved, {"p": 0.0}, 1, scales=[10.0])
+    assert field.differentiation == "complex"
+    x = np.array([[0.3], [-800.0], [0.7]])
+    with pytest.warns(UserWarning, match=r"derivatives of moved to 'x1', 'p'.*differences take"):
+        _, J, P = field.derivatives(np.zeros(3), x, field.values, (0,))
+    assert J[:, 0, 0] == pytest.approx(1.0 / np.cosh(np.clip(x[:, 0], -300, 300))**2, rel=1e-9)
+    assert P[:, 0, 0] == pytest.approx(-J[:, 0, 0], rel=1e-12)
+    strict = VectorField.from_function(moved, {"p": 0.0}, 1, scales=[10.0],
+                                       differentiation="complex")
+    with pytest.raises(AnalysisError, match="does not get the derivatives of moved to 'x1' right"):
+        strict.derivatives(np.zeros(3), x, field.values)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        strict.derivatives(np.zeros(2), x[::2].copy(), field.values)
+
+
+def test_rounding_is_no_derivative_of_zero():
+    """Over steps shorter than the rounding of 1e5 the function does not change at all."""
+    field = VectorField.from_function(offset, {"p": 1.5}, 1)
+    _, J, _ = field.derivatives(np.zeros(2), np.array([[0.3], [-1.7]]), field.values)
+    assert J[:, 0, 0] == pytest.approx([1.5, -1.5], rel=1e-7)
+
+
+def falling(t, x, p, out):
+    out[0] = p[0] + x[0]**3
+
+
+def test_eigenvalue_of_a_cube():
+    found = find_equilibrium(VectorField.from_function(falling, {"p": 0.125}, 1), start=[-0.6])
+    assert found.state[0] == pytest.approx(-0.5, rel=1e-12)
+    assert found.eigenvalues[0] == pytest.approx(0.75, rel=1e-10)
+
+
+def oscillator(t, x, p, out):
+    out[0] = x[1]
+    out[1] = -x[0] + p[0] * x[1] - p[1] * x[0]**3 - x[1]**3
+
+
+def test_normal_form_and_multipliers_with_powers():
+    """x'' + x - mu x' + b x^3 + x'^3 = 0.
+
+    Averaging gives the first Lyapunov coefficient -3/8 for an eigenvector with |q|^2 = 1 (where
+    x = r cos t is z q + its conjugate with |z| = r / sqrt 2, and r' = -3/8 r^3), and Liouville the
+    product of the multipliers.
+    """
+    field = VectorField.from_function(oscillator, {"mu": -0.3, "b": 0.7}, 2)
+    assert field.differentiation == "differences"
+    rest = equilibrium_branch(field, "mu", bounds=(-0.3, 0.5))
+    point, = rest.of_kind("Hopf")
+    assert point.parameter == pytest.approx(0.0, abs=1e-10)
+    assert point.details["first_lyapunov"] == pytest.approx(-0.75, rel=1e-6)
+    orbits = orbits_from_hopf(field, rest, point, bounds=(-0.3, 0.5), intervals=30)
+    last = orbits.points[-1]
+    assert last.parameter == pytest.approx(0.5, abs=1e-9)
+    mesh = np.asarray(last.values["mesh"])
+    nodes = last.u[:-2].reshape(-1, 2)
+    roots, weights = np.polynomial.legendre.leggauss(4)
+    places = np.linspace(0.0, 1.0, 5)
+    basis = [np.polynomial.Polynomial.fromroots(np.delete(places, k)) for k in range(5)]
+    values = np.array([[b((r + 1.0) / 2.0) / b(places[k]) for k, b in enumerate(basis)]
+                       for r in roots])
+    closed = np.vstack([nodes, nodes[:1]])
+    mean = sum(width * weights / 2.0 @ (last.parameter
+                                        - 3.0 * (values @ closed[4 * j:4 * j + 5, 1])**2)
+               for j, width in enumerate(np.diff(mesh)))
+    expected = np.exp(mean * last.values["period"])
+    assert np.prod(last.values["multipliers"]).real == pytest.approx(expected, rel=1e-7)
