@@ -147,7 +147,8 @@ def _from_hdf5(item: Any) -> Any:
 def _read_npz(path: Path, name: str | None) -> tuple[Any, None]:
     import scipy.sparse as sp
 
-    with np.load(path) as arrays:
+    # Opened here, because numpy leaves damaged files open.
+    with path.open("rb") as file, np.load(file) as arrays:
         if {"format", "shape", "data"} <= set(arrays.files):
             _require_no_name(name)
             return sp.load_npz(path), None
