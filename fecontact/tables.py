@@ -217,7 +217,7 @@ def convert(value: Any, hint: Any, where: str, key: str) -> Any:
         raise InputError(f"{where}: {key} = {shown(value)} must be {described(hint)}.") from None
     except OverflowError:
         raise InputError(f"{where}: {key} = {shown(value)} is too large; numbers reach "
-                         f"1.8e308.") from None
+                         f"1.8e308, whole numbers 9.2e18.") from None
 
 
 @contextmanager
@@ -285,6 +285,8 @@ def _converted_to(value: Any, hint: Any, where: str) -> Any:
     if hint is float and isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
     if hint is int and isinstance(value, Integral) and not isinstance(value, bool):
+        if abs(value) >= 2**63:
+            raise OverflowError
         return int(value)
     if hint in (str, bool, types.NoneType) and isinstance(value, hint):
         return value

@@ -135,7 +135,7 @@ def _table(block: _Block) -> Array:
                 try:
                     float(word)
                 except ValueError:
-                    raise InputError(f"Line {number}: '{word}' is not a number; write matrices "
+                    raise InputError(f"Line {number}: {word[:40]!r} is not a number; write matrices "
                                      f"with FORMAT=COORDINATE or FORMAT=MATRIX INPUT.") from None
             width = width or len(words)
             if len(words) != width:

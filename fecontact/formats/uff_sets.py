@@ -1,5 +1,6 @@
 """Data sets of universal files, and what :mod:`fecontact.formats.uff` takes from each."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,9 @@ def data_sets(path: Path) -> list[dict[str, Any]]:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     try:
+        # Each data set lies between two such lines; pyuff passes over one that has no end.
+        if len(re.findall(rb"^ {4}-1\s*?$", path.read_bytes(), re.MULTILINE)) % 2:
+            raise InputError(f"{path}: the file ends within a data set; it is cut off.")
         file = pyuff.UFF(str(path))
         kinds = file.get_set_types()
         wanted = [k for k, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2412, 2420)]
