@@ -1,5 +1,8 @@
 """Touches, slip reversals and crossings within a step, against closed forms."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from oscillators import basis
@@ -24,6 +27,8 @@ from fecontact import (
     sensitivity,
     simulate,
 )
+from fecontact.laws.contract import ground_profile
+from fecontact.laws.profile_base import Profile
 
 UP = np.array([[0.0], [1.0]])
 ALONG = np.array([[1.0], [0.0]])
@@ -111,8 +116,8 @@ def test_reversal_on_a_belt_whose_speed_changes():
     """As above, with a belt whose speed swings: bounds on its speed, not polynomials."""
     for phase in np.linspace(0.0, 1.2, 25):
         system, start = sliding(1e-4, 0.1, phase)
-        system = system.with_(ground=Ground(speed=1.0, motion=HarmonicSpeed(2e-5, 3.0)))
-        coarse, fine = (simulate(system, 5.0 - phase, initial=start, outputs=101, rtol=1e-5,
+        system = system.with_(ground=Ground(speed=1.0, motion=HarmonicSpeed(1e-5, 0.3)))
+        coarse, fine = (simulate(system, 3.0 - phase, initial=start, outputs=101, rtol=1e-5,
                                  max_step=step) for step in (None, 1e-3))
         assert coarse.states == pytest.approx(fine.states, abs=2e-5)
 
@@ -178,6 +183,21 @@ def test_longest_step(method):
     assert run.states[-1] == pytest.approx([-5.0, -10.0], rel=1e-4)
 
 
+def test_longest_step_of_set_valued_runs(monkeypatch):
+    """It is handed on, unless what is given in time or the run ask for a shorter one."""
+    handed = []
+
+    def run(*_, longest, **__):
+        handed.append(longest)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fecontact.integrate.set_valued.integrate_set_valued", run)
+    for step in (None, 1e-3, 10.0):
+        with pytest.raises(KeyboardInterrupt):
+            simulate(thrown(), 1.0, initial=np.zeros(2), method="set-valued", max_step=step)
+    assert handed == [None, 1e-3, pytest.approx(0.02)]
+
+
 def test_longest_step_of_other_runs():
     times = np.array([0.0, 1.0])
     limited = ensemble(thrown(), times, initial=np.zeros(2), max_step=1e-3)
@@ -188,5 +208,22 @@ def test_longest_step_of_other_runs():
         for run in (lambda step: simulate(thrown(), 1.0, initial=np.zeros(2), max_step=step),
                     lambda step: ensemble(thrown(), times, initial=np.zeros(2), max_step=step),
                     lambda step: sensitivity(thrown(), 1.0, initial=np.zeros(2), max_step=step)):
-            with pytest.raises(InputError, match="max_step = .* must be a finite time above zero"):
+            with pytest.raises(InputError, match=r"max_step = .* must be a finite time above zero"):
                 run(wrong)
+
+
+@ground_profile
+def _tilted(xi, p):
+    return p[0] + 0.1 * xi, 0.1, 0.0
+
+
+@dataclass(frozen=True)
+class Tilted(Profile):
+    kernel: ClassVar = _tilted
+    shortest_wavelength: ClassVar = 1.0
+
+
+def test_profiles_that_do_not_say_their_bounds_are_named():
+    system = thrown().with_(ground=Ground(profile=Tilted()))
+    with pytest.raises(InputError, match=r"Tilted\(\) must say its height_range and its steepest_"):
+        simulate(system, 1.0, initial=np.zeros(2))

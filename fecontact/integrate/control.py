@@ -240,9 +240,16 @@ def _levels(system: ContactSystem) -> Array:
 def _ground_bounds(system: ContactSystem, times: Array) -> Array:
     """What bounds the ground, in the order of :mod:`fecontact.integrate.courses`."""
     ground, start, end = system.ground, float(times[0]), float(times[-1])
-    low, high = ground.height_range if ground.wavy else (0.0, 0.0)
-    return np.array([low, high, ground.steepest_slope if ground.wavy else 0.0,
-                     ground.largest_speed(start, end), ground.largest_acceleration(start, end)])
+    low, high, slope = 0.0, 0.0, 0.0
+    if ground.wavy:
+        try:
+            (low, high), slope = ground.height_range, ground.steepest_slope
+        except NotImplementedError:
+            raise InputError(f"Ground: profile = {ground.profile!r} must say its height_range and "
+                             f"its steepest_slope, which bound it between the places where the "
+                             f"integrator meets it.") from None
+    return np.array([low, high, slope, ground.largest_speed(start, end),
+                     ground.largest_acceleration(start, end)])
 
 
 def finish(

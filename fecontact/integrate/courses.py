@@ -9,10 +9,14 @@ of sign are found exactly. Otherwise its bounds are used,
     |V(t) - V(t_0)| \le \max|V'|\,|t - t_0|
 
 over parts of the step that are halved until the sign is decided, or they are as short as _FINEST.
+
+Most steps need none of that: on the interpolant a mode departs from the straight line between its
+ends by no more than the differences of its coefficients from that line, and a node by no more than
+the sum over the modes.
 """
 
 from fecontact.compiled import helper
-from fecontact.integrate import bernstein, rodas
+from fecontact.integrate import bernstein, motion, rodas
 from fecontact.laws.contract import ground_at, signal_at
 
 # Entries of Control.ground: what bounds the ground.
@@ -82,6 +86,85 @@ def set_courses(s, shapes, bounds, before, after, room):  # type: ignore[no-unty
 
 
 @helper
+def set_ends(t, y, s, shapes, bounds, ends):  # type: ignore[no-untyped-def]
+    """Fill ``ends`` (3, 2 n) with displacements and velocities of the nodes, and heights below."""
+    n = len(s.gap)
+    motion.project(shapes, y, ends[0], ends[1])
+    travel = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[0]
+    _set_heights(travel, s, bounds, ends[0], ends[2, :n])
+
+
+@helper
+def _set_heights(travel, s, bounds, places, heights):  # type: ignore[no-untyped-def]
+    """Fill ``heights`` (n,) with those of the ground under the nodes."""
+    for j in range(len(heights)):
+        heights[j] = bounds[HIGHEST]
+        if bounds[STEEPEST] != 0.0:
+            heights[j] = ground_at(s.profile)(s.abscissa[j] + places[j] - travel,
+                                              s.profile_parameters)[0]
+
+
+@helper
+def keep_ends(n, room):  # type: ignore[no-untyped-def]
+    """Take the end of the step for the start of the next."""
+    for k in range(2):
+        for j in range(2 * n):
+            room.ends[k, j] = room.nodes[k, j]
+    for j in range(n):
+        room.ends[2, j] = room.ends[2, n + j]
+
+
+@helper
+def restless(speed, h, s, control, room):  # type: ignore[no-untyped-def]
+    """Whether :func:`doubtful` may find something, by the modes alone.
+
+    ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
+    end; ``speed`` is that of the ground at the start.
+    """
+    bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
+                                          room.dense)
+    n, m = len(s.gap), len(control.largest)
+    move, quicken = 0.0, 0.0
+    for i in range(m):
+        largest = control.largest[i]
+        move += largest * _departure(dense[0, i], dense[1, i], dense[2, i])
+        quicken += largest * _departure(dense[0, m + i], dense[1, m + i], dense[2, m + i])
+    quicken += bounds[QUICKEST] * h
+    wavy = bounds[STEEPEST] != 0.0
+    if wavy:
+        _set_heights(room.given[motion.TRAVEL], s, bounds, nodes[0], ends[2, n:])
+    later = room.given[motion.SPEED]
+    some = False
+    for j in range(n):
+        reach = move
+        f, g = bounds[HIGHEST], bounds[HIGHEST]
+        if wavy:
+            f, g = ends[2, j], ends[2, n + j]
+            reach += 0.5 * bounds[STEEPEST] * (
+                abs(nodes[0, j] - ends[0, j]) + 2.0 * move + bounds[FASTEST] * h)
+        touching = nodes[2, n + j] != 0.0
+        for level in range(levels.shape[0]):
+            shift = s.gap[j] + levels[level, j]
+            first, last = ends[0, n + j] + shift - f, nodes[0, n + j] + shift - g
+            low, high = min(first, last) - reach, max(first, last) + reach
+            some |= (low < 0.0 and high > 0.0) or low < 2.0 * min(min(first, last), 0.0)
+            touching |= low < 0.0 or level > 0
+        first, last = ends[1, j] - speed, nodes[1, j] - later
+        low, high = min(first, last) - quicken, max(first, last) + quicken
+        largest = max(-low, high)
+        mixed = low < 0.0 and high > 0.0 and largest > control.slip_scale[j]
+        felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j])
+        some |= touching and (mixed or largest > felt)
+    return some
+
+
+@helper
+def _departure(k1, k2, k3):  # type: ignore[no-untyped-def]
+    """Bound on the distance of the interpolant from the straight line between its ends."""
+    return max(max(0.25 * abs(k1), abs(2.0 * k1 + k2) / 6.0), 0.25 * abs(k1 + k2 + k3))
+
+
+@helper
 def doubtful(speed, h, bounds, levels, slip_scale, room):  # type: ignore[no-untyped-def]
     """Whether forces within the step may be others than those at its ends let expect.
 
@@ -118,11 +201,11 @@ def doubtful(speed, h, bounds, levels, slip_scale, room):  # type: ignore[no-unt
         return False
     some = 0.0
     for j in range(2 * n):
-        if c[DOUBT, j] != 0.0 and (spread if j < n else bounds[STEEPEST]) == 0.0:
-            # A polygon that only rises or only falls bounds a curve that does.
-            if (c[0, j] <= c[1, j] <= c[2, j] <= c[3, j] <= c[4, j]) or (
-                    c[0, j] >= c[1, j] >= c[2, j] >= c[3, j] >= c[4, j]):
-                c[DOUBT, j] = 0.0
+        # A polygon that only rises or only falls bounds a curve that does.
+        if (spread if j < n else bounds[STEEPEST]) == 0.0 and (
+                (c[0, j] <= c[1, j] <= c[2, j] <= c[3, j] <= c[4, j])
+                or (c[0, j] >= c[1, j] >= c[2, j] >= c[3, j] >= c[4, j])):
+            c[DOUBT, j] = 0.0
         some += c[DOUBT, j]
     return some != 0.0
 

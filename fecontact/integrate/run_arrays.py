@@ -106,8 +106,9 @@ class Room(NamedTuple):
 
     Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
     what the names say; ``nodes`` (3, 2 n), ``given`` and ``pull`` for what acts at the time of a
-    stage, ``power`` (4, 8 + n) for a quadrature. ``inner`` to ``places`` serve to look at the
-    course of a step: its coefficients, those of the nodes, and room for what they may do.
+    stage, ``power`` (4, 8 + n) for a quadrature. ``ends`` to ``places`` serve to look at the
+    course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
+    what they may do.
     """
 
     stages: Array
@@ -126,6 +127,7 @@ class Room(NamedTuple):
     reduced: linear.Reduced
     scratch: motion.Gradients
     gradients_after: motion.Gradients
+    ends: Array
     inner: Array
     courses: Array
     bound: Array
@@ -135,7 +137,7 @@ class Room(NamedTuple):
 
 ROOM = types.NamedTuple(
     [matrix] * 2 + [vector] * 6 + [matrix] + [vector] * 3
-    + [matrix, linear.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 4 + [vector], Room)
+    + [matrix, linear.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector], Room)
 
 
 def gradients_for(nodes: int, states: int) -> motion.Gradients:
@@ -154,7 +156,7 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
         np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
         np.zeros((4, len(POWERS) + nodes)), linear.reduced_for(modes, nodes, states),
         gradients_for(nodes, states), gradients_for(nodes, states),
-        np.zeros((3, size)), np.zeros((courses.DOUBT + 1, 3 * nodes)),
+        np.zeros((3, 2 * nodes)), np.zeros((3, size)), np.zeros((courses.DOUBT + 1, 3 * nodes)),
         np.zeros((3, courses.COEFFICIENTS)),
         np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST))
 

@@ -67,8 +67,8 @@ def simulate(
         Relative tolerance; absolute ones follow from it, the penetration scale of the normal law
         and the width of the friction smoothing.
     max_step : float, optional
-        Longest step [s]; by default, and at most, what resolves drive, loads, waves and ground.
-        Contacts within a step are found without it; see :doc:`integrator`.
+        Longest step [s]; by default, and at most, a part of the shortest period of drive, loads
+        and waves. Touches and slips within a step are found without it by 'Rodas5P'.
     restitution : float, optional
         For 'set-valued' alone: rigid stops with Newton's coefficient of restitution, from 0 to
         below 1, in place of the normal law.
@@ -135,11 +135,13 @@ def simulate(
         rest["node_friction_work"] = work[:, len(POWERS) :]
         work = work[:, : len(POWERS)]
     elif method == "set-valued":
+        from fecontact.integrate.scipy_solvers import longest_step
         from fecontact.integrate.set_valued import integrate_set_valued
 
         found = integrate_set_valued(system, state, times, rtol=rtol, restitution=restitution,
                                      static_coefficient=static_coefficient,
-                                     scheme=scheme or "auto", longest=max_step,
+                                     scheme=scheme or "auto", longest=None if max_step is None else longest_step(
+                                         system, times, max_step),
                                      progress=progress)
         times, states, work = found.time, found.states, found.work
         status, statistics = found.status, found.statistics

@@ -7,6 +7,7 @@ from fecontact.compiled import block, borrowed, f8, helper, i8, kernel, matrix, 
 from fecontact.contact_energy import powers
 from fecontact.contact_kernels import SYSTEM
 from fecontact.integrate import linear, motion, rodas, run_arrays
+from fecontact.integrate.courses import doubtful, keep_ends, restless, set_courses, set_ends
 from fecontact.integrate.run_arrays import (
     CAUTIOUS,
     LAST_ERROR,
@@ -21,11 +22,18 @@ from fecontact.integrate.run_arrays import (
     STEPS,
     TIME,
 )
-from fecontact.integrate.courses import doubtful, set_courses
 from fecontact.integrate.step_error import energy_scale, set_scale, slip_error, state_error
 from fecontact.integrate.unfelt import first_unfelt_at
 from fecontact.integrate.variation import VARIATION, begin_anew, keep, propagate
-from fecontact.integrate.watching import KINKS, NODES, WATCH, begin, full, next_switch, note_events_at
+from fecontact.integrate.watching import (
+    KINKS,
+    NODES,
+    WATCH,
+    begin,
+    full,
+    next_switch,
+    note_events_at,
+)
 from fecontact.integrate.work import add_up, work_error, work_until
 from fecontact.laws.contract import signal_at
 
@@ -147,6 +155,7 @@ def advance(  # type: ignore[no-untyped-def]
         for k in range(size):
             out[0, k] = progress.state[k]
         counts[STARTED], counts[OUTPUTS] = 1, 1
+    set_ends(t, progress.state, s, shapes, control.ground, room.ends)
     new, speed, attempts, to_switch, again = True, 0.0, 0, False, 0
     while counts[OUTPUTS] < len(times):
         # A step that failed is repeated before the call returns: derivatives are not kept.
@@ -203,17 +212,17 @@ def advance(  # type: ignore[no-untyped-def]
             error = slip_error(error, s, shapes, control, progress, room)
         if error <= 1.0:
             rodas.dense_coefficients(room.stages, room.dense)
-            set_courses(s, shapes, control.ground, progress.state, room.after, room)
-            if again < _MOST_AGAIN and doubtful(
-                    speed, h, control.ground, control.levels, control.slip_scale, room):
-                part = first_unfelt_at(control.unfelt)(
-                    t, h, latest, again, s, shapes, control, progress, room)
-                if part * h > 100.0 * smallest and part < 1.0:
-                    counts[REJECTIONS] += 1
-                    h *= part
-                    to_switch = True
-                    again += 1
-                    continue
+            if restless(speed, h, s, control, room) and again < _MOST_AGAIN:
+                set_courses(s, shapes, control.ground, progress.state, room.after, room)
+                if doubtful(speed, h, control.ground, control.levels, control.slip_scale, room):
+                    part = first_unfelt_at(control.unfelt)(
+                        t, h, latest, again, s, shapes, control, progress, room)
+                    if part * h > 100.0 * smallest and part < 1.0:
+                        counts[REJECTIONS] += 1
+                        h *= part
+                        to_switch = True
+                        again += 1
+                        continue
             if control.work:
                 add_up(t, h, latest, s, progress, room)
                 error = max(error, work_error(h, room.power) / (
@@ -254,7 +263,9 @@ def advance(  # type: ignore[no-untyped-def]
 
         ends = 2.0
         if watched:
-            ends = note_events_at(watch.note)(t, h, latest, s, control, progress.state, room, watch)
+            set_courses(s, shapes, control.ground, progress.state, room.after, room)
+            ends = note_events_at(watch.note)(
+                t, h, latest, s, control, progress.state, room, watch)
         elif watch.counts[KINKS]:
             begin(min(target, latest), room.after, s, control.depth, watch, room.scratch)
         reached = target if ends > 1.0 else t + ends * h
@@ -288,6 +299,7 @@ def advance(  # type: ignore[no-untyped-def]
             else:
                 progress.power[:] = room.power[3]
         _go_on(progress, room)
+        keep_ends(len(s.gap), room)
         t = target
         new, again = True, 0
         counts[STEPS] += 1

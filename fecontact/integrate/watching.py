@@ -319,7 +319,9 @@ def _set_places(t, h, latest, s, control, before, room, watch):  # type: ignore[
 
 
 @helper
-def _note_changes(j, zone, t, h, latest, left, right, s, watch, depth, force, rates, before, after, dense, y):  # type: ignore[no-untyped-def]
+def _note_changes(  # type: ignore[no-untyped-def]
+    j, zone, t, h, latest, left, right, s, watch, depth, force, rates, before, after, dense, y,
+):
     """Note what node j does between two parts of a step, at whose right end it is in a zone."""
     low = left
     for _ in range(_MOST_A_NODE):
