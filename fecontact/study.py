@@ -293,6 +293,7 @@ class Study:
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=settings.initial, outputs=settings.outputs,
                             method=settings.method, rtol=settings.rtol,
+                            max_step=settings.max_step,
                             restitution=settings.restitution,
                             static_coefficient=settings.static_coefficient,
                             scheme=settings.scheme, progress=progress,

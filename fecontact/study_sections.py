@@ -197,6 +197,8 @@ class SimulationSettings:
         scikit-sundae; 'set-valued' friction.
     rtol : float
         Relative tolerance.
+    max_step : float, optional
+        Longest step [s]; by default as long as the tolerance and what is given in time allow.
     restitution : float, optional
         For 'set-valued': rigid stops with this coefficient in place of the normal law.
     static_coefficient : float, optional
@@ -218,6 +220,7 @@ class SimulationSettings:
     outputs: int = 1001
     method: str = "Rodas5P"
     rtol: float = 1e-6
+    max_step: float | None = None
     restitution: float | None = None
     static_coefficient: float | None = None
     scheme: str | None = None
@@ -234,6 +237,8 @@ class SimulationSettings:
         if self.outputs < 2:
             raise InputError(f"SimulationSettings: outputs = {self.outputs} must be at least 2.")
         require_positive("SimulationSettings", rtol=self.rtol)
+        if self.max_step is not None:
+            require_positive("SimulationSettings", max_step=self.max_step)
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,14 @@ def _first_below(b):
     return bernstein.first_below(b, np.empty((bernstein.DEPTH, len(b) + 1)))
 
 
+@njit
+def _sign_changes(b):
+    places = np.empty(len(b))
+    found = bernstein.sign_changes(b, np.empty((bernstein.DEPTH, len(b) + 1)), np.empty(len(b)),
+                                   places)
+    return places[:found]
+
+
 def _of(polynomial: Polynomial) -> np.ndarray:
     """Bernstein coefficients from powers, b_k = sum_i c_i C(k, i) / C(n, i)."""
     n = len(polynomial.coef) - 1
@@ -100,3 +108,25 @@ def test_many_random_polynomials_against_dense_sampling() -> None:
                 found < places[below[0]] and _value(b, min(found + 1e-10, 1.0)) < 1e-9)
         elif found != bernstein.NOWHERE:
             assert _value(b, found + 1e-10) < 0.0
+
+
+@pytest.mark.parametrize("roots", [
+    [0.3], [0.25, 0.75], [0.499999, 0.500001], [0.1, 0.2, 0.3], [0.9, 1.7, -0.4], [0.5],
+    [0.5, 0.25, 0.7, 2.0], [0.0123, 0.0124, 0.9, 0.95, 0.99, 3.0, -1.0], [1.5, -0.5], [0.0, 0.5],
+])
+def test_every_change_of_sign_is_found(roots: list[float]) -> None:
+    within = sorted(root for root in roots if 0.0 < root < 1.0 and roots.count(root) == 1)
+    for polynomial in (Polynomial.fromroots(roots), -Polynomial.fromroots(roots)):
+        assert _sign_changes(_of(polynomial)) == pytest.approx(within, abs=1e-8)
+
+
+def test_changes_of_sign_of_random_polynomials() -> None:
+    rng = np.random.default_rng(3)
+    places = np.linspace(0.0, 1.0, 4001)
+    for _ in range(300):
+        b = rng.normal(size=5)
+        signs = np.sign([_value(b, place) for place in places])
+        wanted = places[1:][signs[1:] != signs[:-1]]
+        found = _sign_changes(b)
+        assert len(found) == len(wanted)
+        assert found == pytest.approx(wanted, abs=2.6e-4)

@@ -19,6 +19,7 @@ from fecontact import (
     simulate,
     write_case,
 )
+from fecontact.integrate.checkpoint import Checkpoint
 
 
 def drop():
@@ -182,3 +183,29 @@ def test_kinds_and_functions_that_are_no_events_are_named():
 
     with pytest.raises(InputError, match=r"'event 0' is not a finite number before t = "):
         simulate(drop(), 1.0, initial=np.zeros(2), events=Event(root))
+
+
+def test_more_events_than_steps_of_a_piece(tmp_path, monkeypatch):
+    """80,000 turning points of a fast oscillator fill the table of events hundreds of times.
+
+    Progress is told, and the checkpoint is kept, all along.
+    """
+    monkeypatch.setattr(Checkpoint, "keep", Checkpoint.write)
+    shape = np.array([[0.0], [1.0]])
+    system = ContactSystem(basis([1000.0], [0.0], shape, shape), normal=LinearContact(1.0),
+                           gap=10.0)
+    file, told = tmp_path / "run.checkpoint", []
+
+    def tell(time):
+        told.append((time, file.exists()))
+
+    run = simulate(system, 40.0, initial=np.array([1e-3, 0.0]), outputs=3, rtol=1e-5,
+                   events=[Crossing("B", "y", of="velocity"), ContactEvents()], progress=tell,
+                   checkpoint=file)
+    assert run.status is Status.FINISHED
+    assert len(run.events.only("event 0")) in (79_999, 80_000, 80_001)
+    times = [time for time, _ in told]
+    assert len(times) > 3
+    assert (np.diff(times) > 0.0).all()
+    assert all(there for _, there in told[1:])
+    assert not file.exists()

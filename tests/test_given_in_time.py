@@ -124,7 +124,7 @@ def test_moment_and_constant_loads_at_points():
 
 
 def test_longest_steps_resolve_what_is_given_in_time():
-    """Parts of the run, of the shortest period, and of the time in which a wave passes."""
+    """Parts of the shortest period, and of the time in which a wave passes; a given limit."""
     def loaded(signal):
         return fc.Load(forces=(fc.PointLoad(point="C", direction="x", signal=signal),))
 
@@ -140,8 +140,11 @@ def test_longest_steps_resolve_what_is_given_in_time():
         np.inf: point(drive=fc.Drive(stiffness_x=1.0, angular_frequency=4.0 * np.pi)),
     }
     for period, system in cases.items():
-        assert control.longest_step(system, times) == pytest.approx(min(1.0, period / 4.0))
+        assert control.longest_step(system, times) == pytest.approx(min(10.0, period / 4.0))
+        assert control.longest_step(system, times, 0.06) == pytest.approx(min(0.06, period / 4.0))
         assert scipy_solvers.longest_step(system, times) == pytest.approx(min(0.2, period / 20.0))
+        assert scipy_solvers.longest_step(system, times, 0.02) == pytest.approx(
+            min(0.02, period / 20.0))
     ramp = point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02,
                                   motion=fc.SpeedRamp(0.8, start=1.0, duration=1.0)))
     assert ramp.shortest_period(0.0, 10.0) == pytest.approx(0.02 / 0.8)

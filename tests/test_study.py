@@ -252,6 +252,7 @@ MISTAKES = [
     ({"simulation.outputs": 3.5}, r"\[simulation\]: outputs = 3\.5 must be a whole number"),
     ({"simulation.t_end": 0}, r"\[simulation\]: t_end = 0\.0 must be a finite time after"),
     ({"simulation.rtol": 0}, r"\[simulation\]: rtol = 0\.0 must be a finite number above zero"),
+    ({"simulation.max_step": 0}, r"\[simulation\]: max_step = 0\.0 must be a finite number above"),
     ({"simulation.method": "Eulr"}, r"\[simulation\]: method = 'Eulr' must be one of"),
     ({"geometry.shape": "bem"}, r"\[geometry\]: shape = \"bem\" must be one of .*mean 'beam'"),
     ({"geometry.length": -1}, r"\[geometry\]: length = -1\.0 must be a finite number above zero"),

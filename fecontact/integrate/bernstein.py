@@ -105,3 +105,60 @@ def first_below(b, room):  # type: ignore[no-untyped-def]
             return begin
         waiting -= 1
     return NOWHERE
+
+
+@helper
+def variations(b):  # type: ignore[no-untyped-def]
+    """Changes of sign along the coefficients: at least as many as p has within the step."""
+    count, last = 0, 0.0
+    for i in range(len(b)):
+        if b[i] != 0.0:
+            if b[i] * last < 0.0:
+                count += 1
+            last = b[i]
+    return count
+
+
+@helper
+def sign_changes(b, room, row, places):  # type: ignore[no-untyped-def]
+    """Fill ``places`` with where p changes its sign, ascending; how many there are.
+
+    Those that lie nearer to each other than FINEST may be left out, and those that find no place.
+    ``room`` (DEPTH, n + 1) and ``row`` (n + 1,) are room to work in; b is kept.
+    """
+    n = len(b)
+    for i in range(n):
+        room[0, i] = b[i]
+    room[0, n] = 1.0
+    waiting, begin, found, sign = 1, 0.0, 0, 0.0
+    while waiting > 0:
+        part, width = room[waiting - 1, :n], room[waiting - 1, n]
+        changes = variations(part)
+        if changes > 1 and width > FINEST:
+            split(part, room[waiting, :n])
+            room[waiting - 1, n] = room[waiting, n] = 0.5 * width
+            waiting += 1
+            continue
+        first, last = 0.0, 0.0
+        for i in range(n):
+            if part[i] != 0.0:
+                first = part[i] if first == 0.0 else first
+                last = part[i]
+        # At the begin where p is zero there, then within.
+        if sign * first < 0.0 and found < len(places):
+            places[found] = begin
+            found += 1
+        if first * last < 0.0 and found < len(places):
+            low, high = 0.0, 1.0
+            while (high - low) * width > FINEST:
+                middle = 0.5 * (low + high)
+                if value(part, middle, row) * first > 0.0:
+                    low = middle
+                else:
+                    high = middle
+            places[found] = begin + high * width
+            found += 1
+        sign = last if last != 0.0 else sign
+        begin += width
+        waiting -= 1
+    return found

@@ -17,6 +17,7 @@ from fecontact.integrate.events import Events, Watched
 from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
 from fecontact.integrate.scipy_solvers import energy_scale
 from fecontact.integrate.trajectory import Status
+from fecontact.integrate.unfelt import first_unfelt
 from fecontact.integrate.variation import Variation, variation_for
 from fecontact.integrate.watch_arrays import watch_for
 from fecontact.integrate.watching import FOUND, Watch
@@ -32,6 +33,8 @@ _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
 # or of this part of the largest that it has been.
 _LOOSER, _FADED = 10.0, 1e-3
+# Steps of a piece of a run: at first, at least and at most.
+_FEWEST, _MOST_STEPS = 200, 10_000_000
 
 
 class Vary(NamedTuple):
@@ -97,6 +100,12 @@ class Run:
         return float(self.progress.numbers[run_arrays.TIME])
 
     @property
+    def attempts(self) -> int:
+        """Steps so far, those that failed included."""
+        counts = self.progress.counts
+        return int(counts[run_arrays.STEPS] + counts[run_arrays.REJECTIONS])
+
+    @property
     def statistics(self) -> dict[str, int]:
         """Counts of steps, rejected steps, right-hand sides and Jacobians."""
         counts = self.progress.counts
@@ -127,6 +136,7 @@ def start(
     times: Array,
     *,
     rtol: float,
+    max_step: float | None = None,
     work: bool = True,
     vary: bool | tuple[ContactSystem, ContactSystem, float] = False,
     vary_rtol: float | None = None,
@@ -148,6 +158,8 @@ def start(
         to the largest so far; of internal variables relative to their scale. At nodes with
         friction without memory slip velocities are resolved to a hundredth of their distance
         from rest, or of the width of the smoothing.
+    max_step : float, optional
+        Longest step [s]; shorter ones where :func:`longest_step` says so.
     work : bool
         Whether to integrate the powers. Their error of one step is kept below ``rtol`` of the
         largest energy so far, so that the energy balance closes.
@@ -173,7 +185,7 @@ def start(
         slip_scale[nodes] = law.velocity_scale
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
-    longest = longest_step(system, times)
+    longest = longest_step(system, times, max_step)
     with np.errstate(over="ignore", invalid="ignore"):
         energy = energy_scale(system, state)
     breaks = np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float)
@@ -187,10 +199,10 @@ def start(
     control = Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
-        breaks=breaks,
+        breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
         speed_scale=system.velocity_scale, energy_scale=energy,
-        work=int(work))
+        work=int(work), unfelt=first_unfelt.address)
     with np.errstate(over="ignore", invalid="ignore"):
         acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
     first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
@@ -206,13 +218,38 @@ def start(
         watch_for(system, events, bool(vary)))
 
 
-def longest_step(system: ContactSystem, times: Array) -> float:
-    """A tenth of the run, a quarter of the shortest period of drive, loads and waves [s].
+def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
+    """A quarter of the shortest period of drive, loads and waves, or the given limit [s].
 
-    The stages of a step meet these at five times; longer steps could miss them.
+    The stages of a step meet what is given in time at five times; longer steps could miss it.
+    Contacts that they miss are found, however long they are.
     """
     start, end = float(times[0]), float(times[-1])
-    return min((end - start) / 10.0, system.shortest_period(start, end) / 4.0)
+    longest = min(end - start, system.shortest_period(start, end) / 4.0)
+    return longest if max_step is None else min(longest, float(max_step))
+
+
+def _levels(system: ContactSystem) -> Array:
+    """Penetrations (l, n) at which the normal forces of the nodes begin or end."""
+    parts = [law.onsets(nodes.stop - nodes.start) for nodes, _, law in system.law_groups("normal")]
+    most = max(len(part) for part in parts)
+    # What a law has less of, it has twice.
+    return np.hstack([np.vstack([part, *[part[:1]] * (most - len(part))]) for part in parts])
+
+
+def _ground_bounds(system: ContactSystem, times: Array) -> Array:
+    """What bounds the ground, in the order of :mod:`fecontact.integrate.courses`."""
+    ground, start, end = system.ground, float(times[0]), float(times[-1])
+    low, high, slope = 0.0, 0.0, 0.0
+    if ground.wavy:
+        try:
+            (low, high), slope = ground.height_range, ground.steepest_slope
+        except NotImplementedError:
+            raise InputError(f"Ground: profile = {ground.profile!r} must say its height_range and "
+                             f"its steepest_slope, which bound it between the places where the "
+                             f"integrator meets it.") from None
+    return np.array([low, high, slope, ground.largest_speed(start, end),
+                     ground.largest_acceleration(start, end)])
 
 
 def finish(
@@ -223,18 +260,22 @@ def finish(
 
     ``keep`` is called after every piece of the run.
     """
-    steps = 200
+    steps = _FEWEST
     while True:
-        begin = clock.perf_counter()
-        status = run.advance(steps)
+        begin, first = clock.perf_counter(), run.attempts
+        status, done, passed = stepping.RUNNING, 0, 0.0
+        # A call returns early when its events fill the table.
+        while status == stepping.RUNNING and done < steps and passed < seconds:
+            status = run.advance(steps - done)
+            done, passed = run.attempts - first, clock.perf_counter() - begin
         if progress is not None:
             progress(run.time)
         if status != stepping.RUNNING:
             return status
         if keep is not None:
             keep()
-        passed = clock.perf_counter() - begin
-        steps = int(min(max(steps * seconds / max(passed, 1e-9), 100), 10 * steps))
+        steps = int(np.clip(done * seconds / max(passed, 1e-9), _FEWEST,
+                            min(10 * steps, _MOST_STEPS)))
 
 
 def integrate(
@@ -243,6 +284,7 @@ def integrate(
     times: Array,
     *,
     rtol: float,
+    max_step: float | None = None,
     progress: Callable[[float], None] | None = None,
     checkpoint: Path | None = None,
     events: Sequence[Watched] = (),
@@ -255,7 +297,7 @@ def integrate(
         If the run ended early, those until then, and the last state that was reached.
     """
     begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, events=events)
+    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()

@@ -22,6 +22,7 @@ def integrate(
     *,
     rtol: float,
     progress: Callable[[float], None] | None,
+    max_step: float | None = None,
 ) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
     """Integrate with CVODE's backward differentiation formulas, from break to break.
 
@@ -51,7 +52,7 @@ def integrate(
     result = np.empty((len(times), len(y)))
     result[0] = y
     done, status = 1, Status.FINISHED
-    longest = scipy_solvers.longest_step(system, times)
+    longest = scipy_solvers.longest_step(system, times, max_step)
     try:
         for end in [*system.breakpoints(t, float(times[-1])), float(times[-1])]:
             solver = CVODE(rhs, jacfn=jacobian, method="BDF", rtol=rtol, atol=tolerance,

@@ -21,6 +21,7 @@ from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, start
 from fecontact.integrate.events import Events, Watched, as_watched
 from fecontact.integrate.initial import Initial, initial_state
+from fecontact.integrate.simulate import require_max_step
 from fecontact.integrate.trajectory import Status
 from fecontact.system import ContactSystem
 
@@ -63,6 +64,7 @@ def ensemble(
     *,
     initial: Initial | Sequence[Any] | Array = "rest",
     rtol: float = 1e-6,
+    max_step: float | None = None,
     chain: int = 1,
     events: Watched | Sequence[Watched] | None = None,
     workers: int | None = None,
@@ -84,6 +86,8 @@ def ensemble(
         Initial states, or what :func:`fecontact.integrate.initial.initial_state` takes.
     rtol : float
         Relative tolerance.
+    max_step : float, optional
+        Longest step [s]; see :func:`fecontact.simulate`.
     chain : int
         Runs in a row that hand on their last state: only the first of each chain starts from its
         initial state, as when a parameter is moved slowly. With E the whole ensemble is one chain
@@ -109,6 +113,7 @@ def ensemble(
     members, starts, instants = _members(systems, initial, times)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    require_max_step(max_step)
     for name, value in (("chain", chain), ("workers", 1 if workers is None else workers)):
         if not (isinstance(value, Integral) and value >= 1):
             raise InputError(f"{name} = {value!r} must be a whole number from 1 on.")
@@ -124,8 +129,8 @@ def ensemble(
         last: Array | None = None
         for index in range(first, min(first + chain, count)):
             state = starts(index) if last is None else last
-            run = start(members[index], state, instants[index], rtol=float(rtol), work=False,
-                        events=watched)
+            run = start(members[index], state, instants[index], rtol=float(rtol), max_step=max_step,
+                        work=False, events=watched)
             result = stepping.RUNNING
             while result == stepping.RUNNING:
                 if leave[0]:

@@ -95,3 +95,17 @@ def interpolated(s, before, after, dense, out):  # type: ignore[no-untyped-def]
     for i in range(len(out)):
         out[i] = (1.0 - s) * before[i] + s * (after[i] + (1.0 - s) * (
             dense[0, i] + s * (dense[1, i] + s * dense[2, i])))
+
+
+@helper
+def inner_coefficients(before, after, dense, out):  # type: ignore[no-untyped-def]
+    """Fill out (3, size) with the Bernstein coefficients of the interpolant but the outer ones.
+
+    It is of degree four; the first of its five coefficients is the state before the step, the
+    last that after it.
+    """
+    for i in range(out.shape[1]):
+        a, c, k1, k2, k3 = before[i], after[i], dense[0, i], dense[1, i], dense[2, i]
+        out[0, i] = 0.75 * a + 0.25 * (c + k1)
+        out[1, i] = 0.5 * (a + c) + k1 / 3.0 + k2 / 6.0
+        out[2, i] = 0.25 * (a + k1 + k2 + k3) + 0.75 * c

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fecontact.compiled import f8, i8, integers, matrix, vector
 from fecontact.contact_energy import POWERS
-from fecontact.integrate import linear, motion, rodas
+from fecontact.integrate import bernstein, courses, linear, motion, rodas
 
 Array = NDArray[np.float64]
 
@@ -35,11 +35,18 @@ class Control(NamedTuple):
         Largest motion of each mode at any point.
     breaks : (k,) array
         Times to step on to.
+    levels : (l, n) array
+        Penetrations at which normal forces begin or end.
+    ground : (5,) array
+        Lowest and highest place of the ground, its steepest slope, its largest speed and
+        acceleration, as :mod:`fecontact.integrate.courses` names them.
     rtol, slip_part, longest, speed_scale, energy_scale : float
         Relative tolerance, part of the distance from stick to which slip velocities are resolved,
         longest step [s], velocity and energy below which errors count as if they were this large.
     work : int
         Whether to integrate the powers.
+    unfelt : int
+        Address of :data:`fecontact.integrate.unfelt.first_unfelt`.
     """
 
     displacement_scale: Array
@@ -49,15 +56,18 @@ class Control(NamedTuple):
     depth: Array
     largest: Array
     breaks: Array
+    levels: Array
+    ground: Array
     rtol: float
     slip_part: float
     longest: float
     speed_scale: float
     energy_scale: float
     work: int
+    unfelt: int
 
 
-CONTROL = types.NamedTuple([vector] * 7 + [f8] * 5 + [i8], Control)
+CONTROL = types.NamedTuple([vector] * 7 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
 
 
 class Progress(NamedTuple):
@@ -96,7 +106,9 @@ class Room(NamedTuple):
 
     Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
     what the names say; ``nodes`` (3, 2 n), ``given`` and ``pull`` for what acts at the time of a
-    stage, ``power`` (4, 8 + n) for a quadrature.
+    stage, ``power`` (4, 8 + n) for a quadrature. ``ends`` to ``places`` serve to look at the
+    course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
+    what they may do.
     """
 
     stages: Array
@@ -115,11 +127,17 @@ class Room(NamedTuple):
     reduced: linear.Reduced
     scratch: motion.Gradients
     gradients_after: motion.Gradients
+    ends: Array
+    inner: Array
+    courses: Array
+    bound: Array
+    halves: Array
+    places: Array
 
 
 ROOM = types.NamedTuple(
     [matrix] * 2 + [vector] * 6 + [matrix] + [vector] * 3
-    + [matrix, linear.REDUCED, motion.GRADIENTS, motion.GRADIENTS], Room)
+    + [matrix, linear.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector], Room)
 
 
 def gradients_for(nodes: int, states: int) -> motion.Gradients:
@@ -137,7 +155,10 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
         stage, right, base, time_rate, after, rate_after,
         np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
         np.zeros((4, len(POWERS) + nodes)), linear.reduced_for(modes, nodes, states),
-        gradients_for(nodes, states), gradients_for(nodes, states))
+        gradients_for(nodes, states), gradients_for(nodes, states),
+        np.zeros((3, 2 * nodes)), np.zeros((3, size)), np.zeros((courses.DOUBT + 1, 3 * nodes)),
+        np.zeros((3, courses.COEFFICIENTS)),
+        np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST))
 
 
 def progress_for(state: Array, time: float, step: float, modes: int, nodes: int) -> Progress:

@@ -25,6 +25,7 @@ def integrate(
     method: str,
     rtol: float,
     progress: Callable[[float], None] | None,
+    max_step: float | None = None,
 ) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
     """Integrate from ``times[0]`` to ``times[-1]``.
 
@@ -46,7 +47,7 @@ def integrate(
     def started(t: float, y: Array) -> Any:
         return getattr(scipy.integrate, method)(
             rhs, t, y, ends.pop(0), jac=jacobian, rtol=rtol, atol=tolerance,
-            max_step=longest_step(system, times))
+            max_step=longest_step(system, times, max_step))
 
     solver = started(float(times[0]), np.concatenate([state, np.zeros(extra)]))
     result = np.empty((len(times), size + extra))
@@ -158,10 +159,13 @@ def energy_scale(system: ContactSystem, state: Array) -> float:
     return float(start + springs + pressed) or np.inf
 
 
-def longest_step(system: ContactSystem, times: Array) -> float:
+def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
     """A fiftieth of the run, a twentieth of the shortest period of drive, loads and waves [s].
+
+    Or the given limit, if that is shorter.
 
     Longer steps could jump over an excitation that starts from rest.
     """
     start, end = float(times[0]), float(times[-1])
-    return min((end - start) / 50.0, system.shortest_period(start, end) / 20.0)
+    longest = min((end - start) / 50.0, system.shortest_period(start, end) / 20.0)
+    return longest if max_step is None else min(longest, float(max_step))

@@ -12,7 +12,7 @@ from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, finish, start
 from fecontact.integrate.initial import Initial, initial_state
-from fecontact.integrate.simulate import output_times
+from fecontact.integrate.simulate import output_times, require_max_step
 from fecontact.integrate.variation import MOVE
 from fecontact.system import ContactSystem
 
@@ -82,6 +82,7 @@ def sensitivity(
     parameter: Parameter | None = None,
     rtol: float = 1e-8,
     derivative_rtol: float | None = None,
+    max_step: float | None = None,
 ) -> Sensitivity:
     """Integrate, and carry the derivatives to the initial state and a parameter along.
 
@@ -104,6 +105,8 @@ def sensitivity(
         have been since the last output time; by default ten times ``rtol`` of their size at the
         time. Whatever it is, they are exact for the steps taken; 1e-2 saves most of the steps that
         fast modes cost which only disturbances, but not the motion have.
+    max_step : float, optional
+        Longest step [s]; see :func:`fecontact.simulate`.
 
     Raises
     ------
@@ -119,10 +122,11 @@ def sensitivity(
     if derivative_rtol is not None and not (isinstance(derivative_rtol, Real)
                                             and 1e-13 <= derivative_rtol <= 1.0):
         raise InputError(f"derivative_rtol = {derivative_rtol!r} must be a number from 1e-13 to 1.")
+    require_max_step(max_step)
     state = initial_state(system, initial, t_start)
     vary = True if parameter is None else _moved(system, parameter)
-    run = start(system, state, times, rtol=float(rtol), work=False, vary=vary,
-                vary_rtol=derivative_rtol)
+    run = start(system, state, times, rtol=float(rtol), max_step=max_step, work=False,
+                vary=vary, vary_rtol=derivative_rtol)
     result = finish(run)
     if result != stepping.FINISHED:
         raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = {t_end:.9g}: "

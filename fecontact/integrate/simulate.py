@@ -43,6 +43,7 @@ def simulate(
     outputs: int | ArrayLike = 1001,
     method: str = "Rodas5P",
     rtol: float = 1e-6,
+    max_step: float | None = None,
     restitution: float | None = None,
     static_coefficient: float | Sequence[float] | None = None,
     scheme: str | None = None,
@@ -72,6 +73,9 @@ def simulate(
     rtol : float
         Relative tolerance; absolute ones follow from it, the penetration scale of the normal law
         and the width of the friction smoothing.
+    max_step : float, optional
+        Longest step [s]; by default, and at most, a part of the shortest period of drive, loads
+        and waves. Touches and slips within a step are found without it by 'Rodas5P'.
     restitution : float, optional
         For 'set-valued' alone: rigid stops with Newton's coefficient of restitution, from 0 to
         below 1, in place of the normal law.
@@ -117,6 +121,7 @@ def simulate(
     times = output_times(t_start, t_end, outputs)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    require_max_step(max_step)
     if method not in METHODS:
         raise InputError(f"method = {method!r} must be one of {choices(METHODS)}"
                          f"{nearest(str(method), METHODS)}.")
@@ -143,7 +148,7 @@ def simulate(
     if method == "Rodas5P":
         from fecontact.integrate.control import integrate
 
-        run = integrate(system, state, times, rtol=rtol, progress=progress,
+        run = integrate(system, state, times, rtol=rtol, max_step=max_step, progress=progress,
                         checkpoint=None if checkpoint is None else Path(checkpoint),
                         events=watched)
         times, states, work, status, statistics, found = run
@@ -153,11 +158,14 @@ def simulate(
         rest["node_friction_work"] = work[:, len(POWERS) :]
         work = work[:, : len(POWERS)]
     elif method == "set-valued":
+        from fecontact.integrate.scipy_solvers import longest_step
         from fecontact.integrate.set_valued import integrate_set_valued
 
         found = integrate_set_valued(system, state, times, rtol=rtol, restitution=restitution,
                                      static_coefficient=static_coefficient,
-                                     scheme=scheme or "auto", progress=progress)
+                                     scheme=scheme or "auto", progress=progress,
+                                     longest=None if max_step is None else longest_step(
+                                         system, times, max_step))
         times, states, work = found.time, found.states, found.work
         status = found.status
         # With what the run was told, it can be repeated.
@@ -171,12 +179,13 @@ def simulate(
         from fecontact.integrate import cvode
 
         times, states, work, status, statistics = cvode.integrate(
-            system, state, times, rtol=rtol, progress=progress)
+            system, state, times, rtol=rtol, max_step=max_step, progress=progress)
     else:
         from fecontact.integrate import scipy_solvers
 
         times, states, work, status, statistics = scipy_solvers.integrate(
-            system, state, times, method=method, rtol=rtol, progress=progress)
+            system, state, times, method=method, rtol=rtol, max_step=max_step,
+            progress=progress)
     trajectory = Trajectory(
         system, times, states[:, :m], states[:, m : 2 * m], work, status, statistics,
         memory=states[:, 2 * m :] if system.memory else None, **rest)
@@ -219,6 +228,14 @@ def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
         warnings.warn(f"The initial state is {depth:.3g} m deep in the ground, {depth / scale:.2g} "
                       f"times the {scale:.3g} m over which the normal law rises: the body will be "
                       f"thrown off.", stacklevel=3)
+
+
+def require_max_step(max_step: Any) -> None:
+    """InputError for what is no longest step: neither None nor a time above zero."""
+    if max_step is not None and not (isinstance(max_step, Real) and not isinstance(max_step, bool)
+                                     and 0.0 < max_step < np.inf):
+        raise InputError(f"max_step = {max_step!r} must be a finite time above zero [s]; leave it "
+                         f"out for steps as long as the tolerance allows.")
 
 
 def output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:

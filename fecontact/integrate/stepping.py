@@ -7,6 +7,7 @@ from fecontact.compiled import block, borrowed, f8, helper, i8, kernel, matrix, 
 from fecontact.contact_energy import powers
 from fecontact.contact_kernels import SYSTEM
 from fecontact.integrate import linear, motion, rodas, run_arrays
+from fecontact.integrate.courses import doubtful, keep_ends, restless, set_courses, set_ends
 from fecontact.integrate.run_arrays import (
     CAUTIOUS,
     LAST_ERROR,
@@ -22,8 +23,17 @@ from fecontact.integrate.run_arrays import (
     TIME,
 )
 from fecontact.integrate.step_error import energy_scale, set_scale, slip_error, state_error
+from fecontact.integrate.unfelt import first_unfelt_at
 from fecontact.integrate.variation import VARIATION, begin_anew, keep, propagate
-from fecontact.integrate.watching import KINKS, NODES, WATCH, begin, full, next_switch, note_events
+from fecontact.integrate.watching import (
+    KINKS,
+    NODES,
+    WATCH,
+    begin,
+    full,
+    next_switch,
+    note_events_at,
+)
 from fecontact.integrate.work import add_up, work_error, work_until
 from fecontact.laws.contract import signal_at
 
@@ -31,6 +41,8 @@ RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
 _POWER = -1.0 / rodas.ORDER
+# Attempts at a step that end where something was not felt.
+_MOST_AGAIN = 20
 
 
 @helper
@@ -143,7 +155,8 @@ def advance(  # type: ignore[no-untyped-def]
         for k in range(size):
             out[0, k] = progress.state[k]
         counts[STARTED], counts[OUTPUTS] = 1, 1
-    new, speed, attempts, to_switch = True, 0.0, 0, False
+    set_ends(t, progress.state, s, shapes, control.ground, room.ends)
+    new, speed, attempts, to_switch, again = True, 0.0, 0, False, 0
     while counts[OUTPUTS] < len(times):
         # A step that failed is repeated before the call returns: derivatives are not kept.
         if new and (attempts >= most or (watched and full(watch))):
@@ -197,14 +210,24 @@ def advance(  # type: ignore[no-untyped-def]
             motion.set_rate_and_gradients(room.after, s, shapes, room.given, room.pull, room.nodes,
                                           room.gradients_after, room.rate_after)
             error = slip_error(error, s, shapes, control, progress, room)
-            if control.work and error <= 1.0:
-                rodas.dense_coefficients(room.stages, room.dense)
+        if error <= 1.0:
+            rodas.dense_coefficients(room.stages, room.dense)
+            if restless(speed, h, s, control, room) and again < _MOST_AGAIN:
+                set_courses(s, shapes, control.ground, progress.state, room.after, room)
+                if doubtful(speed, h, control.ground, control.levels, control.slip_scale, room):
+                    part = first_unfelt_at(control.unfelt)(
+                        t, h, latest, again, s, shapes, control, progress, room)
+                    if part * h > 100.0 * smallest and part < 1.0:
+                        counts[REJECTIONS] += 1
+                        h *= part
+                        to_switch = True
+                        again += 1
+                        continue
+            if control.work:
                 add_up(t, h, latest, s, progress, room)
                 error = max(error, work_error(h, room.power) / (
                     control.rtol * energy_scale(control, progress, room)))
 
-        if error <= 1.0 and (watched or watch.counts[KINKS]) and not control.work:
-            rodas.dense_coefficients(room.stages, room.dense)
         if error <= 1.0 and watch.counts[KINKS]:
             part = next_switch(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
                                room.after, room.dense, room.right)
@@ -240,8 +263,9 @@ def advance(  # type: ignore[no-untyped-def]
 
         ends = 2.0
         if watched:
-            ends = note_events(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
-                               room.after, room.dense, room.right)
+            set_courses(s, shapes, control.ground, progress.state, room.after, room)
+            ends = note_events_at(watch.note)(
+                t, h, latest, s, control, progress.state, room, watch)
         elif watch.counts[KINKS]:
             begin(min(target, latest), room.after, s, control.depth, watch, room.scratch)
         reached = target if ends > 1.0 else t + ends * h
@@ -253,8 +277,6 @@ def advance(  # type: ignore[no-untyped-def]
             if len(columns):
                 transitions[row] = columns
                 begin_anew(variation)
-            if not (control.work or watched):
-                rodas.dense_coefficients(room.stages, room.dense)
             while row < len(times) and times[row] <= reached:
                 part = (times[row] - t) / h
                 rodas.interpolated(part, progress.state, room.after, room.dense, out[row])
@@ -277,8 +299,9 @@ def advance(  # type: ignore[no-untyped-def]
             else:
                 progress.power[:] = room.power[3]
         _go_on(progress, room)
+        keep_ends(len(s.gap), room)
         t = target
-        new = True
+        new, again = True, 0
         counts[STEPS] += 1
         if numbers[LAST_STEP] > 0.0:
             # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).

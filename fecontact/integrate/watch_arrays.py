@@ -6,8 +6,14 @@ from typing import Any
 import numpy as np
 
 from fecontact.errors import InputError
-from fecontact.integrate.events import CONTACT_EVENTS, ContactEvents, Watched, direction_sign
-from fecontact.integrate.watching import FIRST_OWN, KINKS, NODES, Watch
+from fecontact.integrate.events import (
+    CONTACT_EVENTS,
+    ContactEvents,
+    Crossing,
+    Watched,
+    direction_sign,
+)
+from fecontact.integrate.watching import FIRST_OWN, KINKS, NODES, PLACES, Watch, note_events
 from fecontact.system import ContactSystem
 
 # Slip velocities at which the friction of laws with memory in steady sliding is tabulated.
@@ -49,7 +55,10 @@ def watch_for(system: ContactSystem, events: Sequence[Watched], kinks: bool) -> 
         stick_speed, curve_speed, curve, np.zeros(n, dtype=np.int64),
         np.array([one.kernel.address for one in own], dtype=np.int64),
         np.array([np.pad(row, (0, width - len(row))) for row in rows]).reshape(len(own), width),
-        np.zeros(len(own)), np.array([direction_sign(one) for one in own], dtype=np.int64), stops,
+        np.zeros(len(own)), np.array([direction_sign(one) for one in own], dtype=np.int64),
+        np.array([isinstance(one, Crossing) for one in own], dtype=np.int64),
+        np.zeros((n + len(own), PLACES)), np.zeros(n + len(own), dtype=np.int64), np.zeros(64),
+        note_events.address if events else 0, stops,
         np.zeros((places, 3)), np.zeros((places, states)), counts)
 
 

@@ -1,8 +1,10 @@
 """Finding events within a step: contact nodes that change their state, and users' functions.
 
-The dense output of a step is looked at four times, and what has changed since the time before is
-narrowed down by bisection. So two changes within a quarter of a step escape; but steps are as
-short as the forces demand.
+The dense output of a step is looked at a few times, and what has changed since the time before is
+narrowed down by bisection. Gaps, slip velocities and what `Crossing` watches are polynomials
+whose changes of sign are known (:mod:`fecontact.integrate.courses`); between two of them they are
+looked at too, so that none escapes. Functions of users and the stick of friction with memory are
+known at the looks only.
 """
 
 from typing import NamedTuple
@@ -12,9 +14,21 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
-from fecontact.compiled import borrowed, f8, function_at, helper, integers, kernel, matrix, vector
+from fecontact.compiled import (
+    borrowed,
+    compile_law,
+    f8,
+    function_at,
+    helper,
+    i8,
+    integers,
+    kernel,
+    matrix,
+    vector,
+)
 from fecontact.contact_kernels import SYSTEM
-from fecontact.integrate import motion, rodas
+from fecontact.integrate import bernstein, motion, rodas, run_arrays
+from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, changes
 from fecontact.laws.contract import signal_at
 
 Array = NDArray[np.float64]
@@ -24,13 +38,16 @@ EVENT = f8(f8, vector, vector)
 event_at = function_at(EVENT)
 
 # Kinds of events; a user's event k is FIRST_OWN + k.
-TOUCH_DOWN, LIFT_OFF, STICK, SLIP, FIRST_OWN = range(5)
+TOUCH_DOWN, LIFT_OFF, STICK, SLIP_BEGINS, FIRST_OWN = range(5)
 # States of a node, as in `ContactState`; past the depth of the normal law 3 more.
 OPEN, STICKING, SLIPPING, DEEP = range(4)
 # Entries of Watch.counts.
 FOUND, NODES, KINKS = range(3)
 
-_LOOKS = 4
+# Looks at a step, and more where functions of users are watched.
+_LOOKS, _MORE_LOOKS = 4, 16
+# Places besides for each node and function.
+PLACES = 12
 _HALVINGS = 44
 _MOST_A_NODE = 3
 
@@ -49,6 +66,14 @@ class Watch(NamedTuple):
     own, own_parameters, own_values, own_direction : (l,), (l, p), (l,), (l,)
         Users' functions, their values at the start of the step, and the direction of the change
         of sign that counts.
+    linear : (l,) array
+        Whether the function is ``y @ p[1:] - p[0]``.
+    places, known : (n + l, PLACES), (n + l,) arrays
+        Parts of the step between changes of sign, and how many there are.
+    changed : (64,) array
+        Room for these changes.
+    note : int
+        Address of :data:`note_events`.
     stops : (4 + l,) array
         Whether the run ends at an event of this kind.
     found, states : (K, 3), (K, size)
@@ -66,6 +91,11 @@ class Watch(NamedTuple):
     own_parameters: Array
     own_values: Array
     own_direction: Integers
+    linear: Integers
+    places: Array
+    known: Integers
+    changed: Array
+    note: int
     stops: Integers
     found: Array
     states: Array
@@ -73,8 +103,10 @@ class Watch(NamedTuple):
 
 
 WATCH = types.NamedTuple(
-    [vector, vector, matrix, integers, integers, matrix, vector, integers, integers, matrix, matrix,
-     integers], Watch)
+    [vector, vector, matrix, integers, integers, matrix, vector, integers, integers, matrix,
+     integers, vector, i8, integers, matrix, matrix, integers], Watch)
+NOTE = f8(f8, f8, f8, SYSTEM, run_arrays.CONTROL, vector, run_arrays.ROOM, WATCH)
+note_events_at = function_at(NOTE)
 
 
 @helper
@@ -116,7 +148,7 @@ def _note(watch, t, kind, node, y):  # type: ignore[no-untyped-def]
 @helper
 def full(watch):  # type: ignore[no-untyped-def]
     """Whether the events of one more step may find no place."""
-    most = _LOOKS * (_MOST_A_NODE * len(watch.zones) + len(watch.own))
+    most = (_MORE_LOOKS + PLACES) * (_MOST_A_NODE * len(watch.zones) + len(watch.own))
     return watch.counts[FOUND] + most > len(watch.found)
 
 
@@ -234,48 +266,134 @@ def next_switch(  # type: ignore[no-untyped-def]
     return first
 
 
-@kernel(types.f8(f8, f8, f8, SYSTEM, vector, WATCH, motion.GRADIENTS, vector, vector, matrix,
-                 vector))
-def note_events(  # type: ignore[no-untyped-def]
-    t, h, latest, held_s, held_depth, held_watch, held_scratch, held_before, held_after,
-    held_dense, held_y,
+@helper
+def _keep_between(count, row, watch):  # type: ignore[no-untyped-def]
+    """Put the middles between changes of sign, of which there are so many, into a row of places."""
+    found = watch.changed
+    for i in range(1, count):
+        k = i
+        while k > 0 and found[k] < found[k - 1]:
+            found[k], found[k - 1] = found[k - 1], found[k]
+            k -= 1
+    watch.known[row] = 0
+    for i in range(min(count - 1, PLACES)):
+        watch.places[row, i] = 0.5 * (found[i] + found[i + 1])
+        watch.known[row] = i + 1
+
+
+@helper
+def _set_places(t, h, latest, s, control, before, room, watch):  # type: ignore[no-untyped-def]
+    """Fill ``watch.places`` for a step."""
+    n = len(watch.zones)
+    b, row = room.bound[0], room.bound[2]
+    levels = control.levels.shape[0]
+    for j in range(n):
+        count = 0
+        # Gaps over the levels of the normal law, and slip velocities either way where stick ends.
+        for k in range(levels + 2):
+            what, shift = GAP, 0.0
+            if k < levels:
+                shift = control.levels[k, j]
+            else:
+                what, shift = SLIP, watch.stick_speed[j] * (2.0 * (k - levels) - 1.0)
+            if watch.counts[NODES] == 0 or (what == SLIP and s.memory[j] > 0) or (
+                    count + MOST > len(watch.changed)):
+                continue
+            count += changes(what, j, t, h, latest, s, control.ground, room.courses, shift, b,
+                             room.halves, row, watch.changed[count : count + MOST])
+        _keep_between(count, j, watch)
+    for k in range(len(watch.own)):
+        count = 0
+        if watch.linear[k] != 0:
+            p = watch.own_parameters[k]
+            for i in range(COEFFICIENTS):
+                b[i] = -p[0]
+            for i in range(len(before)):
+                b[0] += p[1 + i] * before[i]
+                b[1] += p[1 + i] * room.inner[0, i]
+                b[2] += p[1 + i] * room.inner[1, i]
+                b[3] += p[1 + i] * room.inner[2, i]
+                b[4] += p[1 + i] * room.after[i]
+            count = bernstein.sign_changes(b, room.halves, row, watch.changed[:MOST])
+        _keep_between(count, n + k, watch)
+
+
+@helper
+def _note_changes(  # type: ignore[no-untyped-def]
+    j, zone, t, h, latest, left, right, s, watch, depth, force, rates, before, after, dense, y,
 ):
+    """Note what node j does between two parts of a step, at whose right end it is in a zone."""
+    low = left
+    for _ in range(_MOST_A_NODE):
+        old = watch.zones[j] % DEEP
+        if old == zone % DEEP:
+            break
+        low, watch.zones[j] = _changed(j, t, h, latest, low, right, s, watch, depth, force,
+                                       rates, before, after, dense, y)
+        at, new = min(t + low * h, latest), watch.zones[j] % DEEP
+        if old == OPEN:
+            _note(watch, at, TOUCH_DOWN, j, y)
+        if new == OPEN:
+            _note(watch, at, LIFT_OFF, j, y)
+        elif new == STICKING:
+            _note(watch, at, STICK, j, y)
+        elif old == STICKING:
+            _note(watch, at, SLIP_BEGINS, j, y)
+    watch.zones[j] = zone
+
+
+def _note_events(t, h, latest, held_s, held_control, held_before, held_room, held_watch):  # type: ignore[no-untyped-def]
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
-    s, watch, scratch = borrowed(held_s), borrowed(held_watch), borrowed(held_scratch)
-    depth, before, after = borrowed(held_depth), borrowed(held_before), borrowed(held_after)
-    dense, y = borrowed(held_dense), borrowed(held_y)
-    force, rates = scratch.force[0], scratch.rates[0]
+    s, watch, room = borrowed(held_s), borrowed(held_watch), borrowed(held_room)
+    control, before = borrowed(held_control), borrowed(held_before)
+    depth, after, dense, y = control.depth, room.after, room.dense, room.right
+    force, rates = room.scratch.force[0], room.scratch.rates[0]
     begun = watch.counts[FOUND]
     n = len(watch.zones)
-    for look in range(_LOOKS):
-        left, right = look / _LOOKS, (look + 1) / _LOOKS
+    looks = _LOOKS
+    for k in range(len(watch.own)):
+        if watch.linear[k] == 0:
+            looks = _MORE_LOOKS
+    _set_places(t, h, latest, s, control, before, room, watch)
+    for look in range(looks):
+        left, right = look / looks, (look + 1) / looks
         _state_at(right, before, after, dense, y)
         now = min(t + right * h, latest)
         for k in range(len(watch.own)):
-            watch.own_values[k] = _own(k, t, h, latest, left, right, before, after, dense, watch,
+            first = left
+            for i in range(watch.known[n + k]):
+                place = watch.places[n + k, i]
+                if first < place < right:
+                    _state_at(place, before, after, dense, y)
+                    watch.own_values[k] = _own(k, t, h, latest, first, place, before, after,
+                                               dense, watch, y)
+                    first = place
+            _state_at(right, before, after, dense, y)
+            watch.own_values[k] = _own(k, t, h, latest, first, right, before, after, dense, watch,
                                        y)
             _state_at(right, before, after, dense, y)
         for j in range(n):
+            first = left
+            for i in range(watch.known[j]):
+                place = watch.places[j, i]
+                if first < place < right:
+                    _state_at(place, before, after, dense, y)
+                    zone = _zone(j, min(t + place * h, latest), y, s, watch, depth, force, rates)
+                    _note_changes(j, zone, t, h, latest, first, place, s, watch, depth, force,
+                                  rates, before, after, dense, y)
+                    first = place
+            if first != left:
+                _state_at(right, before, after, dense, y)
             zone = _zone(j, now, y, s, watch, depth, force, rates)
             if watch.counts[NODES] == 0 or zone % DEEP == watch.zones[j] % DEEP:
                 watch.zones[j] = zone
                 continue
-            low = left
-            for _ in range(_MOST_A_NODE):
-                old = watch.zones[j] % DEEP
-                if old == zone % DEEP:
-                    break
-                low, watch.zones[j] = _changed(j, t, h, latest, low, right, s, watch, depth, force,
-                                               rates, before, after, dense, y)
-                at, new = min(t + low * h, latest), watch.zones[j] % DEEP
-                if old == OPEN:
-                    _note(watch, at, TOUCH_DOWN, j, y)
-                if new == OPEN:
-                    _note(watch, at, LIFT_OFF, j, y)
-                elif new == STICKING:
-                    _note(watch, at, STICK, j, y)
-                elif old == STICKING:
-                    _note(watch, at, SLIP, j, y)
-            watch.zones[j] = zone
+            _note_changes(j, zone, t, h, latest, first, right, s, watch, depth, force, rates,
+                          before, after, dense, y)
             _state_at(right, before, after, dense, y)
     return _end(t, h, begun, watch)
+
+
+# By its address, so that it is not compiled into every step of runs that watch for nothing.
+note_events = compile_law(NOTE, "note_events(t, h, latest, s, control, before, room, watch)",
+                          _note_events)

@@ -230,6 +230,13 @@ class NormalLaw(NodeLaw):
         """
         raise NotImplementedError
 
+    def onsets(self, nodes: int) -> NDArray[np.float64]:
+        """Penetrations (k, n) of n nodes at which a force begins or ends [m]; here zero.
+
+        The time integrator looks for touches between its steps there.
+        """
+        return np.zeros((1, nodes))
+
     def stored_energy(
         self, penetration: NDArray[np.float64], share: NDArray[np.float64]
     ) -> NDArray[np.float64]:

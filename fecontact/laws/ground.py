@@ -136,6 +136,12 @@ class Ground:
             return abs(float(self.speed))
         return self.motion.largest_speed(self.speed, t0, t1)
 
+    def largest_acceleration(self, t0: float, t1: float) -> float:
+        """Largest magnitude of the rate of the speed from t0 to t1 [m/s2]."""
+        if self.motion is None:
+            return 0.0
+        return self.motion.largest_acceleration(self.speed, t0, t1)
+
     def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
         """Times between t0 and t1 at which the speed has kinks, ascending [s]."""
         return () if self.motion is None else self.motion.breakpoints(t0, t1)

@@ -14,6 +14,9 @@ from fecontact.laws.signal_base import between
 
 Array = NDArray[np.float64]
 
+# Samples of a speed that is known by its values alone.
+_SAMPLES = 10_001
+
 
 @dataclass(frozen=True)
 class GroundMotion:
@@ -35,6 +38,16 @@ class GroundMotion:
     def largest_speed(self, speed: float, t0: float, t1: float) -> float:
         """Largest magnitude of the speed from t0 to t1, or a bound of it [m/s]."""
         raise NotImplementedError
+
+    def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
+        """Largest magnitude of the rate of the speed from t0 to t1, or a bound of it [m/s2].
+
+        Here one and a half times the largest change between samples.
+        """
+        p = self.parameters(speed)
+        times = np.linspace(t0, t1, _SAMPLES)
+        speeds = np.array([self.kernel.python(t, p)[1] for t in times])
+        return 1.5 * float(np.abs(np.diff(speeds)).max()) * (_SAMPLES - 1) / (t1 - t0)
 
 
 @signal
@@ -96,6 +109,10 @@ class HarmonicSpeed(GroundMotion):
         angles = [low, high, *(math.pi * (k + 0.5) for k in range(first, last + 1))]
         return max(abs(speed + self.amplitude * math.sin(angle)) for angle in angles)
 
+    def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
+        """A w [m/s2]."""
+        return abs(self.amplitude) * self.angular_frequency
+
 
 @signal
 def _ramp(t, p):  # type: ignore[no-untyped-def]
@@ -153,3 +170,7 @@ class SpeedRamp(GroundMotion):
         """Largest magnitude of the speed from t0 to t1 [m/s]."""
         p = self.parameters(speed)
         return max(abs(float(self.kernel.python(t, p)[1])) for t in (t0, t1))
+
+    def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
+        """That of the ramp [m/s2]."""
+        return abs(self.end_speed - speed) / self.duration

@@ -68,6 +68,10 @@ class ExponentialContact(NormalLaw):
         """Penetration u_0 over which the force grows by a factor e [m], the smallest of all."""
         return float(np.min(self.decay_length))
 
+    def onsets(self, nodes: int) -> NDArray[np.float64]:
+        """Where the force is exp(-10) of that at u = 0 (1, n) [m]."""
+        return np.full((1, nodes), -10.0 * np.asarray(self.decay_length))
+
     def stored_energy(
         self, penetration: NDArray[np.float64], share: NDArray[np.float64]
     ) -> NDArray[np.float64]:
@@ -190,6 +194,11 @@ class GreenwoodWilliamson(NormalLaw):
     def penetration_scale(self) -> float:
         """Standard deviation sigma of the asperity heights [m], the smallest of all nodes."""
         return float(np.min(self.height_deviation))
+
+    def onsets(self, nodes: int) -> NDArray[np.float64]:
+        """Where h = 5, and the force 1e-7 of that at h = 0 (1, n) [m]."""
+        away = np.asarray(self.separation) - 5.0
+        return np.array(np.broadcast_to(np.asarray(self.height_deviation) * away, (1, nodes)))
 
     def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters (n, 4): 4/3 E* R^(1/2) N sigma^(3/2), sigma, h_0, chi."""

@@ -120,6 +120,10 @@ class TwoSidedStop(NormalLaw):
         stiffness, exponent = np.asarray(self.stiffness), np.asarray(self.exponent)
         return float(np.min(stiffness ** (-1.0 / exponent)))
 
+    def onsets(self, nodes: int) -> NDArray[np.float64]:
+        """Zero and minus the clearance (2, n) [m]."""
+        return np.array([np.zeros(nodes), np.broadcast_to(-np.asarray(self.clearance), nodes)])
+
     def stored_energy(
         self, penetration: NDArray[np.float64], share: NDArray[np.float64]
     ) -> NDArray[np.float64]:

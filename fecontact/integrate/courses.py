@@ -1,0 +1,305 @@
+r"""Gaps and slip velocities of the contact nodes in the course of a step.
+
+On the interpolant of a step they are polynomials of degree four in the part s of the step, less
+what the ground adds, its height under the node or its speed. The polynomials' Bernstein
+coefficients bound them. On flat ground at constant speed the ground adds a constant, and changes
+of sign are found exactly. Otherwise its bounds are used,
+
+.. math:: |y_R(\xi) - y_R(\xi_0)| \le \max|y_R'|\,|\xi - \xi_0|, \qquad
+    |V(t) - V(t_0)| \le \max|V'|\,|t - t_0|
+
+over parts of the step that are halved until the sign is decided, or they are as short as _FINEST.
+
+Most steps need none of that: on the interpolant a mode departs from the straight line between its
+ends by no more than the differences of its coefficients from that line, and a node by no more than
+the sum over the modes.
+"""
+
+from fecontact.compiled import helper
+from fecontact.integrate import bernstein, motion, rodas
+from fecontact.laws.contract import ground_at, signal_at
+
+# Entries of Control.ground: what bounds the ground.
+LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)
+# Rows of courses: five coefficients, then which of them are in doubt.
+COEFFICIENTS, DOUBT = 5, 5
+# What is looked at of a node.
+SLIP, GAP = range(2)
+
+_FINEST = 2.0**-6
+# Changes of sign of one quantity in a step that are told apart.
+MOST = 8
+
+
+@helper
+def _project(shapes, v, columns, out):  # type: ignore[no-untyped-def]
+    """Fill out with velocities along and displacements away from the ground, then along it."""
+    m, rows = shapes.shape
+    n = rows // 2
+    for j in range(n):
+        out[j] = shapes[0, j] * v[m]
+        out[n + j] = shapes[0, n + j] * v[0]
+    i = 1
+    while i + 3 < m:
+        for j in range(n):
+            out[j] += (shapes[i, j] * v[m + i] + shapes[i + 1, j] * v[m + i + 1]
+                       + shapes[i + 2, j] * v[m + i + 2] + shapes[i + 3, j] * v[m + i + 3])
+            out[n + j] += (shapes[i, n + j] * v[i] + shapes[i + 1, n + j] * v[i + 1]
+                           + shapes[i + 2, n + j] * v[i + 2] + shapes[i + 3, n + j] * v[i + 3])
+        i += 4
+    while i < m:
+        for j in range(n):
+            out[j] += shapes[i, j] * v[m + i]
+            out[n + j] += shapes[i, n + j] * v[i]
+        i += 1
+    if columns == 3 * n:
+        for j in range(n):
+            out[2 * n + j] = 0.0
+        for i in range(m):
+            for j in range(n):
+                out[2 * n + j] += shapes[i, j] * v[i]
+
+
+@helper
+def set_courses(s, shapes, bounds, before, after, room):  # type: ignore[no-untyped-def]
+    """Fill ``room.courses`` (6, 2 n or 3 n) with the coefficients over a step.
+
+    Velocities of the nodes along the ground, heights with their gap, and where the ground is not
+    flat displacements along it. ``room.nodes`` holds what :func:`motion.project` says of the end.
+    """
+    out, inner = room.courses, room.inner
+    n = shapes.shape[1] // 2
+    columns = 2 * n if bounds[STEEPEST] == 0.0 else 3 * n
+    rodas.inner_coefficients(before, after, room.dense, inner)
+    _project(shapes, before, columns, out[0])
+    for k in range(3):
+        _project(shapes, inner[k], columns, out[1 + k])
+    for j in range(n):
+        out[4, j] = room.nodes[1, j]
+        out[4, n + j] = room.nodes[0, n + j]
+    if columns == 3 * n:
+        for j in range(n):
+            out[4, 2 * n + j] = room.nodes[0, j]
+    for k in range(COEFFICIENTS):
+        for j in range(n):
+            out[k, n + j] += s.gap[j]
+
+
+@helper
+def set_ends(t, y, s, shapes, bounds, ends):  # type: ignore[no-untyped-def]
+    """Fill ``ends`` (3, 2 n) with displacements and velocities of the nodes, and heights below."""
+    n = len(s.gap)
+    motion.project(shapes, y, ends[0], ends[1])
+    travel = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[0]
+    _set_heights(travel, s, bounds, ends[0], ends[2, :n])
+
+
+@helper
+def _set_heights(travel, s, bounds, places, heights):  # type: ignore[no-untyped-def]
+    """Fill ``heights`` (n,) with those of the ground under the nodes."""
+    for j in range(len(heights)):
+        heights[j] = bounds[HIGHEST]
+        if bounds[STEEPEST] != 0.0:
+            heights[j] = ground_at(s.profile)(s.abscissa[j] + places[j] - travel,
+                                              s.profile_parameters)[0]
+
+
+@helper
+def keep_ends(n, room):  # type: ignore[no-untyped-def]
+    """Take the end of the step for the start of the next."""
+    for k in range(2):
+        for j in range(2 * n):
+            room.ends[k, j] = room.nodes[k, j]
+    for j in range(n):
+        room.ends[2, j] = room.ends[2, n + j]
+
+
+@helper
+def restless(speed, h, s, control, room):  # type: ignore[no-untyped-def]
+    """Whether :func:`doubtful` may find something, by the modes alone.
+
+    ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
+    end; ``speed`` is that of the ground at the start.
+    """
+    bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
+                                          room.dense)
+    n, m = len(s.gap), len(control.largest)
+    move, quicken = 0.0, 0.0
+    for i in range(m):
+        largest = control.largest[i]
+        move += largest * _departure(dense[0, i], dense[1, i], dense[2, i])
+        quicken += largest * _departure(dense[0, m + i], dense[1, m + i], dense[2, m + i])
+    quicken += bounds[QUICKEST] * h
+    wavy = bounds[STEEPEST] != 0.0
+    if wavy:
+        _set_heights(room.given[motion.TRAVEL], s, bounds, nodes[0], ends[2, n:])
+    later = room.given[motion.SPEED]
+    some = False
+    for j in range(n):
+        reach = move
+        f, g = bounds[HIGHEST], bounds[HIGHEST]
+        if wavy:
+            f, g = ends[2, j], ends[2, n + j]
+            reach += 0.5 * bounds[STEEPEST] * (
+                abs(nodes[0, j] - ends[0, j]) + 2.0 * move + bounds[FASTEST] * h)
+        touching = nodes[2, n + j] != 0.0
+        for level in range(levels.shape[0]):
+            shift = s.gap[j] + levels[level, j]
+            first, last = ends[0, n + j] + shift - f, nodes[0, n + j] + shift - g
+            low, high = min(first, last) - reach, max(first, last) + reach
+            some |= (low < 0.0 and high > 0.0) or low < 2.0 * min(min(first, last), 0.0)
+            touching |= low < 0.0 or level > 0
+        first, last = ends[1, j] - speed, nodes[1, j] - later
+        low, high = min(first, last) - quicken, max(first, last) + quicken
+        largest = max(-low, high)
+        mixed = low < 0.0 and high > 0.0 and largest > control.slip_scale[j]
+        felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j])
+        some |= touching and (mixed or largest > felt)
+    return some
+
+
+@helper
+def _departure(k1, k2, k3):  # type: ignore[no-untyped-def]
+    """Bound on the distance of the interpolant from the straight line between its ends."""
+    return max(max(0.25 * abs(k1), abs(2.0 * k1 + k2) / 6.0), 0.25 * abs(k1 + k2 + k3))
+
+
+@helper
+def doubtful(speed, h, bounds, levels, slip_scale, room):  # type: ignore[no-untyped-def]
+    """Whether forces within the step may be others than those at its ends let expect.
+
+    A gap or slip velocity may change its sign other than once on its way from start to end, or
+    a contact be twice as deep in between, or slip begin and end. ``levels`` (k, n) are the
+    penetrations at which normal forces begin; ``speed`` is that of the ground. Row DOUBT of
+    ``room.courses`` tells which are meant.
+    """
+    c = room.courses
+    n = levels.shape[1]
+    spread = bounds[QUICKEST] * h
+    for j in range(n):
+        low = min(min(min(c[0, j], c[1, j]), min(c[2, j], c[3, j])), c[4, j]) - speed - spread
+        high = max(max(max(c[0, j], c[1, j]), max(c[2, j], c[3, j])), c[4, j]) - speed + spread
+        largest = max(-low, high)
+        felt = 2.0 * max(max(abs(c[0, j] - speed), abs(c[4, j] - speed)), slip_scale[j])
+        mixed = low < 0.0 and high > 0.0 and largest > slip_scale[j]
+        c[DOUBT, j] = 1.0 if mixed or largest > felt + spread else 0.0
+        c[DOUBT, n + j] = 0.0
+    for level in range(levels.shape[0]):
+        for j in range(n):
+            k = n + j
+            low = min(min(min(c[0, k], c[1, k]), min(c[2, k], c[3, k])), c[4, k])
+            high = max(max(max(c[0, k], c[1, k]), max(c[2, k], c[3, k])), c[4, k])
+            top = levels[level, j] - bounds[HIGHEST]
+            bottom = levels[level, j] - bounds[LOWEST]
+            felt = 2.0 * min(min(c[0, k], c[4, k]) + bottom, 0.0)
+            mixed = low + top < 0.0 and high + bottom > 0.0
+            c[DOUBT, k] += 1.0 if mixed or low + top < felt else 0.0
+    some = 0.0
+    for j in range(2 * n):
+        some += c[DOUBT, j]
+    if some == 0.0:
+        return False
+    some = 0.0
+    for j in range(2 * n):
+        # A polygon that only rises or only falls bounds a curve that does.
+        if (spread if j < n else bounds[STEEPEST]) == 0.0 and (
+                (c[0, j] <= c[1, j] <= c[2, j] <= c[3, j] <= c[4, j])
+                or (c[0, j] >= c[1, j] >= c[2, j] >= c[3, j] >= c[4, j])):
+            c[DOUBT, j] = 0.0
+        some += c[DOUBT, j]
+    return some != 0.0
+
+
+@helper
+def ground_part(what, part, j, t, h, latest, s, bounds, courses, row):  # type: ignore[no-untyped-def]
+    """What the ground adds at a part of the step: its height under node j, or its speed."""
+    now = min(t + part * h, latest)
+    if what == SLIP:
+        return signal_at(s.ground_motion)(now, s.ground_motion_parameters)[1]
+    if bounds[STEEPEST] == 0.0:
+        return bounds[HIGHEST]
+    travel = signal_at(s.ground_motion)(now, s.ground_motion_parameters)[0]
+    column = 2 * s.gap.shape[0] + j
+    for k in range(COEFFICIENTS):
+        row[k] = courses[k, column]
+    for k in range(COEFFICIENTS - 1, 0, -1):
+        for i in range(k):
+            row[i] += part * (row[i + 1] - row[i])
+    return ground_at(s.profile)(s.abscissa[j] + row[0] - travel, s.profile_parameters)[0]
+
+
+@helper
+def at(what, part, j, t, h, latest, s, bounds, courses, shift, b, row):  # type: ignore[no-untyped-def]
+    """Slip velocity, or gap, of node j at a part of the step, plus ``shift``.
+
+    ``b`` (5,) are the coefficients of the node's own motion.
+    """
+    return bernstein.value(b, part, row) + shift - ground_part(
+        what, part, j, t, h, latest, s, bounds, courses, row)
+
+
+@helper
+def changes(what, j, t, h, latest, s, bounds, courses, shift, b, room, row, places):  # type: ignore[no-untyped-def]
+    """Fill ``places`` with the parts of the step at which a quantity of node j changes its sign.
+
+    Slip velocity or gap, plus ``shift``; returns how many there are. Sets ``b`` (5,) to the
+    coefficients of the node's own motion; ``room`` (bernstein.DEPTH, 6) and ``row`` (5,) are room.
+    """
+    n = s.gap.shape[0]
+    own = j if what == SLIP else n + j
+    for k in range(COEFFICIENTS):
+        b[k] = courses[k, own]
+    bound = bounds[QUICKEST] * h
+    if what == GAP:
+        # The node's own motion over the ground, and that of the ground.
+        bound = 0.0
+        if bounds[STEEPEST] != 0.0:
+            for k in range(4):
+                bound = max(bound, 4.0 * abs(courses[k + 1, 2 * n + j] - courses[k, 2 * n + j]))
+            bound = bounds[STEEPEST] * (bound + bounds[FASTEST] * h)
+    if bound == 0.0:
+        constant = shift - ground_part(what, 0.0, j, t, h, latest, s, bounds, courses, row)
+        for k in range(COEFFICIENTS):
+            b[k] += constant
+        found = bernstein.sign_changes(b, room, row, places)
+        for k in range(COEFFICIENTS):
+            b[k] -= constant
+        return found
+    bend = 0.0
+    for k in range(3):
+        bend = max(bend, 12.0 * abs(b[k] - 2.0 * b[k + 1] + b[k + 2]))
+    # Parts that are left, the earliest on top: begin, width, own motion and ground at both ends.
+    found, waiting = 0, 1
+    room[0, 0], room[0, 1] = 0.0, 1.0
+    room[0, 2], room[0, 3] = b[0] + shift, b[4] + shift
+    room[0, 4] = ground_part(what, 0.0, j, t, h, latest, s, bounds, courses, row)
+    room[0, 5] = ground_part(what, 1.0, j, t, h, latest, s, bounds, courses, row)
+    sign = room[0, 2] - room[0, 4]
+    while waiting > 0:
+        top = room[waiting - 1]
+        begin, width, p, q, f, g = top[0], top[1], top[2], top[3], top[4], top[5]
+        reach = 0.125 * bend * width * width + 0.5 * bound * width
+        middle = 0.5 * (f + g)
+        first, last = p - f, q - g
+        decided = min(p, q) - reach > middle or max(p, q) + reach < middle
+        if not decided and width > _FINEST:
+            half = begin + 0.5 * width
+            u = bernstein.value(b, half, row) + shift
+            v = ground_part(what, half, j, t, h, latest, s, bounds, courses, row)
+            top[0], top[1], top[2], top[3], top[4], top[5] = half, 0.5 * width, u, q, v, g
+            below = room[waiting]
+            below[0], below[1], below[2], below[3], below[4], below[5] = (begin, 0.5 * width, p, u,
+                                                                         f, v)
+            waiting += 1
+            continue
+        waiting -= 1
+        if sign == 0.0:
+            sign = first
+        if last * sign < 0.0:
+            if found < len(places):
+                share = first / (first - last) if first * last < 0.0 else 0.0
+                places[found] = begin + share * width
+                found += 1
+            sign = last
+    return found
+
