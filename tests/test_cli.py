@@ -61,6 +61,32 @@ def files_below(folder):
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+def test_a_load_beyond_the_limits_of_the_model_is_warned_of(cli, study):
+    """1 kN on 0.3e6 N/m: 3.3 mm, 640 times the roughness; at 100 N it is 65 times."""
+    words = "warning: In this run contact node"
+    code, _, err = cli("run", study, "--set", "load.normal=1000.0")
+    assert code == 0
+    assert err.count(words) == 1
+    for command in (["plot", study, "history"], ["export", study, "--format", "csv"]):
+        code, _, err = cli(*command)
+        assert (code, err.count(words)) == (0, 1)
+    code, _, err = cli("run", study, "--set", "load.normal=100.0")
+    assert (code, err) == (0, "")
+
+
+def test_a_study_without_a_normal_law_is_told_what_to_give(cli, study):
+    study.write_text("".join(line for line in TINY.splitlines(keepends=True)
+                             if not line.startswith("normal")))
+    assert cli("mesh", study)[0] == 0
+    code, _, err = cli("run", study)
+    assert code == 1
+    assert "lacks the section [normal]" in err
+    assert "`fecontact laws rough-surface` says how to choose" in err
+    code, out, _ = cli("laws", "rough-surface")
+    assert code == 0
+    assert "How to choose." in out
+
+
 def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli("init", "beam.toml")[0] == 0

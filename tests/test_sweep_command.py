@@ -42,6 +42,22 @@ def cli(capsys, monkeypatch):
     return run
 
 
+def test_cases_beyond_the_limits_of_the_model_are_named(cli, tmp_path):
+    """14 N and 1.4 kN on 0.3e6 N/m: 9 and 900 roughness heights."""
+    study = write_study(tmp_path, """
+[sweep]
+summaries = ["stick_fraction"]
+[sweep.axes]
+load.normal = [14.0, 1400.0]
+""")
+    code, _, err = cli("sweep", study, "--set", "simulation.t_end=1e-3")
+    assert code == 0
+    assert err.startswith("warning: 1 of the cases leave the limits of the model")
+    assert "case 1: In this run contact node" in err
+    table = read_table(tmp_path / "results/small-sweep/index.csv")
+    assert [bool(one) for one in table.warnings] == [False, True]
+
+
 def test_a_sweep_of_a_study_file(cli, tmp_path):
     study = write_study(tmp_path, SWEEP)
     folder = tmp_path / "results/small-sweep"
