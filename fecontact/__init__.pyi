@@ -71,7 +71,7 @@ from .laws.profiles import Flat, Sine
 from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
 from .laws.trace import Trace
-from .laws.transients import Pulse, Tabulated
+from .laws.transients import Pulse, Step, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
@@ -187,6 +187,7 @@ __all__ = [
     "SobolIndices",
     "SpeedRamp",
     "Status",
+    "Step",
     "Strobing",
     "Study",
     "Sweep",

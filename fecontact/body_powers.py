@@ -25,3 +25,17 @@ def body_powers(t, y, s, out):  # type: ignore[no-untyped-def]
             product = y[m + i] * y[m + k]
             out[4] += s.modal_damping[i, k] * product
             out[5] += (s.damping[i, k] - s.modal_damping[i, k]) * product
+
+
+@helper
+def drive_jump(before, after, y, s):  # type: ignore[no-untyped-def]
+    """Work that the drive puts in where its motions jump, between two times on both sides [J]."""
+    work = 0.0
+    for axis in range(2):
+        old = signal_at(s.drive[axis])(before, s.drive_parameters[axis])[0]
+        new = signal_at(s.drive[axis])(after, s.drive_parameters[axis])[0]
+        pull = 0.5 * s.drive_stiffness[axis] * (old + new)
+        for i in range(s.Tx.shape[1]):
+            pull -= s.drive_shapes[axis, i] * y[i]
+        work += pull * (new - old)
+    return work

@@ -168,12 +168,13 @@ class ContactSystem:
                              for time in source.breakpoints(start, end)}))
 
     def shortest_period(self, start: float, end: float) -> float:
-        """Shortest period of drive, loads and waves under the body [s]; infinite without any.
+        """Shortest period of drive, loads, belt and waves under the body [s]; infinite without any.
 
         Waves pass at the largest speed of the ground between two times [s].
         """
         given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
         given += [force.signal for force in self.load.forces]
+        given += [self.ground.motion] if self.ground.motion is not None else []
         periods = [source.shortest_period for source in given]
         wavelength, speed = self.ground.shortest_wavelength, self.ground.largest_speed(start, end)
         if wavelength is not None and speed > 0.0:

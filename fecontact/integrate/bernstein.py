@@ -15,6 +15,10 @@ G. Farin, Curves and Surfaces for CAGD, 5th ed., chapters 4 and 5 (de Casteljau'
 the convex hull, multiplication by s and 1 - s).
 """
 
+from math import comb
+
+import numpy as np
+
 from fecontact.compiled import helper
 
 # Parts of a step are told apart down to this, after so many halvings less two.
@@ -162,3 +166,36 @@ def sign_changes(b, room, row, places):  # type: ignore[no-untyped-def]
         begin += width
         waiting -= 1
     return found
+
+
+@helper
+def from_nested(c, b):  # type: ignore[no-untyped-def]
+    """Coefficients b (n + 1,) of c_0 + s (c_1 + (1 - s) (c_2 + s (c_3 + ...))), c (n + 1,)."""
+    degree = len(c) - 1
+    b[:] = 0.0
+    b[0] = c[degree]
+    for k in range(degree - 1, -1, -1):
+        have = degree - 1 - k
+        if k % 2 == 0:
+            times_s(b, have)
+        else:
+            times_rest(b, have)
+        for i in range(have + 2):
+            b[i] += c[k]
+
+
+@helper
+def largest(b):  # type: ignore[no-untyped-def]
+    """A bound above p, that of its coefficients."""
+    most = b[0]
+    for i in range(1, len(b)):
+        most = max(most, b[i])
+    return most
+
+
+def fit(places):  # type: ignore[no-untyped-def]
+    """Matrix that makes Bernstein coefficients of the values at n + 1 different places."""
+    degree = len(places) - 1
+    return np.ascontiguousarray(np.linalg.inv(np.array(
+        [[comb(degree, k) * s**k * (1.0 - s) ** (degree - k) for k in range(degree + 1)]
+         for s in places])))

@@ -43,7 +43,7 @@ def integrate(
 
     # CVODE's own arrays are read-only, for which the compiled functions are not made.
     def rhs(t: float, y: Array, out: Array) -> None:
-        out[:] = rate(t, y.copy())
+        out[:] = rate(min(t, latest), y.copy())
 
     def jacobian(t: float, y: Array, out: Array, into: Array) -> None:
         into[:] = derivative(t, y.copy())
@@ -53,10 +53,12 @@ def integrate(
     result[0] = y
     done, status = 1, Status.FINISHED
     longest = scipy_solvers.longest_step(system, times, max_step)
+    latest = t
     try:
         for end in [*system.breakpoints(t, float(times[-1])), float(times[-1])]:
             solver = CVODE(rhs, jacfn=jacobian, method="BDF", rtol=rtol, atol=tolerance,
                            max_step=longest, max_num_steps=100_000)
+            latest = scipy_solvers.before_break(t, end)
             solver.init_step(t, y)
             while t < end and status is Status.FINISHED:
                 target = min(float(times[done]), end)
@@ -74,6 +76,10 @@ def integrate(
                     done += 1
                 if progress is not None:
                     progress(t)
+            if t == end and done < len(times):
+                y = scipy_solvers.jumped(system, float(np.nextafter(t, times[0])), t, y)
+                if times[done - 1] == t:
+                    result[done - 1] = y
     except KeyboardInterrupt:
         status = Status.INTERRUPTED
     statistics = {"method": "CVODE", "rtol": rtol, **counts,

@@ -45,9 +45,11 @@ def integrate(
     ends = [*system.breakpoints(float(times[0]), float(times[-1])), float(times[-1])]
 
     def started(t: float, y: Array) -> Any:
+        end = ends.pop(0)
+        latest = before_break(t, end)
         return getattr(scipy.integrate, method)(
-            rhs, t, y, ends.pop(0), jac=jacobian, rtol=rtol, atol=tolerance,
-            max_step=longest_step(system, times, max_step))
+            lambda t, y: rhs(min(t, latest), y), t, y, end, jac=jacobian, rtol=rtol,
+            atol=tolerance, max_step=longest_step(system, times, max_step))
 
     solver = started(float(times[0]), np.concatenate([state, np.zeros(extra)]))
     result = np.empty((len(times), size + extra))
@@ -74,7 +76,9 @@ def integrate(
                 result[done:reached] = solver.dense_output()(times[done:reached]).T
                 done = reached
             if solver.status == "finished" and ends:
-                solver = started(solver.t, solver.y)
+                solver = started(solver.t, jumped(system, solver.t_old, solver.t, solver.y))
+                if times[done - 1] == solver.t:
+                    result[done - 1] = solver.y
             if progress is not None:
                 progress(float(solver.t))
     except KeyboardInterrupt:
@@ -116,6 +120,21 @@ def with_work(
     energy = 0.01 * rtol * energy_scale(system, state)
     tolerance = np.concatenate([absolute_tolerances(system, rtol), np.full(extra, energy)])
     return rhs, jacobian, tolerance, counts
+
+
+def before_break(t: float, end: float) -> float:
+    """The last moment before a break at ``end`` of a step from t: signals may jump there."""
+    return float(np.nextafter(end, t))
+
+
+def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
+    """State and work behind a break at ``end``: the drive's work counts where its motion jumps."""
+    y, m = y.copy(), system.basis.modes
+    for motion, stiffness, shape in zip(system.drive.motions, system.arrays.drive_stiffness,
+                                        system.arrays.drive_shapes, strict=True):
+        old, new = motion.history([before_break(t, end), end])[:, 0]
+        y[system.size] += (0.5 * stiffness * (old + new) - shape @ y[:m]) * (new - old)
+    return y
 
 
 def _step(solver: Any) -> str | None:

@@ -25,6 +25,8 @@ SCHEMES = ("auto", "events", "stepping")
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
 _STEPS_PER_CALL = 2000
+# Errors of velocities count relative to this part of what drive and loads bring about.
+_DRIVEN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,9 +191,12 @@ def _problem(
     arrays = system.arrays._replace(friction_parameters=np.vstack(
         [np.pad(table, ((0, 0), (0, width - table.shape[1]))) for table in tables]))
     cluster, rows = _clusters(arrays.Tx)
+    ground = system.ground
+    wave = ground.shortest_wavelength if ground.wavy else None
     problem = kinds.Problem(arrays, _static(static_coefficient, n), cluster, rows,
                             1e-4 * longest, -1.0 if restitution is None else float(restitution),
-                            compiled_derivative.address)
+                            np.array([*ground.height_range, np.inf if wave is None else wave]),
+                            int(ground.motion is None), compiled_derivative.address)
     if restitution is not None:
         _require_free_stops(system, groups, problem)
     return problem
@@ -277,16 +282,22 @@ def _chosen(problem: kinds.Problem, scheme: str) -> str:
 def _floor(system: ContactSystem, state: Array, times: Array, longest: float) -> Array:
     """Values (2 m + 8 + n,) below which the error is not measured relative to the state."""
     m, n = system.basis.modes, system.basis.contact_nodes
-    drive = system.drive
+    arrays, drive = system.arrays, system.drive
     largest = np.abs(system.basis.T[:, :2]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
     depth = system.penetration_scale
     speed = max(0.01 * system.ground.largest_speed(float(times[0]), float(times[-1])),
                 depth / longest)
+    # Velocities that drive and loads bring about in each mode, within a step where it is slow.
+    pushes = [(arrays.drive_shapes, [motion.largest for motion in drive.motions]),
+              (arrays.load_shapes, [force.signal.largest for force in system.load.forces])]
+    push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
+    driven = push / np.maximum(np.sqrt(np.diag(arrays.stiffness)), 1.0 / longest)
     energy = (0.5 * state[m : 2 * m] @ state[m : 2 * m]
               + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
               + abs(system.load.normal) * depth
               + sum(0.5 * c * motion.largest**2 for c, motion in zip(
-                  (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True)))
-    return np.concatenate([depth / largest, speed / largest,
+                  (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
+              + 0.5 * driven @ driven)
+    return np.concatenate([depth / largest, np.maximum(speed / largest, _DRIVEN * driven),
                            np.full(len(POWERS) + n, energy or 0.5 * speed**2)])

@@ -81,12 +81,14 @@ def _least_friction(p, candidate, relative, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def decide_clusters(t, Y, p, released, near, status, fresh, closed, w, out):  # type: ignore[no-untyped-def]
+def decide_clusters(  # type: ignore[no-untyped-def]
+        t, Y, p, released, arrived, near, status, fresh, closed, w, out):
     """Set the status of all clusters at a moment at which some may change.
 
     ``released`` clusters have reached the limit of stick and slip in the sense of ``status``;
-    others with a slip velocity below ``near`` stick or slip by their forces. ``fresh`` tells
-    those that begin to slip from no slip velocity. Returns how often a force was decided.
+    those whose slip has ``arrived`` at its end, up to the error of the step, and others with a
+    slip velocity below ``near`` stick or slip by their forces. ``fresh`` tells those that begin
+    to slip from no slip velocity.
     """
     clusters, m = p.rows.shape
     derivative(t, Y, p, status, closed, w, out)
@@ -95,7 +97,7 @@ def decide_clusters(t, Y, p, released, near, status, fresh, closed, w, out):  # 
         fresh[c] = False
         if status[c] == FIXED:
             continue
-        still = status[c] == STICK or abs(w.slip[c]) <= near
+        still = status[c] == STICK or arrived[c] or abs(w.slip[c]) <= near
         if not w.pressing[c] > 0.0:
             status[c] = OPEN
         elif released[c]:

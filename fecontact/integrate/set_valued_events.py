@@ -1,7 +1,7 @@
 """Compiled run from event to event, of order 8, for contact with few independent slip velocities.
 
 Between events the sticking clusters and the closed stops are constraints. A step in which a
-cluster or a stop goes past its margin is cut at the moment where that begins, bisected in the
+cluster or a stop goes past its margin is cut at the moment where that begins, found in the
 step's interpolation to the last digits, and repeated with the shorter length.
 """
 
@@ -10,9 +10,10 @@ import math
 import numpy as np
 from numba import types
 
+from fecontact.body_powers import drive_jump
 from fecontact.compiled import f8, i8, integers, kernel, matrix, vector
 from fecontact.integrate.set_valued_decisions import decide_clusters, decide_stops, hold_velocity
-from fecontact.integrate.set_valued_nodes import derivative, margins
+from fecontact.integrate.set_valued_nodes import derivative
 from fecontact.integrate.set_valued_problem import (
     DIVERGED,
     EVENTS,
@@ -31,6 +32,7 @@ from fecontact.integrate.set_valued_problem import (
     STUCK,
     workspace,
 )
+from fecontact.integrate.set_valued_search import first_changes
 from fecontact.integrate.set_valued_steps import (
     PARTS,
     SLOPES,
@@ -41,8 +43,8 @@ from fecontact.integrate.set_valued_steps import (
     step,
 )
 
-# Places in a step at which margins are looked at.
-SAMPLES = 4
+# What has just begun to move and turns back in this part of a step is looked at more closely.
+EARLY = 0.25
 
 
 @kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
@@ -57,15 +59,16 @@ def run_events(  # type: ignore[no-untyped-def]
     far. ``states`` (N, size), ``friction`` and ``normal`` (N, n) are filled as ``counts`` says.
     """
     n = len(p.cluster)
-    clusters, size = len(p.rows), len(Y)
+    clusters, m, size = len(p.rows), p.rows.shape[1], len(Y)
     rigid = p.restitution >= 0.0
     w = workspace(p)
     slopes, parts = np.empty((SLOPES, size)), np.empty((PARTS, size))
     new, room, rate = np.empty(size), np.empty(size), np.empty(size)
-    margin = np.empty(clusters + n)
+    place = np.empty(clusters + n)
     past = np.zeros(clusters + n, np.bool_)
     fresh = np.zeros(clusters + n, np.bool_)
     released, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
+    arrived = np.zeros(clusters, np.bool_)
     touched, parting = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
     t, h, end = clock[0], clock[1], times[-1]
     tiny = 1e-14 * max(abs(times[0]), abs(end), longest)
@@ -88,8 +91,8 @@ def run_events(  # type: ignore[no-untyped-def]
         else:
             for c in range(clusters):
                 largest[0] = max(largest[0], abs(w.slip[c]))
-            decide_clusters(t, Y, p, released, 1e-12 * largest[0], status, fresh[:clusters],
-                            closed, w, rate)
+            decide_clusters(t, Y, p, released, arrived, 1e-12 * largest[0], status,
+                            fresh[:clusters], closed, w, rate)
     while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= t:
         derivative(t, Y, p, status, closed, w, rate)
         row = counts[OUTPUTS]
@@ -109,7 +112,9 @@ def run_events(  # type: ignore[no-untyped-def]
         length = left if reaching else min(h, longest)
         length = min(length, longest)
         reaching = reaching and length == left
-        step(t, length, Y, p, status, closed, w, slopes, new)
+        # At the end of a step that ends at a break, signals are as before the break.
+        latest = np.nextafter(goal, t)
+        step(t, latest, length, Y, p, status, closed, w, slopes, new)
         size_of_error = error(length, Y, new, slopes, rtol, floor)
         counts[STEPS] += 1
         if not size_of_error <= 1.0:
@@ -123,51 +128,33 @@ def run_events(  # type: ignore[no-untyped-def]
                 clock[0], clock[1] = t, h
                 return STUCK
             continue
+        quick, fast, deep = largest[0], largest[1], largest[2]
+        for c in range(clusters):
+            quick = max(quick, abs(w.slip[c]))
+        for j in range(n):
+            fast, deep = max(fast, abs(w.nodes[j, RATE])), max(deep, abs(w.nodes[j, PENETRATION]))
         prepare_dense(t, length, Y, new, p, status, closed, w, slopes, room, parts)
 
-        low, high, found, again = 0.0, 1.0, False, False
-        for sample in range(1, SAMPLES + 1):
-            high = sample / SAMPLES
-            interpolate(high, Y, parts, room)
-            derivative(t + high * length, room, p, status, closed, w, rate)
-            margins(p, status, closed, w, margin)
-            for k in range(clusters + n):
-                past[k] = margin[k] < 0.0
-                if past[k]:
-                    found = True
-                    again = again or (sample == 1 and fresh[k])
-            if found:
-                break
-            low = high
-        if found and again and length > tiny:
+        shorter = first_changes(t, latest, length, Y, parts, p, status, closed, w, floor, rtol,
+                                place)
+        high, found, again = 1.0, False, False
+        for k in range(clusters + n):
+            found = found or place[k] <= 1.0
+            high = min(high, place[k])
+        if shorter < high and shorter * length > tiny:
+            h = shorter * length
+            counts[REJECTED] += 1
+            continue
+        for k in range(clusters + n):
+            past[k] = found and place[k] <= high
+            again = again or (past[k] and fresh[k] and high < EARLY)
+        if again and length > tiny:
             # What has just begun to move cannot be told from its start: look at a shorter step.
             h = 0.2 * length
             counts[REJECTED] += 1
             continue
-        if not found:
-            low = high = 1.0
-        elif again:
+        if again:
             high = 0.0
-        else:
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                if middle <= low or middle >= high:
-                    break
-                interpolate(middle, Y, parts, room)
-                derivative(t + middle * length, room, p, status, closed, w, rate)
-                margins(p, status, closed, w, margin)
-                beyond = False
-                for k in range(clusters + n):
-                    beyond = beyond or (past[k] and margin[k] < 0.0)
-                if beyond:
-                    high = middle
-                else:
-                    low = middle
-            interpolate(high, Y, parts, room)
-            derivative(t + high * length, room, p, status, closed, w, rate)
-            margins(p, status, closed, w, margin)
-            for k in range(clusters + n):
-                past[k] = past[k] and margin[k] < 0.0
 
         reached = t + high * length
         if not found and reaching:
@@ -183,11 +170,16 @@ def run_events(  # type: ignore[no-untyped-def]
 
         if not found:
             t = reached
-            if reaching and stop < len(stops) and goal == stops[stop]:
-                stop += 1
             for i in range(size):
                 Y[i] = new[i]
                 slopes[0, i] = slopes[STAGES, i]
+            passing = reaching and stop < len(stops) and goal == stops[stop]
+            if passing:
+                stop += 1
+                work = drive_jump(latest, t, Y, p.system)
+                Y[2 * m] += work
+                if counts[OUTPUTS] > 0 and times[counts[OUTPUTS] - 1] == t:
+                    states[counts[OUTPUTS] - 1, 2 * m] += work
             fresh[:] = False
             idle = 0
             h = length * min(5.0, max(0.5, 0.9 * max(size_of_error, 1e-12) ** -0.125))
@@ -197,28 +189,39 @@ def run_events(  # type: ignore[no-untyped-def]
             for c in range(clusters):
                 held[c] = status[c] == STICK
                 any_held = any_held or held[c]
-                largest[0] = max(largest[0], abs(w.slip[c]))
-            for j in range(n):
-                largest[1] = max(largest[1], abs(w.nodes[j, RATE]))
-                largest[2] = max(largest[2], abs(w.nodes[j, PENETRATION]))
+            largest[0], largest[1], largest[2] = quick, fast, deep
             if any_held:
                 derivative(t, Y, p, status, closed, w, rate)
                 hold_velocity(p, held, w, Y)
+            if passing:
+                derivative(t, Y, p, status, closed, w, slopes[0])
             continue
 
-        counts[EVENTS] += 1
         idle = idle + 1 if high * length <= tiny else 0
         if idle > 200:
             clock[0], clock[1] = t, length
             return STUCK
         if high > 0.0:
-            step(t, high * length, Y, p, status, closed, w, slopes, new)
+            step(t, latest, high * length, Y, p, status, closed, w, slopes, new)
             for i in range(size):
                 Y[i] = new[i]
             t = reached
         derivative(t, Y, p, status, closed, w, rate)
         h = min(max(0.1 * length, 1e3 * tiny), longest)
-        if rigid:
+        # The repeated step may end, by its error, before what holds lets go: it holds on.
+        held_on = not again
+        for k in range(clusters + n):
+            if past[k]:
+                held_on = held_on and (
+                    closed[k - clusters] == 1 and w.nodes[k - clusters, FORCE] > 0.0
+                    if k >= clusters else status[k] == STICK and w.pressing[k] > 0.0
+                    and abs(w.total[k]) < (1.0 - 1e-12) * w.limit[k])
+        if not held_on:
+            counts[EVENTS] += 1
+        if held_on:
+            for i in range(size):
+                slopes[0, i] = rate[i]
+        elif rigid:
             height = largest[2]
             for j in range(n):
                 event = past[clusters + j]
@@ -231,10 +234,11 @@ def run_events(  # type: ignore[no-untyped-def]
         else:
             for c in range(clusters):
                 released[c] = past[c] and status[c] == STICK and w.pressing[c] > 0.0 and not again
+                arrived[c] = past[c] and (status[c] == 1 or status[c] == -1)
                 if released[c]:
                     status[c] = 1 if w.total[c] > 0.0 else -1
-            decide_clusters(t, Y, p, released, 1e-9 * largest[0], status, fresh[:clusters],
-                            closed, w, slopes[0])
+            decide_clusters(t, Y, p, released, arrived, 1e-9 * largest[0], status,
+                            fresh[:clusters], closed, w, slopes[0])
         # Wherever the motion goes on from, an output at this moment shows what comes after.
         while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= t:
             row = counts[OUTPUTS]

@@ -264,21 +264,3 @@ def _derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def
 
 compiled_derivative = compile_law(DERIVATIVE, "derivative(t, Y, p, status, closed, w, out)",
                                   _derivative)
-
-
-@helper
-def margins(p, status, closed, w, out):  # type: ignore[no-untyped-def]
-    """Fill out (k + n,) with how far each cluster and stop is from changing; below zero, it has."""
-    clusters = len(p.rows)
-    out[:] = 1.0
-    if p.restitution >= 0.0:
-        for j in range(len(closed)):
-            out[clusters + j] = (w.nodes[j, FORCE] if closed[j] else -w.nodes[j, PENETRATION])
-        return
-    for c in range(clusters):
-        if status[c] == OPEN:
-            out[c] = -1.0 if w.pressing[c] > 0.0 else 1.0
-        elif status[c] == STICK:
-            out[c] = w.limit[c] - abs(w.total[c]) if w.pressing[c] > 0.0 else -1.0
-        elif status[c] != FIXED:
-            out[c] = status[c] * w.slip[c]

@@ -38,7 +38,9 @@ class Problem(NamedTuple):
     ``system`` has unsmoothed friction; ``static`` (n,) is the coefficient that limits stick, below
     zero for the law's own; ``cluster`` (n,) is the cluster of each node, ``rows`` (k, m) are those
     of the clusters; ``tick`` is the time over which the ground's speed is differentiated;
-    ``restitution`` is below zero for compliant contact; ``derivative`` the address of
+    ``restitution`` is below zero for compliant contact; ``relief`` (3,) are the lowest and the
+    highest ground and its shortest wave, infinite where it is level; ``steady`` is zero if the
+    speed of the ground changes; ``derivative`` is the address of
     :data:`fecontact.integrate.set_valued_nodes.compiled_derivative`.
     """
 
@@ -48,10 +50,12 @@ class Problem(NamedTuple):
     rows: Array
     tick: float
     restitution: float
+    relief: Array
+    steady: int
     derivative: int
 
 
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, i8], Problem)
+PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, vector, i8, i8], Problem)
 
 
 class Workspace(NamedTuple):

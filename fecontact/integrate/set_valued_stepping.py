@@ -14,7 +14,9 @@ import math
 import numpy as np
 from numba import types
 
+from fecontact.body_powers import drive_jump
 from fecontact.compiled import f8, helper, i8, integers, kernel, matrix, vector
+from fecontact.integrate.bernstein import DEPTH, NOWHERE, first_below, fit
 from fecontact.integrate.set_valued_nodes import body_powers, contact_powers, observe
 from fecontact.integrate.set_valued_problem import (
     DIVERGED,
@@ -24,7 +26,9 @@ from fecontact.integrate.set_valued_problem import (
     GOING_ON,
     LIMIT,
     OUTPUTS,
+    PENETRATION,
     PROBLEM,
+    RATE,
     REJECTED,
     SLIP,
     STARTED,
@@ -32,6 +36,7 @@ from fecontact.integrate.set_valued_problem import (
     STUCK,
     workspace,
 )
+from fecontact.integrate.set_valued_search import ROUGHLY, UNFELT, first_pressed, pressed
 from fecontact.integrate.set_valued_stages import GRIP, ROUNDING, solve_stage
 from fecontact.laws.contract import signal_at
 
@@ -41,6 +46,54 @@ B1 = -0.25 * (6.0 * GAMMA**2 - 16.0 * GAMMA + 1.0)
 B2 = 0.25 * (6.0 * GAMMA**2 - 20.0 * GAMMA + 5.0)
 ERROR_1 = B1 - GAMMA / (1.0 - GAMMA)
 ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
+_THIRDS = fit(np.arange(4) / 3.0)
+# A step is cut so often at most before what is left counts as error.
+CUTS = 3
+
+
+@helper
+def _passed_over(t, h, before, after, old, p, tolerance, floor, rtol, nodes, b, speed, room):  # type: ignore[no-untyped-def]
+    """Part of a step at which a node slips back, or touches, between ends that show neither; or 1.
+
+    ``old`` and ``nodes`` are what `observe` fills at both ends, ``before`` and ``after`` the
+    accelerations there; between them cubics count. Reversals below ``tolerance`` are left out.
+    """
+    s = p.system
+    n, m = s.Tx.shape
+    for i in range(4):
+        speed[i] = 0.0
+        for k in range(4):
+            speed[i] += _THIRDS[i, k] * signal_at(s.ground_motion)(
+                t + h * k / 3.0, s.ground_motion_parameters)[1]
+    shorter = 1.0
+    for j in range(n):
+        first, last = old[j, SLIP], nodes[j, SLIP]
+        if (old[j, FORCE] != 0.0 and nodes[j, FORCE] != 0.0 and first * last > 0.0
+                and min(abs(first), abs(last)) > tolerance):
+            sign = 1.0 if first > 0.0 else -1.0
+            rise, fall = 0.0, 0.0
+            for i in range(m):
+                rise += s.Tx[j, i] * before[i]
+                fall += s.Tx[j, i] * after[i]
+            b[0], b[3] = first + speed[0], last + speed[3]
+            b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
+            for i in range(4):
+                b[i] = sign * (b[i] - speed[i]) + tolerance
+            back = first_below(b, room)
+            if back != NOWHERE:
+                b[0], b[1], b[2], b[3] = b[3], b[2], b[1], b[0]
+                shorter = min(shorter, 0.5 * (back + 1.0 - first_below(b, room)))
+        b[0], b[3] = old[j, PENETRATION], nodes[j, PENETRATION]
+        b[1], b[2] = b[0] + h * old[j, RATE] / 3.0, b[3] - h * nodes[j, RATE] / 3.0
+        depth = 0.0
+        for i in range(m):
+            depth = max(depth, abs(s.Ty[j, i]) * floor[i])
+        above = UNFELT * max(pressed(b[0], j, s), pressed(b[3], j, s))
+        above += pressed(rtol * depth, j, s)
+        if max(pressed(b.min(), j, s), pressed(b.max(), j, s)) > above:
+            shorter = min(shorter, first_pressed(b, above, ROUGHLY, j, s, room))
+    return shorter
+
 
 @helper
 def _output(  # type: ignore[no-untyped-def]
@@ -86,6 +139,8 @@ def run_steps(  # type: ignore[no-untyped-def]
     start, known = np.empty(m), np.empty(m)
     before, after = np.empty(size - m), np.empty(size - m)
     grip, multiplier, stage_force = np.empty(n), np.empty(n), np.empty((3, n))
+    old, cubic, speed = np.empty_like(w.nodes), np.empty(4), np.empty(4)
+    halves = np.empty((DEPTH, 5))
     side = np.zeros(n)
     force = carried[3:]
     inertia = np.empty(n)
@@ -101,7 +156,7 @@ def run_steps(  # type: ignore[no-untyped-def]
     stop = 0
     while stop < len(stops) and stops[stop] <= t:
         stop += 1
-    in_a_row, known_before = 0, False
+    in_a_row, cuts, known_before = 0, 0, False
 
     for _ in range(limit):
         if t >= end:
@@ -113,9 +168,12 @@ def run_steps(  # type: ignore[no-untyped-def]
         reaching = length >= (goal - t) * (1.0 - 1e-10)
         if reaching:
             length = goal - t
+        # At the end of a step that ends at a break, signals are as before the break.
+        latest = np.nextafter(goal, t)
         g = GAMMA * length
         counts[STEPS] += 1
         observe(t, Y, p, w.nodes)
+        old[:] = w.nodes
         quick = carried[0] + abs(signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1])
         for i in range(m):
             for k in range(m):
@@ -143,9 +201,9 @@ def run_steps(  # type: ignore[no-untyped-def]
                                           + B2 * stage_states[1, m + i])
                     known[i] += length * (B1 * accelerations[0, i] + B2 * accelerations[1, i])
                 state[m + i] = Y[m + i] if k == 0 else stage_states[k - 1, m + i]
-            good = solve_stage(t + node * length, g, start, known, state, p, grip, multiplier,
-                               side, stage_force[k], room, linear, system_matrix, floor, rtol,
-                               finest)
+            good = solve_stage(min(t + node * length, latest), g, start, known, state, p, grip,
+                               multiplier, side, stage_force[k], room, linear, system_matrix,
+                               floor, rtol, finest)
             if not good:
                 break
             for i in range(m):
@@ -186,10 +244,22 @@ def run_steps(  # type: ignore[no-untyped-def]
 
         for k in range(3):
             node = GAMMA if k == 0 else (GAMMA + A21 if k == 1 else 1.0)
-            moment = t + node * length
+            moment = min(t + node * length, latest)
             observe(moment, stage_states[k], p, w.nodes)
             body_powers(moment, stage_states[k], s, rates[k])
             contact_powers(moment, s, w.nodes, stage_force[k], True, rates[k])
+        if not known_before:
+            before[:m] = accelerations[0]
+            before[m:] = rates[0]
+        if cuts < CUTS:
+            part = _passed_over(t, length, before, accelerations[2], old, p,
+                                rtol * (slowest + quick), floor, rtol, w.nodes, cubic, speed,
+                                halves)
+            if part * length > tiny and part < 1.0:
+                counts[REJECTED] += 1
+                cuts += 1
+                h = part * length
+                continue
         for j in range(n):
             carried[0] = max(carried[0], abs(w.nodes[j, SLIP]))
         new[: 2 * m] = stage_states[2]
@@ -199,9 +269,6 @@ def run_steps(  # type: ignore[no-untyped-def]
         reached = goal if reaching else t + length
         after[:m] = accelerations[2]
         after[m:] = rates[2]
-        if not known_before:
-            before[:m] = accelerations[0]
-            before[m:] = rates[0]
         if counts[STARTED] == 0:
             counts[STARTED] = 1
             force[:] = stage_force[0]
@@ -217,7 +284,12 @@ def run_steps(  # type: ignore[no-untyped-def]
         force[:] = stage_force[2]
         if reaching and stop < len(stops) and goal == stops[stop]:
             stop += 1
-        in_a_row = 0
+            known_before = False
+            work = drive_jump(latest, t, Y, s)
+            Y[2 * m] += work
+            if counts[OUTPUTS] > 0 and times[counts[OUTPUTS] - 1] == t:
+                states[counts[OUTPUTS] - 1, 2 * m] += work
+        in_a_row, cuts = 0, 0
         h = length * min(8.0, max(0.3, 0.9 * max(worst, 1e-12) ** (-1.0 / 3.0)))
     clock[0], clock[1] = t, h
     return FINISHED if t >= end else GOING_ON

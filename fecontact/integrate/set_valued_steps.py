@@ -24,10 +24,10 @@ PARTS = 3 + len(DENSE)
 
 
 @helper
-def step(t, h, Y, p, status, closed, w, slopes, new):  # type: ignore[no-untyped-def]
+def step(t, latest, h, Y, p, status, closed, w, slopes, new):  # type: ignore[no-untyped-def]
     """Put the state after h into ``new``; slopes[0] is Y' at t, slopes[12] becomes that at t + h.
 
-    ``slopes`` is (SLOPES, size).
+    ``slopes`` is (SLOPES, size). What is given in time counts as it is at ``latest`` or before.
     """
     size = len(Y)
     for stage in range(1, STAGES + 1):
@@ -41,7 +41,7 @@ def step(t, h, Y, p, status, closed, w, slopes, new):  # type: ignore[no-untyped
                     total += B[k] * slopes[k, i]
             new[i] = Y[i] + h * total
         node = C[stage] if stage < STAGES else 1.0
-        derivative(t + node * h, new, p, status, closed, w, slopes[stage])
+        derivative(min(t + node * h, latest), new, p, status, closed, w, slopes[stage])
 
 
 @helper

@@ -3,6 +3,7 @@
 import numpy as np
 from numba import types
 
+from fecontact.body_powers import drive_jump
 from fecontact.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
 from fecontact.contact_energy import powers
 from fecontact.contact_kernels import SYSTEM
@@ -296,6 +297,10 @@ def advance(  # type: ignore[no-untyped-def]
             work_until(1.0, h, progress.work, room.power, progress.work)
             if is_break and target == stop:
                 powers(stop, room.after, s, progress.power[:8], progress.power[8:])
+                jump = drive_jump(latest, stop, room.after, s)
+                progress.work[0] += jump
+                if times[row - 1] == stop:
+                    work[row - 1, 0] += jump
             else:
                 progress.power[:] = room.power[3]
         _go_on(progress, room)

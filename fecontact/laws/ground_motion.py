@@ -35,6 +35,14 @@ class GroundMotion:
         """Times between t0 and t1 at which the speed has kinks, ascending [s]."""
         return ()
 
+    @property
+    def shortest_period(self) -> float | None:
+        """Shortest time in which the speed goes up and down [s], for a limit of the step; or None.
+
+        Between breakpoints: steps end there.
+        """
+        return None
+
     def largest_speed(self, speed: float, t0: float, t1: float) -> float:
         """Largest magnitude of the speed from t0 to t1, or a bound of it [m/s]."""
         raise NotImplementedError
@@ -100,6 +108,11 @@ class HarmonicSpeed(GroundMotion):
     def parameters(self, speed: float) -> Array:
         """V, A, w and phi."""
         return np.array([speed, self.amplitude, self.angular_frequency, self.phase], dtype=float)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """2 pi / w [s]."""
+        return 2.0 * math.pi / self.angular_frequency
 
     def largest_speed(self, speed: float, t0: float, t1: float) -> float:
         """Largest magnitude of the speed from t0 to t1 [m/s]."""

@@ -87,6 +87,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "harmonic": signals.Harmonic,
             "harmonics": signals.Harmonics,
             "sweep": signals.Sweep,
+            "step": transients.Step,
             "pulse": transients.Pulse,
             "tabulated": transients.Tabulated,
         },

@@ -74,12 +74,45 @@ def equivalent_period(curve: Any) -> float | None:
     Not below two of the shortest distance between knots, which no sampled curve resolves.
     """
     low, high = curve_range(curve)
-    slopes = curve.derivative()
-    places = [curve.x[:-1], np.nextafter(curve.x[1:], -np.inf)]
-    if len(curve.c) > 2:
-        turns = slopes.derivative().roots(extrapolate=False)
-        places.append(turns[np.isfinite(turns)])
-    steepest = float(np.abs(slopes(np.concatenate(places))).max())
+    steepest = float(_steepest(curve).max())
     if steepest == 0.0:
         return None
     return max(np.pi * (high - low) / steepest, 2.0 * float(np.diff(curve.x).min()))
+
+
+def _steepest(curve: Any) -> Array:
+    """Largest magnitude of the slope in each piece of a ``PPoly`` of degree three at most."""
+    c = np.zeros((4, len(curve.x) - 1))
+    c[4 - len(curve.c):] = curve.c
+    widths = np.diff(curve.x)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = -c[1] / (3.0 * c[0])
+    turn = np.where((turn > 0.0) & (turn < widths), turn, 0.0)
+    return np.abs([(3.0 * c[0] * s + 2.0 * c[1]) * s + c[2] for s in (0.0, widths, turn)]).max(0)
+
+
+# Steps that a smooth curve takes in its period.
+_STEPS_PER_PERIOD = 20.0
+
+
+def steep_pieces(curve: Any) -> tuple[float | None, Array]:
+    """Equivalent period of a ``PPoly`` without its steep pieces, and the ends of these.
+
+    Steps that end with a steep piece need not be short for its sake. What counts as steep is
+    chosen so that a run along the curve takes the fewest steps; the period is None if no piece is
+    left.
+    """
+    low, high = curve_range(curve)
+    slopes, widths = _steepest(curve), np.diff(curve.x)
+    order = np.argsort(-slopes)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        periods = np.maximum(np.pi * (high - low) / slopes[order], 2.0 * widths[order])
+    # Of what is left, the shortest; a piece that is taken out adds up to two breaks.
+    shortest = np.append(np.minimum.accumulate(periods[::-1])[::-1], np.inf)
+    if high == low:
+        shortest[:] = np.inf
+    steps = 2.0 * np.arange(len(shortest)) + _STEPS_PER_PERIOD * (
+        curve.x[-1] - curve.x[0]) / shortest
+    count = int(np.argmin(steps))
+    steep = np.union1d(curve.x[order[:count]], curve.x[order[:count] + 1])
+    return None if np.isinf(shortest[count]) else float(shortest[count]), steep

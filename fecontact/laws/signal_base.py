@@ -39,13 +39,17 @@ class Signal:
     def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
         """Times between t0 and t1 on which an integrator must step, ascending [s].
 
-        There the signal, its rate or its second derivative jumps. The ends are not among them.
+        There the signal, its rate or its second derivative jumps, or a steep piece begins or ends.
+        The times t0 and t1 are not among them.
         """
         return ()
 
     @property
     def shortest_period(self) -> float | None:
-        """Shortest time in which it goes up and down [s], for a limit of the step; or None."""
+        """Shortest time in which it goes up and down [s], for a limit of the step; or None.
+
+        Between breakpoints: what is smooth from one to the next, on which steps end, needs none.
+        """
         return None
 
     @property

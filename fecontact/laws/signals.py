@@ -11,11 +11,11 @@ from fecontact.errors import InputError, require_finite, require_not_negative, r
 from fecontact.laws.contract import signal
 from fecontact.laws.records import numbers
 from fecontact.laws.signal_base import Signal, between, require_one_of
-from fecontact.laws.transients import Pulse, Tabulated
+from fecontact.laws.transients import Pulse, Step, Tabulated
 
 Array = NDArray[np.float64]
 
-__all__ = ["Constant", "Harmonic", "Harmonics", "Pulse", "Signal", "Sweep", "Tabulated"]
+__all__ = ["Constant", "Harmonic", "Harmonics", "Pulse", "Signal", "Step", "Sweep", "Tabulated"]
 
 
 @signal

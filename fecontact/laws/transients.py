@@ -1,4 +1,4 @@
-"""Signals that are not harmonic: pulses and tables."""
+"""Signals that are not harmonic: steps, pulses and tables."""
 
 import math
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from fecontact.errors import InputError, require_finite, require_positive
 from fecontact.laws.contract import signal
 from fecontact.laws.piecewise import (
     curve_range,
-    equivalent_period,
     linear_curve,
     piecewise,
     piecewise_parameters,
+    steep_pieces,
 )
 from fecontact.laws.records import read_or_given, require_closed, require_resolved
 from fecontact.laws.signal_base import Signal, between, require_one_of
@@ -24,6 +24,49 @@ Array = NDArray[np.float64]
 
 _PULSES = ("half-sine", "rectangle", "triangle", "haversine")
 _RISE = 0.01
+
+
+@signal
+def _step(t, p):  # type: ignore[no-untyped-def]
+    return (p[1] if t >= p[0] else 0.0), 0.0
+
+
+@dataclass(frozen=True)
+class Step(Signal):
+    """Zero before a time, a value from then on; no ramp between them.
+
+    Integrators step on the time. As a motion of the drive it makes the springs' force jump, and
+    the work of the jump counts; as the motion of a body it would need an infinite force.
+
+    Parameters
+    ----------
+    time : float
+        Of the jump [s].
+    value : float
+        After it, in the unit of what is given.
+
+    Raises
+    ------
+    InputError
+        For values that are not finite.
+    """
+
+    kernel: ClassVar = _step
+
+    time: float
+    value: float
+
+    def __post_init__(self) -> None:
+        require_finite("Step", time=self.time, value=self.value)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """The time, if it lies between t0 and t1 [s]."""
+        return between(self.time, t0, t1)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the value."""
+        return abs(float(self.value))
 
 
 @signal
@@ -115,13 +158,6 @@ class Pulse(Signal):
         return between(self.start + np.array(places), t0, t1)
 
     @property
-    def shortest_period(self) -> float | None:
-        """T for a haversine, else 2 T [s]: steps on the breakpoints follow a steeper rise."""
-        if self.amplitude == 0.0:
-            return None
-        return self.duration if self.kind == "haversine" else 2.0 * self.duration
-
-    @property
     def largest(self) -> float:
         """Magnitude of the amplitude."""
         return abs(float(self.amplitude))
@@ -199,25 +235,39 @@ class Tabulated(Signal):
         """Number of pieces, whether they repeat, the times and the pieces' coefficients."""
         return piecewise_parameters(self._curve, self.outside == "repeat")
 
-    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
-        """Times of kinks between t0 and t1: all of the table for lines, else ends that hold."""
+    @cached_property
+    def _steps(self) -> tuple[float | None, Array]:
+        """Period of the smooth pieces, and the times at which steps must end."""
         times = np.array(self.times)
-        if self.outside == "hold":
-            return between(times if self.interpolation == "linear" else times[[0, -1]], t0, t1)
-        if self.interpolation == "cubic" or t1 <= t0:
-            return ()
+        if self.interpolation == "linear":
+            return None, times
+        period, steep = steep_pieces(self._curve)
+        ends = times[[0, -1]] if self.outside == "hold" else times[:0]
+        return period, np.union1d(ends, steep)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Times between t0 and t1 at which a piece of a line or a steep piece of a curve ends [s].
+
+        And the ends of a curve that hold.
+        """
+        times, places = np.array(self.times), self._steps[1]
+        if self.outside == "hold" or not len(places) or t1 <= t0:
+            return between(places, t0, t1)
         period = times[-1] - times[0]
+        if places[-1] == times[-1]:
+            places = np.union1d(times[:1], places[:-1])
         turns = np.arange(math.floor((t0 - times[-1]) / period),
                           math.ceil((t1 - times[0]) / period) + 1)
-        return between(np.add.outer(turns * period, times[:-1]).ravel(), t0, t1)
+        return between(np.add.outer(turns * period, places).ravel(), t0, t1)
 
     @property
     def shortest_period(self) -> float | None:
-        """Period of the harmonic with the same range and steepest rate [s]; None for a constant.
+        """Period of the harmonic with the curve's range and its steepest rate [s], or None.
 
-        Not less than twice the shortest step of the table.
+        Without pieces that begin and end with a breakpoint, as all of a table of lines do and
+        those of a curve that are much steeper than the others.
         """
-        return equivalent_period(self._curve)
+        return self._steps[0]
 
     @property
     def frequency_hz(self) -> float | None:
