@@ -14,6 +14,7 @@ from fecontact.laws.ground import Ground
 from fecontact.laws.ground_motion import SpeedRamp
 from fecontact.laws.memory import LuGreFriction
 from fecontact.laws.normal import RoughSurface
+from fecontact.laws.normal_stop import PrescribedForce
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -185,15 +186,18 @@ def test_two_independent_nodes_against_two_single_masses(scheme, rtol, tolerance
 @pytest.mark.parametrize(("scheme", "longest", "order"), [("events", 0.6, 8), ("stepping", 0.1, 3)])
 def test_order_while_nothing_changes(scheme, longest, order):
     """Sliding all the time under a driven spring; linear, with a closed form."""
-    system = block(friction=ConstantFriction(0.5), load=Load(1.0), ground=Ground(speed=50.0),
-                   spring=0.5, drive=Drive(stiffness_x=0.5, amplitude_x=1.0, angular_frequency=2.0))
+    row = [[1.0], [0.0], [0.0]]
+    basis = ModalBasis.from_matrices([[1.0]], [[0.5]], {"contact": [row], "B": row, "C": row})
+    system = ContactSystem(basis, normal=PrescribedForce(1.0), friction=ConstantFriction(0.5),
+                           ground=Ground(speed=50.0), drive=Drive(
+                               stiffness_x=0.5, amplitude_x=1.0, angular_frequency=2.0))
     end, errors = 12.0, []
-    state = start(system, 0.5)
+    state = np.array([0.5, 0.0])
     for part in (1.0, 0.5, 0.25):
         run = integrate_set_valued(system, state, np.array([0.0, end]), rtol=1e-2, scheme=scheme,
                                    longest=part * longest)
         # x'' + x = 1/2 + sin(2 t) / 2 from x = 1/2 at rest.
-        errors.append(abs(along(system, run)[0][-1]
+        errors.append(abs(run.states[-1, 0]
                           - (0.5 + np.sin(end) / 3.0 - np.sin(2.0 * end) / 6.0)))
     found = np.log2(np.array(errors[:-1]) / errors[1:])
     assert found[-1] == pytest.approx(order, abs=0.5)

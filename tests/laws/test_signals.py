@@ -18,6 +18,7 @@ from fecontact.laws.signals import (
     Harmonics,
     Pulse,
     Signal,
+    Step,
     Sweep,
     Tabulated,
 )
@@ -182,7 +183,8 @@ def test_breakpoints_of_pulses():
     assert SIGNALS["triangle"].breakpoints(0.0, 1.0) == pytest.approx((0.1, 0.3, 0.5))
     assert SIGNALS["rectangle"].breakpoints(0.0, 1.0) == pytest.approx((0.1, 0.104, 0.496, 0.5))
     assert SIGNALS["rectangle"].breakpoints(0.2, 0.499) == pytest.approx((0.496,))
-    assert SIGNALS["triangle"].shortest_period == pytest.approx(0.8)
+    # Steps end where it begins and ends: it need not shorten those before and after.
+    assert SIGNALS["triangle"].shortest_period is None
 
 
 def test_tables_go_through_their_values():
@@ -233,8 +235,11 @@ def test_rate_of_a_curve_has_no_kinks(name):
 def test_breakpoints_of_tables():
     assert SIGNALS["lines"].breakpoints(-5.0, 5.0) == tuple(TIMES)
     assert SIGNALS["lines"].breakpoints(TIMES[3], TIMES[6]) == tuple(TIMES[4:6])
-    assert SIGNALS["curve"].breakpoints(-5.0, 5.0) == (TIMES[0], TIMES[-1])
-    assert SIGNALS["repeated curve"].breakpoints(-5.0, 5.0) == ()
+    # So few values that steps from one to the next are fewer than those of a smooth curve.
+    assert SIGNALS["curve"].breakpoints(-5.0, 5.0) == tuple(TIMES)
+    smooth = Tabulated(np.linspace(0.0, 3.0, 301), np.sin(np.linspace(0.0, 3.0, 301)),
+                       interpolation="cubic")
+    assert smooth.breakpoints(-5.0, 5.0) == (0.0, 3.0)
     period = TIMES[-1] - TIMES[0]
     points = SIGNALS["repeated lines"].breakpoints(TIMES[0] + 0.001, TIMES[0] + 2 * period + 0.001)
     expected = [*TIMES[1:], *(TIMES[1:] + period)]
@@ -243,12 +248,41 @@ def test_breakpoints_of_tables():
 
 def test_shortest_period_of_a_sampled_sine():
     t = np.linspace(0.0, 3.0, 301)
-    for interpolation in ("linear", "cubic"):
-        table = Tabulated(t, 2.0 * np.cos(2.0 * np.pi * 4.0 * t), interpolation=interpolation)
-        assert table.shortest_period == pytest.approx(0.25, rel=0.02)
-        assert table.largest == pytest.approx(2.0, rel=1e-2)
-    assert Tabulated((0.0, 1.0), (2.0, 2.0)).shortest_period is None
-    assert Tabulated((0.0, 1.0, 2.0), (0.0, 1.0, 0.0)).shortest_period == pytest.approx(math.pi)
+    values = 2.0 * np.cos(2.0 * np.pi * 4.0 * t)
+    table = Tabulated(t, values, interpolation="cubic")
+    assert table.shortest_period == pytest.approx(0.25, rel=0.02)
+    assert table.largest == pytest.approx(2.0, rel=1e-2)
+    # Straight lines from one breakpoint to the next need no shorter steps.
+    assert Tabulated(t, values).shortest_period is None
+    flat = Tabulated((0.0, 1.0, 3.0), (2.0, 2.0, 2.0), interpolation="cubic")
+    assert flat.shortest_period is None
+    assert flat.breakpoints(-1.0, 4.0) == (0.0, 3.0)
+
+
+@pytest.mark.parametrize("outside", ["hold", "repeat"])
+def test_steps_end_with_the_steep_piece_of_a_smooth_curve(outside):
+    """A jump within one of 300 pieces leaves the others the long steps of their sine."""
+    t = np.linspace(0.0, 3.0, 301)
+    values = np.sin(2.0 * np.pi * t) + 0.8 * (t > 1.495)
+    if outside == "repeat":
+        values = np.sin(2.0 * np.pi * t) + 0.8 * ((t > 1.495) & (t < 2.995))
+    table = Tabulated(t, values, interpolation="cubic", outside=outside)
+    points = table.breakpoints(-0.001, 2.999)
+    assert {1.49, 1.5} <= {round(point, 9) for point in points}
+    assert len(points) < 40
+    assert 0.5 < table.shortest_period < 1.5
+    again = table.breakpoints(2.999, 5.999)
+    assert (outside == "repeat") == (len(again) == len(points))
+
+
+def test_step():
+    step = Step(0.4, 3.0)
+    assert step.history([0.0, np.nextafter(0.4, 0.0), 0.4, 1.0])[:, 0].tolist() == [0, 0, 3, 3]
+    assert step.breakpoints(0.0, 1.0) == (0.4,)
+    assert step.breakpoints(0.4, 1.0) == ()
+    assert (step.largest, step.shortest_period, step.frequency_hz) == (3.0, None, None)
+    with pytest.raises(InputError, match="Step: value = inf"):
+        Step(0.0, float("inf"))
 
 
 def test_table_from_a_file(tmp_path):
