@@ -289,6 +289,7 @@ def _joined(run: Trajectory, pieces: list[dict[str, Any]]) -> Trajectory:
     """The run with the rows of pieces between its own."""
     time = np.concatenate([run.time, *(piece["time"] for piece in pieces)])
     order = np.argsort(time, kind="stable")
-    columns = {name: np.concatenate([getattr(run, name), *(piece[name] for piece in pieces)])[order]
-               for name in pieces[0] if name != "time"}
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(run, name), *(piece[name] for piece in pieces)])[order]
+        for name in pieces[0] if name != "time"}
     return replace(run, time=time[order], **columns)
