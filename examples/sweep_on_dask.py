@@ -6,6 +6,7 @@ processes on this machine. Whatever happens to workers, the table is that of an 
 Usage: python examples/sweep_on_dask.py [--quick]
 """
 
+import os
 import shutil
 import socket
 import subprocess
@@ -22,9 +23,10 @@ AXES = {"ground.speed": fc.Range(1e-3, 12e-3, 12),
         "friction.static_coefficient": fc.Range(0.6, 0.9, 5)}
 
 
-def start(*command: str) -> "subprocess.Popen[bytes]":
-    """A process of Dask, without what it has to say."""
+def start(folder: str, *command: str) -> "subprocess.Popen[bytes]":
+    """A process of Dask, without what it has to say; its own files go to the folder."""
     return subprocess.Popen([sys.executable, "-m", *command, "--no-dashboard"],
+                            env={**os.environ, "TMPDIR": folder},
                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
@@ -37,9 +39,10 @@ def main(quick: bool = False) -> None:
         port = probe.getsockname()[1]
     address = f"tcp://127.0.0.1:{port}"
     folder = tempfile.mkdtemp()
-    scheduler = start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port))
-    workers = [start("distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny",
-                     "--local-directory", f"{folder}/workers") for _ in range(2)]
+    scheduler = start(folder, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port",
+                      str(port))
+    workers = [start(folder, "distributed.cli.dask_worker", address, "--nthreads", "1",
+                     "--no-nanny") for _ in range(2)]
     study = fc.Study.read(STUDY).with_(**{"simulation.t_end": 12.0, "simulation.outputs": 1201,
                                           "sweep.after": 9.0})
 
