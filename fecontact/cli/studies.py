@@ -44,8 +44,12 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     with output_folder(output or described.results) as folder:
         made = described.mesh()
         show(mesh_table(made))
-        write_mesh(made, folder / f"{described.name}.msh")
-        say_written(folder / f"{described.name}.msh")
+        target, source = folder / f"{described.name}.msh", getattr(described.geometry, "file", None)
+        if source is not None and target.exists() and target.samefile(described.folder / source):
+            raise InputError(f"{target} is the mesh that the study names; choose another folder "
+                             f"for what is read of it.")
+        write_mesh(made, target)
+        say_written(target)
 
 
 def modes(
