@@ -6,10 +6,10 @@ READY  := $(VENV)/.ready
 SYSTEM := $(VENV)/.system-libraries
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check bench validation clean
+.PHONY: help setup demo test test-slow check bench validation clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
 	  while IFS='|' read -r name what; do printf '  %-12s %s\n' "$$name" "$$what"; done
 
 setup: $(READY) $(SYSTEM) ## install everything into .venv
@@ -19,6 +19,9 @@ demo: $(READY) $(SYSTEM) ## two studies from geometry to movie, into demo-output
 
 test: $(READY) $(SYSTEM) ## run the tests
 	@$(BIN)/python -m pytest -q -n auto
+
+test-slow: $(READY) $(SYSTEM) ## run the tests that take minutes
+	@$(BIN)/python -m pytest -q -m slow
 
 check: $(READY) ## ruff and mypy
 	@$(BIN)/ruff check .

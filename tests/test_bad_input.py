@@ -4,6 +4,8 @@ Each case ends with one kind sentence that names what is wrong, and leaves nothi
 """
 
 import shlex
+import subprocess
+import sys
 import warnings
 
 import pytest
@@ -13,8 +15,6 @@ import fecontact as fe
 from fecontact.cli import execute
 
 SWEEP = TINY + "[sweep.axes]\nground.speed = [0.1, 0.2]\n"
-NAN = float("nan")
-DIGITS = 10**5000
 
 
 @pytest.fixture(scope="module")
@@ -541,3 +541,42 @@ rnu | rnu
 def test_command_lines(line, refused):
     tokens, _, word = line.partition(" | ")
     assert word.lower() in refused(*shlex.split(tokens)).lower()
+
+
+def test_an_index_that_cannot_be_written_is_no_success(tmp_path, capsys):
+    """All cases went well, but their table has no place: a folder is in the way."""
+    (tmp_path / "sweep.toml").write_text(SWEEP)
+    (tmp_path / "s" / "index.csv").mkdir(parents=True)
+    tokens = ["sweep", str(tmp_path / "sweep.toml"), "-o", str(tmp_path / "s"), "--workers", "1"]
+    assert execute(tokens) == 1
+    said = capsys.readouterr()
+    assert "wrote" not in said.out
+    assert_kind(said.err)
+    assert "index.csv cannot be written" in said.err
+    (tmp_path / "s" / "index.csv").rmdir()
+    assert execute([*tokens, "--resume"]) == 0
+    assert len(fe.read_table(tmp_path / "s" / "index.csv")) == 2
+
+
+@pytest.mark.parametrize("name", ["10:00.mp4", "-y.mp4", "pipe:1.mp4", "concat:a|b.mp4", "%d.mp4"])
+def test_names_of_movies_that_mean_something_to_the_encoder(name, place, tmp_path, monkeypatch,
+                                                            capfd):
+    """A colon would begin a protocol, a hyphen an option."""
+    monkeypatch.chdir(tmp_path)
+    assert execute(["render", str(place / "run.vtkhdf"), "--frames", "2", "--size", "320", "180",
+                    f"--output={name}"]) == 0
+    assert capfd.readouterr().err == ""
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert b"ftyp" in (tmp_path / name).read_bytes()[:12]
+
+
+def test_in_a_process_of_its_own(place):
+    """As people meet it: the largest picture, a name that is too long, bytes that are no text."""
+    for tokens in (["render", "run.vtkhdf", "--size", "100000", "100000"],
+                   ["mesh", "n" * 300 + ".toml"],
+                   [b"mesh", b"\xff\xfe.toml"]):
+        done = subprocess.run([sys.executable, "-m", "fecontact", *tokens], text=True,
+                              capture_output=True, check=False)
+        assert done.returncode == 1
+        assert done.stdout == ""
+        assert_kind(done.stderr)

@@ -135,8 +135,8 @@ def _table(block: _Block) -> Array:
                 try:
                     float(word)
                 except ValueError:
-                    raise InputError(f"Line {number}: {word[:40]!r} is not a number; write matrices "
-                                     f"with FORMAT=COORDINATE or FORMAT=MATRIX INPUT.") from None
+                    raise InputError(f"Line {number}: {word[:40]!r} is not a number; write "
+                                     f"matrices with FORMAT=COORDINATE or FORMAT=MATRIX INPUT.") from None
             width = width or len(words)
             if len(words) != width:
                 raise InputError(f"Line {number} has {len(words)} columns, but the lines before "
