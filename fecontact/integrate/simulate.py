@@ -188,7 +188,7 @@ def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
 def require_max_step(max_step: Any) -> None:
     """InputError for what is no longest step: neither None nor a time above zero."""
     if max_step is not None and not (isinstance(max_step, Real) and not isinstance(max_step, bool)
-                                     and 0.0 < max_step < np.inf):
+                                     and 0.0 < float(max_step) < np.inf):
         raise InputError(f"max_step = {max_step!r} must be a finite time above zero [s]; leave it "
                          f"out for steps as long as the tolerance allows.")
 
