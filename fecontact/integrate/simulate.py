@@ -161,11 +161,11 @@ def simulate(
         from fecontact.integrate.scipy_solvers import longest_step
         from fecontact.integrate.set_valued import integrate_set_valued
 
+        longest = None if max_step is None else longest_step(system, times, max_step)
         found = integrate_set_valued(system, state, times, rtol=rtol, restitution=restitution,
                                      static_coefficient=static_coefficient,
-                                     scheme=scheme or "auto", progress=progress,
-                                     longest=None if max_step is None else longest_step(
-                                         system, times, max_step))
+                                     scheme=scheme or "auto", longest=longest,
+                                     progress=progress)
         times, states, work = found.time, found.states, found.work
         status = found.status
         # With what the run was told, it can be repeated.
