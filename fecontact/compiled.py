@@ -67,7 +67,7 @@ def _source_stamp(path: Path) -> str:
     return stamp.hexdigest()
 
 
-class _StoredCode(IndexDataCacheFile):  # type: ignore[misc]
+class _StoredCode(IndexDataCacheFile):
     """Compiled code on disk, made anew where it cannot be read.
 
     Power cuts and full disks leave files that are cut short, and numba stops at them. Only such
