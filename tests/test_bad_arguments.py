@@ -382,7 +382,8 @@ def names():
     mesh = fecontact.generate(fecontact.Beam(0.1, 0.01, element_size=0.01))
     body = ElasticBody(mesh)
     basis = body.modal_basis(5, contact_nodes=4)
-    system = fecontact.ContactSystem(basis, ground=fecontact.Ground(speed=0.1),
+    system = fecontact.ContactSystem(basis, fecontact.RoughSurface(0.3e6, 5.2e-6, 6.0),
+                                     ground=fecontact.Ground(speed=0.1),
                                      load=fecontact.Load(normal=10.0))
     oscillator = friction_oscillator(2)
     known = {name: getattr(fecontact, name) for name in fecontact.__all__}

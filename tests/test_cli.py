@@ -220,7 +220,7 @@ def test_mistakes_are_one_sentence_and_leave_nothing_behind(tokens, message, cli
 
 def test_settings_of_a_movie_out_of_range(cli, study):
     assert cli("run", study)[0] == 0
-    for option, message in ((["--fps", -1], "fps = -1.0 must be a finite number above zero"),
+    for option, message in ((["--fps", -1], "fps = -1.0 must be a number from 0.01"),
                             (["--frames", 0], "frames = 0 must be at least 1"),
                             (["--size", 5, 5], "must be an even width and height"),
                             (["--start", 7], "no output time"),

@@ -3,33 +3,35 @@
 Slow, so that it is left out by default: ``make test-slow``.
 """
 
+import os
 import random
 import signal
-import subprocess
-import sys
 import time
+import traceback
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from sweep_study import files_below, write_study
+from sweep_study import Serial, files_below, write_study
 from test_cli import TINY
 
-from fecontact import read_case, read_table
+from fecontact import read_case, read_table, sweep
+from fecontact.cli import execute
+from fecontact.integrate import control
+from fecontact.integrate.checkpoint import Checkpoint
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow,
+              pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")]
 
 KILLS = 20
-# A checkpoint after every piece of a run, instead of every minute.
-OFTEN = """
-import sys
-from fecontact.integrate.checkpoint import Checkpoint
-Checkpoint.keep = Checkpoint.write
-from fecontact.cli import execute
-sys.exit(execute(sys.argv[1:]))
+# Driven, so that it never comes to rest: most of the time goes into steps.
+LONG = TINY.replace("t_end = 5e-4, outputs = 11", "t_end = 4.0, outputs = 201").replace(
+    "frames = 3", "frames = 0") + """
+[drive]
+stiffness_x = 1e5
+amplitude_x = 1e-4
+angular_frequency = 600.0
 """
-LONG = TINY.replace("t_end = 5e-4, outputs = 11", "t_end = 4.0, outputs = 2001").replace(
-    "ground = { speed = 0.1 }", "ground = { speed = 0.1, amplitude = 1e-5, wavelength = 0.01 }")
 SWEEP = """
 [sweep]
 batch = 2
@@ -39,28 +41,43 @@ ground.speed = { start = 1e-3, end = 4e-3, count = 60 }
 """
 
 
-def start(*tokens):
-    return subprocess.Popen([sys.executable, "-c", OFTEN, *map(str, tokens)],
-                            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-
-
-def killed(process, moment):
-    """Whether a process was still at work at a moment, at which it was killed."""
+def start(work):
+    """A process that has everything loaded, at work; it ends with 0 if all went well."""
+    child = os.fork()
+    if child:
+        return child
+    code = 1
     try:
-        said = process.communicate(timeout=moment)[1]
-    except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGKILL)
-        process.communicate()
-        return True
-    assert process.returncode == 0, said
-    return False
+        # Checkpoints after every piece of a run, and short pieces.
+        Checkpoint.keep = Checkpoint.write
+        control.finish.__defaults__ = (None, 0.02, None)
+        code = work() or 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(code)
 
 
-def finished(*tokens):
+def ended(child):
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def killed(child, moment):
+    """Whether a process was still at work after some time [s], when it was killed."""
+    end = time.monotonic() + moment
+    while time.monotonic() < end:
+        found, status = os.waitpid(child, os.WNOHANG)
+        if found:
+            assert os.waitstatus_to_exitcode(status) == 0
+            return False
+        time.sleep(0.002)
+    os.kill(child, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+
+
+def time_of(work):
     begin = time.monotonic()
-    process = start(*tokens)
-    said = process.communicate()[1]
-    assert process.returncode == 0, said
+    ended(start(work))
     return time.monotonic() - begin
 
 
@@ -74,67 +91,69 @@ def same(one, other):
     return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
 
-def test_a_killed_run(tmp_path, record_property):
+def test_a_killed_run(tmp_path):
     study = tmp_path / "tiny.toml"
     study.write_text(LONG)
-    finished("run", study, "-o", tmp_path / "warm")
-    lasts = finished("run", study, "-o", tmp_path / "whole")
-    whole = numbers(tmp_path / "whole" / "tiny.vtkhdf")
     folder = tmp_path / "results"
+
+    def run(*tokens):
+        return lambda: execute(["run", str(study), *map(str, tokens)])
+
     # An earlier run with other values, and files of the user's.
-    finished("run", study, "--set", "ground.speed=0.2", "--set", "simulation.t_end=0.01")
+    ended(start(run("--set", "ground.speed=0.2", "--set", "simulation.t_end=0.01")))
+    lasts = time_of(run("-o", tmp_path / "whole"))
+    whole = numbers(tmp_path / "whole" / "tiny.vtkhdf")
     earlier = numbers(folder / "tiny.vtkhdf")
     mine = {folder / name: f"mine: {name}" for name in ("notes.txt", "tiny.txt", "tiny.part")}
     for path, text in mine.items():
         path.write_text(text)
+    checkpoint = folder / "tiny.checkpoint"
     rng = random.Random(11)
     kills = resumed = 0
     while kills < KILLS:
-        checkpoint = folder / "tiny.checkpoint"
         tokens = ["--resume"] if checkpoint.exists() else []
         resumed += bool(tokens)
-        kills += killed(start("run", study, *tokens), rng.uniform(0.2, 1.0) * lasts)
+        kills += killed(start(run(*tokens)), rng.uniform(0.0, 0.7) * lasts)
         assert {path: path.read_text() for path in mine} == mine
         found = numbers(folder / "tiny.vtkhdf")
         assert same(found, earlier) or same(found, whole)
         for picture in folder.glob("*.png"):
             assert imread(picture).size
-    while True:
-        tokens = ["--resume"] if (folder / "tiny.checkpoint").exists() else []
-        finished("run", study, *tokens)
-        if not (folder / "tiny.checkpoint").exists():
-            break
+    ended(start(run(*(["--resume"] if checkpoint.exists() else []))))
+    assert not checkpoint.exists()
     assert same(numbers(folder / "tiny.vtkhdf"), whole)
-    record_property("resumed", resumed)
-    assert resumed > KILLS // 4
+    assert resumed >= KILLS // 4
+    print(f"{kills} kills, {resumed} runs taken up again, {lasts:.1f} s each")
 
 
 def test_a_killed_sweep(tmp_path):
     study = write_study(tmp_path, SWEEP)
-    lasts = finished("sweep", study, "-o", tmp_path / "whole", "--workers", 2)
+
+    def swept(folder):
+        return lambda: sweep(study, executor=Serial(), folder=folder, resume=True) is None
+
+    lasts = time_of(swept(tmp_path / "whole"))
     whole = results(tmp_path / "whole")
     rng = random.Random(13)
-    kills, round_ = 0, 0
+    kills = rounds = 0
     folder = tmp_path / "sweep0"
-    (folder).mkdir()
-    (folder / "notes.txt").write_text("mine")
     while kills < KILLS:
-        if killed(start("sweep", study, "-o", folder, "--workers", 2, "--resume"),
-                  rng.uniform(0.2, 1.0) * lasts):
+        folder.mkdir(exist_ok=True)
+        (folder / "notes.txt").write_text("mine")
+        if killed(start(swept(folder)), rng.uniform(0.0, 0.5) * lasts):
             kills += 1
         else:
             assert results(folder) == whole
-            round_ += 1
-            folder = tmp_path / f"sweep{round_}"
-            folder.mkdir()
-            (folder / "notes.txt").write_text("mine")
+            rounds += 1
         assert (folder / "notes.txt").read_text() == "mine"
         if (folder / "index.csv").exists():
             assert len(read_table(folder / "index.csv")) == 60
         for path in (folder / "shards").glob("*.json"):
             assert whole[str(path.relative_to(folder))] == path.read_bytes()
-    finished("sweep", study, "-o", folder, "--workers", 2, "--resume")
+        folder = tmp_path / f"sweep{rounds}"
+    ended(start(swept(folder)))
     assert results(folder) == whole
+    print(f"{kills} kills, {rounds} sweeps whole before them, {lasts:.1f} s each")
 
 
 def results(folder):

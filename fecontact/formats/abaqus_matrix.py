@@ -136,7 +136,8 @@ def _table(block: _Block) -> Array:
                     float(word)
                 except ValueError:
                     raise InputError(f"Line {number}: {word[:40]!r} is not a number; write "
-                                     f"matrices with FORMAT=COORDINATE or FORMAT=MATRIX INPUT.") from None
+                                     f"matrices with FORMAT=COORDINATE or FORMAT=MATRIX "
+                                     f"INPUT.") from None
             width = width or len(words)
             if len(words) != width:
                 raise InputError(f"Line {number} has {len(words)} columns, but the lines before "
