@@ -105,7 +105,10 @@ def canard(t, x, p, out):
 
 
 def test_no_folds_on_a_canard():
-    """The whole explosion of van der Pol's orbits lies within 1e-9 of one parameter."""
+    """The whole explosion of van der Pol's orbits lies within 1e-9 of one parameter.
+
+    Where its multipliers grow beyond what numbers hold, the branch may say that it has lost them.
+    """
     field = VectorField.from_function(canard, {"a": 1.2}, 2)
     rest = equilibrium_branch(field, "a", [1.2, 1.2**3 / 3.0 - 1.2], bounds=(0.8, 1.3),
                               direction=-1.0)
@@ -113,7 +116,7 @@ def test_no_folds_on_a_canard():
                               intervals=100, settings=Settings(points=200))
     # Asymptotically 1 - eps / 8 - 3 eps^2 / 32, eps = 0.01 (Zvonkin and Shubin 1984).
     assert orbits.parameter[-1] == pytest.approx(1.0 - 0.01 / 8.0 - 3e-4 / 32.0, abs=2e-6)
-    assert not orbits.special
+    assert {point.kind for point in orbits.special} <= {"unresolved"}
 
 
 def pendulum(t, x, p, out):
@@ -127,7 +130,7 @@ def test_a_conservative_family_has_no_special_points():
     centre, = rest.of_kind("Hopf")
     assert centre.details["criticality"] == "undecided"
     orbits = orbits_from_hopf(field, rest, centre, bounds=(-0.5, 0.5), intervals=50,
-                              settings=Settings(points=150))
+                              settings=Settings(points=100))
     assert np.abs(orbits.parameter).max() < 1e-8
     assert orbits.points[-1].values["maximum"][0] > 10.0
     assert not orbits.special
