@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
-# Parts of the terms of l1, and of what a change of the Jacobian by itself over the scales would make
-# of it, that are rounding.
+# Parts of the terms of l1, and of what a change of the Jacobian by itself over the scales would
+# make of it, that are rounding.
 _CANCELLED, _CONSTANT = 1e-9, 1e-15
 
 
