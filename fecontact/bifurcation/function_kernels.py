@@ -32,9 +32,9 @@ _complex_rates_at = function_at(COMPLEX_RATES)
 
 # Step of the complex step: its square is lost against one.
 _TINY = 1e-30
-# Widest step of extrapolated differences, and step of those with which the complex step is compared,
-# relative to the state or parameter, or to its scale if that is larger. No powers of two: these
-# might be periods of the function.
+# Widest step of extrapolated differences, and step of those with which the complex step is
+# compared, relative to the state or parameter, or to its scale if that is larger. No powers of two:
+# these might be periods of the function.
 _WIDEST, _CHECK = 2.1e-3, 2.3e-4
 # Halvings of the widest step: enough for a function that changes over 1e-9 of the scale.
 _LEVELS = 36
