@@ -32,9 +32,9 @@ _complex_rates_at = function_at(COMPLEX_RATES)
 
 # Step of the complex step: its square is lost against one.
 _TINY = 1e-30
-# Widest step of extrapolated differences, and step of those with which the complex step is compared,
-# relative to the state or parameter, or to its scale if that is larger. No powers of two: these
-# might be periods of the function.
+# Widest step of extrapolated differences, and step of those with which the complex step is
+# compared, relative to the state or parameter, or to its scale if that is larger. No powers of two:
+# these might be periods of the function.
 _WIDEST, _CHECK = 2.1e-3, 2.3e-4
 # Halvings of the widest step: enough for a function that changes over 1e-9 of the scale.
 _LEVELS = 36
@@ -51,10 +51,10 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
 
     Central differences over steps h that are halved again and again, extrapolated to order six.
     The error is the change from order four to order six, and rounding; the step with the least
-    counts, for each rate, and is kept in orders[3]. What lies between x - h and x + h is seen by f at x: a second difference
-    that does not fall with h^2 shows a function that changes over less than h. Once a rate has
-    converged, the first step at which its error grows is the last one: over shorter ones only
-    rounding is seen, and none at all where it keeps f from changing.
+    counts, for each rate, and is kept in orders[3]. What lies between x - h and x + h is seen by
+    f at x: a second difference that does not fall with h^2 shows a function that changes over less
+    than h. Once a rate has converged, the first step at which its error grows is the last one: over
+    shorter ones only rounding is seen, and none at all where it keeps f from changing.
     """
     value, h = moved[at], _WIDEST * size
     for i in range(len(f)):

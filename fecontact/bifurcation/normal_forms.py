@@ -12,9 +12,8 @@ from fecontact.errors import AnalysisError
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-
-# Parts of the terms of l1, and of what a change of the Jacobian by itself over the scales would make
-# of it, that are rounding.
+# Parts that are rounding: of the terms of l1, and of what it would be if the Jacobian changed by as
+# much as itself over the scales.
 _CANCELLED, _CONSTANT = 1e-9, 1e-15
 
 

@@ -17,9 +17,9 @@ Array = NDArray[np.float64]
 Start = tuple[Collocation, Array, Array]
 
 _CORRECTIONS = 25
-# First amplitudes of orbits at a Hopf point that are tried one after the other. Where the friction law
-# bends strongly, orbits keep the shape of the eigenvector at the smallest ones only; where they lie
-# close to the Hopf point in the parameter, a larger one is told from it.
+# First amplitudes of orbits at a Hopf point that are tried one after the other. Where the friction
+# law bends strongly, orbits keep the shape of the eigenvector at the smallest ones only; where they
+# lie close to the Hopf point in the parameter, a larger one is told from it.
 AMPLITUDES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-2, 1e-7)
 
 
