@@ -6,6 +6,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.arguments import as_path, require_kind
-from fecontact.errors import InputError, MeshError, require_positive
+from fecontact.errors import InputError, MeshError
 from fecontact.formats.groups import Box, named_boundaries, named_points
 from fecontact.formats.inp import read_inp
 from fecontact.formats.med import read_med
@@ -63,8 +64,7 @@ def read_mesh(
         edges or node.
     """
     path = as_path(path, "a mesh")
-    require_positive(str(path), scale=scale)
-    if not 0.0 < scale < np.inf:
+    if not (isinstance(scale, Real) and 0.0 < scale < np.inf):
         raise InputError(f"{path}: scale = {scale!r} (metres per unit of the file) must be a "
                          f"finite number above zero.")
     reader, format_name = _reader(path)

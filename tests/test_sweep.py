@@ -11,7 +11,6 @@ from sweep_study import Serial, files_below, is_alive, write_study
 
 from fecontact import Range, Study, read_case, read_table, sweep
 from fecontact.errors import AnalysisError, InputError
-from fecontact.sweeps import shards
 from fecontact.sweeps.batch import Row, UnwritableError, changed
 from fecontact.sweeps.shards import Store
 from fecontact.sweeps.summaries import functions_for, summarise
@@ -309,7 +308,7 @@ def test_a_full_disk_is_one_sentence_and_finished_cases_stay(study, tmp_path, mo
                 raise OSError(28, "No space left on device")
         return original(source, target)
 
-    monkeypatch.setattr(shards.os, "replace", replace)
+    monkeypatch.setattr(os, "replace", replace)
     with pytest.raises(InputError, match=r"\.json cannot be written \(no space left on device\); "
                                          r".* 1 of 3 cases are kept in .*; go on with --resume"):
         sweep(study, {"ground.speed": speeds}, Serial(), folder=tmp_path / "f", batch=1)
@@ -375,7 +374,7 @@ def test_progress_is_told(study, tmp_path):
     ({"ground.speed": [1.0]}, {"after": 1.0}, "after = 1 must lie before the end of the run"),
     ({"ground.speed": [1.0]}, {"sample": 3}, r"no key 'sample' \(did you mean 'samples'\?\)"),
     ({"ground.speed": [1.0]}, {"executor": 3}, "must have the methods of"),
-    ({"ground.speed": [1.0]}, {"workers": 0}, "workers = 0 must be at least 1"),
+    ({"ground.speed": [1.0]}, {"workers": 0}, "workers = 0 must be a whole number from 1"),
     ({"ground.speed": {"distribution": "normal", "mean": 1.0, "std": 0.1}}, {},
      "ground.speed is a distribution, which method = 'grid' cannot use"),
     ({"load.forces.0.point": ["B"]}, {}, "must be a list of tables of point"),
