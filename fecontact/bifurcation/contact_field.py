@@ -18,8 +18,6 @@ from fecontact.system import ContactSystem
 _DIRECTIONS = ("x", "y", "rotation")
 # Step of central differences in a parameter, relative to its value.
 _STEP = 2e-4
-# A value on its way through zero counts as so much of its base value at least.
-_LEAST = 1e-3
 # Arrays that decide on what is given in time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
@@ -37,7 +35,6 @@ class ContactField(VectorField):
         self.state_names = (*(f"q{i}" for i in modes), *(f"q{i}'" for i in modes),
                             *(f"z{j}.{k + 1}" for j in range(base.basis.contact_nodes)
                               for k in range(base.memory)))
-        self._sizes = np.where(self.values != 0.0, np.abs(self.values), 1.0)
         varying = family.varying
         self._constant_period = varying is not None and not self._moves_forcing(varying)
 
@@ -100,7 +97,7 @@ class ContactField(VectorField):
     def _step(self, values: Array, index: int) -> float:
         """Small beside the value, and beside the widths of the laws where it moves the ground."""
         value = abs(float(values[index]))
-        h = _STEP * max(value, _LEAST * float(self._sizes[index]))
+        h = _STEP * (value if value > 0.0 else 1.0)
         speed, gap = self._moved(values, index, h)
         base = self._family.base
         if speed > 0.0:
