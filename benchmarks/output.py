@@ -32,7 +32,7 @@ def bouncing_beam(element_size: float = 0.00145) -> Trajectory:
     w = 2.0 * np.pi * 100.0 * np.arange(1, basis.modes + 1)
     size = 1e-5 / np.arange(1, basis.modes + 1)
     return Trajectory(system, t, size * np.sin(w * t[:, None]),
-                      size * w * np.cos(w * t[:, None]), np.zeros((len(t), 7)))
+                      size * w * np.cos(w * t[:, None]), np.zeros((len(t), 8)))
 
 
 def best_of(count: int, task) -> float:

@@ -53,7 +53,8 @@ def main(end: float = 1.0) -> None:
     basis = body.modal_basis(12, contact_nodes=20, damping=0.01)
     for friction in (LogarithmicFriction(), fc.ExponentialFriction(0.2, 0.12, smoothing_slope=1e4)):
         system = fc.ContactSystem(
-            basis, friction=friction, ground=fc.Ground(speed=0.01), load=fc.Load(normal=14.0),
+            basis, fc.RoughSurface(stiffness=0.3e6, roughness_height=5.2e-6, damping=6.0),
+            friction=friction, ground=fc.Ground(speed=0.01), load=fc.Load(normal=14.0),
             drive=fc.Drive(stiffness_x=5610.0, damping_x=5.0))
         run = fc.simulate(system, end, outputs=2001)
         late = slice(3 * len(run.time) // 4, None)

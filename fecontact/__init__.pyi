@@ -26,7 +26,7 @@ from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
-from .errors import FecontactError, InputError
+from .errors import FecontactError, InputError, ModelWarning
 from .forcing import forcing_period
 from .formats.matrices import read_matrix
 from .formats.uff import read_uff
@@ -162,6 +162,7 @@ __all__ = [
     "MeasuredSurface",
     "Mesh",
     "ModalBasis",
+    "ModelWarning",
     "NormalLaw",
     "ParabolicSurface",
     "Patch",

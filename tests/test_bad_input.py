@@ -405,7 +405,7 @@ init none/../tiny.toml | --force
 init a.txt | .toml
 init --shape x | --shape
 init tiny.msh/x.toml | tiny.msh
-init --force folder.toml | directory
+init --force folder.toml | folder
 mesh none.toml | none.toml
 mesh folder.toml | folder.toml
 mesh broken.toml | broken.toml

@@ -14,6 +14,9 @@ from fecontact.laws.cycles import cycle_work
 from fecontact.laws.names import law_names
 
 NEEDED = {
+    fc.RoughSurface: (1e6, 1e-5, 3.0), fc.ParabolicSurface: (1e6, 1e-5, 3.0),
+    fc.CosineSurface: (1e6, 1e-5, 3.0), fc.GaussianSurface: (1e6, 1e-5, 3.0),
+    fc.MeasuredSurface: (1e6, 1e-5, 3.0),
     fc.LinearContact: (1e6, 3.0), fc.PowerContact: (1e9, 1.5, 2.0),
     fc.RestitutionContact: (1e9, 0.5, 1.0), fc.ExponentialContact: (10.0, 1e-6),
     fc.PowerLawContact: (1e-4, 1e-9), fc.TwoSidedStop: (1e6, 1e-4, 1.5), fc.PrescribedForce: (3.0,),

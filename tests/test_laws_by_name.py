@@ -27,6 +27,7 @@ GIVEN = {
     "start_frequency_hz": 1.0, "end_frequency_hz": 10.0, "duration": 2.0, "end_speed": 0.2,
     "times": (0.0, 1.0, 2.0), "values": (0.0, 1.0, 0.0), "abscissae": (0.0, 1e-3, 2e-3, 3e-3),
     "abscissa": (0.0, 1e-3, 2e-3, 3e-3), "heights": (0.0, 1e-6, -1e-6, 0.0), "value": 1.0,
+    "time": 0.1,
     "rms_height": 1e-6, "length": 1e-2, "seed": 3, "hurst_exponent": 0.8,
     "start": 0.1, "cut_off_wavelength": 1e-4, "roll_off_wavelength": 5e-3, "kind": "half-sine",
 }

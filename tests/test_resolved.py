@@ -22,7 +22,7 @@ def point_mass(axis, **parts):
     rows["xy".index(axis)] = 1.0
     basis = fc.ModalBasis.from_matrices(
         [[MASS]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
-    return fc.ContactSystem(basis, **parts)
+    return fc.ContactSystem(basis, **{"normal": fc.RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 
 def hit(outputs, t_end=0.05, height=1e-3, **options):

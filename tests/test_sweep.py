@@ -150,7 +150,7 @@ def test_failed_cases_have_reasons_and_do_not_stop_the_others(study, tmp_path, c
            f"above."}
     assert (np.isnan(table.values["amplitude_x"]) == [False, False, True, True]).all()
     lines = (tmp_path / "f/index.csv").read_text().splitlines()
-    assert lines[3].endswith(",failed,ZeroDivisionError: a case that fails")
+    assert lines[3].endswith(",failed,ZeroDivisionError: a case that fails,")
     assert read_table(tmp_path / "f/index.csv").failed == table.failed
     assert len(counts()) == 3
     run(resume=True)
