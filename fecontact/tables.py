@@ -276,7 +276,7 @@ def _converted_to(value: Any, hint: Any, where: str) -> Any:
     if hint is float and isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
     if hint is int and isinstance(value, Integral) and not isinstance(value, bool):
-        if abs(value) >= 2**63:
+        if abs(int(value)) >= 2**63:
             raise OverflowError
         return int(value)
     if hint in (str, bool, types.NoneType) and isinstance(value, hint):

@@ -107,7 +107,7 @@ def frequency_response(
         Where the response is infinite: at frequency zero of a body that nothing holds, or at an
         undamped eigenfrequency; and if there is no equilibrium.
     """
-    require_kind("frequency_response", ContactSystem, body=body)
+    require_kind("frequency_response", (ContactSystem, ModalBasis), body=body)
     basis = body.basis if isinstance(body, ContactSystem) else body
     if kind not in _POWERS:
         raise InputError(f"kind = {kind!r} must be one of {choices(_POWERS)}"
