@@ -1,5 +1,6 @@
 """Compiled code on disk that is cut short, empty or garbage: compiled again, never a crash."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -49,19 +50,25 @@ DAMAGES = {
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_damaged_code_is_compiled_again(tmp_path, stored, suffix, damage):
-    for path in stored.rglob("*"):
-        if path.is_file():
-            copy = tmp_path / path.relative_to(stored)
-            copy.parent.mkdir(exist_ok=True)
-            copy.write_bytes(path.read_bytes())
-    other = tmp_path / "__pycache__" / f"mine{suffix}"
+    # With times of files, by which stored code is known to be that of the source.
+    folder = Path(shutil.copytree(stored, tmp_path / "copy"))
+    other = folder / "__pycache__" / f"mine{suffix}"
     other.write_bytes(b"of somebody else")
     own = [path for path in other.parent.glob(f"*{suffix}") if path != other]
     assert len(own) == 2
     for path in own:
         path.write_bytes(DAMAGES[damage](path.read_bytes()))
-    assert hits(tmp_path) == ["0", "0"]
+    assert hits(folder) == ["0", "0"]
     assert other.read_bytes() == b"of somebody else"
+
+
+def test_whole_code_is_found_and_damaged_code_stored_anew(tmp_path, stored):
+    folder = Path(shutil.copytree(stored, tmp_path / "copy"))
+    assert hits(folder) == ["1", "1"]
+    for path in (folder / "__pycache__").glob("*.nbc"):
+        path.write_bytes(b"")
+    assert hits(folder) == ["0", "0"]
+    assert hits(folder) == ["1", "1"]
 
 
 @pytest.fixture(scope="module")

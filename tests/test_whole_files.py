@@ -310,7 +310,7 @@ def test_a_full_disk_keeps_the_earlier_run_and_its_checkpoint(small_disk, tmp_pa
                           f"simulation.outputs={sys.argv[3]}"]))
     """
     (small_disk / "s.vtkhdf").write_bytes(b"the earlier run")
-    done = in_process(code, study, small_disk, 301, check=False)
+    done = in_process(code, study, small_disk, 601, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1

@@ -45,8 +45,8 @@ class SystemFamily:
     def __init__(
         self, system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str]
     ) -> None:
-        require_kind("parameters", ContactSystem, system=system)
-        require_kind("parameters", Iterable, names=parameters)
+        require_kind("A field of a system", ContactSystem, system=system)
+        require_kind("A field of a system", Iterable, names=parameters)
         given = (parameters if isinstance(parameters, Mapping)
                  else dict.fromkeys([parameters] if isinstance(parameters, str) else parameters))
         self.base = system

@@ -39,7 +39,7 @@ class Variable:
 
 def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
     """What the dimensions stand for: time, names of points, axes, nodes, modes."""
-    require_kind("coordinates", Trajectory, trajectory=trajectory)
+    require_kind("A table of a run", Trajectory, trajectory=trajectory)
     basis = trajectory.system.basis
     return {
         "time": Variable(("time",), trajectory.time, "s"),
@@ -59,7 +59,7 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
     Displacements and velocities [x, y, phi] of B, C and further named points that the body has
     and of the contact nodes, forces and states of these, energies, modal coordinates.
     """
-    require_kind("to_xarray", Trajectory, trajectory=trajectory)
+    require_kind("A table of a run", Trajectory, trajectory=trajectory)
     basis, q, rate = (trajectory.system.basis, trajectory.modal_coordinates,
                       trajectory.modal_velocities)
     points = [basis.point_index(name) for name in _points(trajectory)]
@@ -85,7 +85,7 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
 
     Modal coordinates are left out: they say nothing without the modes.
     """
-    require_kind("columns", Trajectory, trajectory=trajectory)
+    require_kind("A table of a run", Trajectory, trajectory=trajectory)
     names = {key: [str(value) for value in variable.values]
              for key, variable in coordinates(trajectory).items()}
     found: dict[str, NDArray[Any]] = {"time [s]": trajectory.time}

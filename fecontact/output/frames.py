@@ -72,7 +72,7 @@ def require_scale(owner: str, scale: float) -> None:
 
 def require_field(trajectory: Trajectory) -> Field:
     """The modes over the body; InputError if the modal basis holds none."""
-    require_kind("require_field", Trajectory, trajectory=trajectory)
+    require_kind("A picture", Trajectory, trajectory=trajectory)
     field = trajectory.system.basis.field
     if field is None:
         raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "

@@ -110,7 +110,8 @@ def sweep(
     place = Path(folder) if folder is not None else base.results / f"{base.name}-sweep"
     store = Store(place, files=wanted.keep != "none")
     described = place / "sweep.toml"
-    if study.path is not None and described.exists() and described.samefile(study.path):
+    if study.path is not None and described.exists() and (
+            study.path.exists() and described.samefile(study.path)):
         raise InputError(f"The sweep would write {described} in the place of its study; choose "
                          f"another folder, or another name for the study.")
     with _folder(place), store.locked():
