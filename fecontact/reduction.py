@@ -128,7 +128,8 @@ def _quality(
 
 def linear_cells(body: "ElasticBody") -> NDArray[np.int64]:
     """First-order cells between all displacement nodes, counter-clockwise."""
-    dofs = body.basis.element_dofs
+    # Indices are 64-bit integers in files too.
+    dofs = body.basis.element_dofs.astype(np.int64)
     if body.degree == 1:
         cells = dofs.T
     elif len(dofs) == 6:
