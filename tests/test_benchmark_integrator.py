@@ -1,7 +1,5 @@
 """The benchmark of the time integrator, in a short form."""
 
-import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -33,21 +31,3 @@ def test_every_problem_runs(problems, name, part):
                        jac=system.jacobian, rtol=1e-7, atol=1e-11).y.T
     assert np.abs(wanted[-1]).max() > 0.0
     assert problem.error(run.states, wanted) < 2e-3
-
-
-def test_the_table_of_a_problem(problems, monkeypatch, tmp_path, capsys):
-    """`python benchmarks/integrator.py b --quick` on its first period, at two tolerances."""
-    import integrator
-
-    short = problems.shortened(problems.PROBLEMS["b"](), 0.05)
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
-    monkeypatch.setattr(sys, "argv", ["integrator.py", "b", "--quick"])
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(integrator, "PROBLEMS", {"b": lambda: short})
-    monkeypatch.setattr(integrator, "TOLERANCES", [1e-3, 1e-5])
-    monkeypatch.setattr(integrator, "PEERS", {"odeint": integrator.PEERS["odeint"]})
-    integrator.main()
-    said = capsys.readouterr().out
-    assert "b   fecontact        rtol 1.0e-05" in said
-    assert "b   odeint           rtol 1.0e-03" in said
-    assert "ms at error of" in said

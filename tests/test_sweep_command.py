@@ -239,6 +239,6 @@ def test_tables_that_are_none(tmp_path):
         read_table(tmp_path / "x.csv")
     (tmp_path / "f/shards").mkdir(parents=True)
     (tmp_path / f"f/shards/{24 * 'a'}.json").write_text('{"rows": [{"case":')
-    with pytest.raises(InputError, match=r"a\.json is damaged .*; remove it, and its cases"):
+    with pytest.raises(InputError, match=r"a\.json is damaged; remove it, and its cases"):
         sweep(write_study(tmp_path), {"ground.speed": [1.0]}, Serial(), folder=tmp_path / "f",
               resume=True)
