@@ -12,18 +12,7 @@ from fecontact.integrate import bernstein
 
 @njit
 def _nested(parts, b):
-    """c_0 + s (c_1 + (1 - s) (c_2 + s (c_3 + ...))), from the inside out."""
-    degree = len(parts) - 1
-    b[:] = 0.0
-    b[0] = parts[degree]
-    for k in range(degree - 1, -1, -1):
-        have = degree - 1 - k
-        if k % 2 == 0:
-            bernstein.times_s(b, have)
-        else:
-            bernstein.times_rest(b, have)
-        for i in range(have + 2):
-            b[i] += parts[k]
+    bernstein.from_nested(parts, b)
 
 
 @njit
