@@ -16,7 +16,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fecontact import ContactSystem, Ground, ModalBasis, PrescribedForce, ProductFriction
+from fecontact import (
+    ContactSystem,
+    Ground,
+    PrescribedForce,
+    ProductFriction,
+    basis_from_matrices,
+)
 from fecontact.bifurcation.branch import Branch
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
@@ -33,7 +39,7 @@ def two_masses() -> VectorField:
     """The oscillator, its parameter B the normal forces."""
     rows = np.zeros((2, 3, 2))
     rows[:, 0] = np.eye(2)
-    basis = ModalBasis.from_matrices(
+    basis = basis_from_matrices(
         np.diag([2.5, 1.0]), [[3.0, -1.0], [-1.0, 1.0]], {"contact": rows},
         damping=0.2 * np.array([[2.0, -1.0], [-1.0, 1.0]]))
     system = ContactSystem(basis, normal=PrescribedForce((1.0, 1.0)), friction=ProductFriction(),
@@ -48,7 +54,7 @@ def chain(masses: int) -> VectorField:
     rows[:, 0] = np.eye(masses)
     K = 2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
     K[-1, -1] = 1.0
-    basis = ModalBasis.from_matrices(np.eye(masses), K, {"contact": rows}, damping=0.2 * K)
+    basis = basis_from_matrices(np.eye(masses), K, {"contact": rows}, damping=0.2 * K)
     system = ContactSystem(basis, normal=PrescribedForce(np.ones(masses)),
                            friction=ProductFriction(), ground=Ground(speed=1.0))
     return contact_field(system, {"B": (0.5, lambda system, B: system.with_(

@@ -18,6 +18,7 @@ from fecontact import (
     ModalBasis,
     PrescribedForce,
     RoughSurface,
+    modal_basis,
 )
 from fecontact.laws.signals import Constant
 
@@ -124,8 +125,8 @@ def _beam_mesh(columns: int, rows: int = 4, length: float = 0.2, height: float =
 def beam(name: str, nodes: int, modes: int, columns: int, speed: float = 0.01) -> Problem:
     """(d), (e): a free steel beam on a belt, pulled by a spring at its left end."""
     body = ElasticBody(_beam_mesh(columns), Material.named("steel"), 0.01)
-    basis = body.modal_basis(modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
-                             points={"right": (0.2, 0.01)}, damping=0.01)
+    basis = modal_basis(body, modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
+                        points={"right": (0.2, 0.01)}, damping=0.01)
     pull = 9.5
     system = ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0), friction=FRICTION,

@@ -35,8 +35,8 @@ def beam(speed: float = 0.05, nodes: int = 40, modes: int = 20) -> fc.ContactSys
     mesh = fc.Mesh(np.column_stack([x.ravel(), y.ravel()]), cells,
                    {"contact": np.column_stack([number[0, :-1], number[0, 1:]])})
     body = fc.ElasticBody(mesh, fc.Material.named("steel"), 0.01)
-    basis = body.modal_basis(modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
-                             damping=0.01)
+    basis = fc.modal_basis(body, modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
+                           damping=0.01)
     return fc.ContactSystem(
         basis, normal=fc.RoughSurface(0.3e6, 5.2e-6, 6.0),
         friction=fc.ExponentialFriction(0.8, 0.55, 1000.0, 1e6),

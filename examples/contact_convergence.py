@@ -24,6 +24,7 @@ from fecontact import (
     Patch,
     RoughSurface,
     generate,
+    modal_basis,
     simulate,
     static_equilibrium,
 )
@@ -50,8 +51,8 @@ def system(element_size: float, nodes: int, *, spread: bool = True,
            tolerance: float = 0.0) -> ContactSystem:
     """The beam with a number of contact nodes; its load spread over 20 mm, or on one node."""
     body = ElasticBody(generate(Beam(LENGTH, HEIGHT, element_size)), thickness=0.01)
-    basis = body.modal_basis(
-        10, contact_nodes=nodes, reduction="residual", tolerance=tolerance, damping=0.02,
+    basis = modal_basis(
+        body, 10, contact_nodes=nodes, reduction="residual", tolerance=tolerance, damping=0.02,
         B=Patch("B", 0.005) if spread else "B", C=Patch("C", 0.01) if spread else "C")
     return ContactSystem(
         basis,

@@ -164,8 +164,8 @@ def soft_block(nodes: int = 16, youngs_modulus: float = 5e6) -> fc.ContactSystem
     body = fc.ElasticBody(fc.generate(shape), fc.Material(youngs_modulus, 0.3, density),
                           thickness=MASS / (density * width * height))
     return fc.ContactSystem(
-        body.modal_basis(10, contact_nodes=nodes, damping=0.02, B=fc.Patch("B", 0.006), C="top",
-                         reduction="residual", tolerance=0.2), **{**LAWS, "ground": EVEN})
+        fc.modal_basis(body, 10, contact_nodes=nodes, damping=0.02, B=fc.Patch("B", 0.006), C="top",
+                       reduction="residual", tolerance=0.2), **{**LAWS, "ground": EVEN})
 
 
 def figure(runs: dict[str, fc.Trajectory]) -> Any:

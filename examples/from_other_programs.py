@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import eigh
 
-from fecontact import ModalBasis
+from fecontact import ModalBasis, basis_from_matrices, basis_from_modes, modal_basis
 from fecontact.formats.matrices import AssembledMatrix, read_matrix
 from fecontact.formats.uff import read_uff
 from fecontact.normalisation import normalisation
@@ -50,7 +50,7 @@ def from_files(mass: str, mass_name: str | None, stiffness: str,
                stiffness_name: str | None) -> ModalBasis:
     """The basis of two matrices."""
     M, K = read_matrix(DATA / mass, mass_name), read_matrix(DATA / stiffness, stiffness_name)
-    return ModalBasis.from_matrices(M, K, rows(K), modes=MODES, damping=0.01, contact_x=CONTACT_X)
+    return basis_from_matrices(M, K, rows(K), modes=MODES, damping=0.01, contact_x=CONTACT_X)
 
 
 def from_own_modes() -> ModalBasis:
@@ -62,16 +62,16 @@ def from_own_modes() -> ModalBasis:
     print(f"The shapes are normalised to {found.name}, the largest product of two is "
           f"{found.worst_off_diagonal:.0e}.")
     w = np.sqrt(np.where(np.arange(MODES) < 3, 0.0, squares))  # a free plane body: three are rigid
-    return ModalBasis.from_modes(shapes, rows(K), angular_frequencies=w, mass=M, damping=0.01,
-                                 contact_x=CONTACT_X)
+    return basis_from_modes(shapes, rows(K), angular_frequencies=w, mass=M, damping=0.01,
+                            contact_x=CONTACT_X)
 
 
 def bases(count: int | None = None) -> dict[str, ModalBasis]:
     """The basis by each way in, or by so many kinds of files, and by modes."""
     found = {name: from_files(*files) for name, files in list(FILES.items())[:count]}
     found["modes of SciPy"] = from_own_modes()
-    found["universal file"] = read_uff(DATA / "block.uff").modal_basis(
-        contact=range(101, 106), B=106, C=113)
+    found["universal file"] = modal_basis(
+        read_uff(DATA / "block.uff"), contact=range(101, 106), B=106, C=113)
     return found
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import root
 
-from fecontact import ElasticBody, Material, ModalBasis, Pendulum, generate
+from fecontact import ElasticBody, Material, ModalBasis, Pendulum, generate, modal_basis
 
 THICKNESS = 0.0196
 TARGET = np.array([0.092, 230.0, 0.600])
@@ -38,7 +38,7 @@ class Calibration:
 
 def pendulum_basis(body: ElasticBody, modes: int = 4, nodes: int = 3) -> ModalBasis:
     """Modes of the pendulum: rotation, first bending and so on, damped by 3 %."""
-    return body.modal_basis(modes, contact_nodes=nodes, damping=0.03)
+    return modal_basis(body, modes, contact_nodes=nodes, damping=0.03)
 
 
 def modal_numbers(basis: ModalBasis) -> np.ndarray:

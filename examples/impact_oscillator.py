@@ -21,10 +21,10 @@ from fecontact import (
     ConstantFriction,
     ContactSystem,
     Drive,
-    ModalBasis,
     RoughSurface,
     Study,
     Trajectory,
+    basis_from_matrices,
     lyapunov_exponents,
     sensitivity,
     simulate,
@@ -64,7 +64,7 @@ def two_mode_system(bending_hz: float = 230.0, ratio: float = 0.600,
     row = np.array([1.0, ratio]) / np.sqrt(REDUCED_MASS)
     rows = np.zeros((3, 2))
     rows[1] = row
-    basis = ModalBasis.from_matrices(
+    basis = basis_from_matrices(
         np.eye(2), np.diag([0.0, (2.0 * np.pi * bending_hz) ** 2]), {"contact": rows[None],
                                                                     "B": rows},
         damping=(0.0, damping))

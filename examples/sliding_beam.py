@@ -34,9 +34,9 @@ def system(beam: fc.ElasticBody, nodes: int = 40, modes: int = 12, **basis: Any
            ) -> fc.ContactSystem:
     """The beam on moving waves, with numbers of contact nodes and modes."""
     return fc.ContactSystem(
-        beam.modal_basis(modes, contact_nodes=nodes, B=fc.Patch("B", 0.004),
-                         C=fc.Patch("C", 0.01), points={"end": (LENGTH, HEIGHT / 2)},
-                         damping=0.02, **basis),
+        fc.modal_basis(beam, modes, contact_nodes=nodes, B=fc.Patch("B", 0.004),
+                       C=fc.Patch("C", 0.01), points={"end": (LENGTH, HEIGHT / 2)},
+                       damping=0.02, **basis),
         normal=fc.RoughSurface(stiffness=5e7, roughness_height=20e-6, damping=2e3),
         friction=fc.ExponentialFriction(static_coefficient=0.5, kinetic_coefficient=0.35,
                                         decay=2.0, smoothing_slope=1e4),

@@ -22,7 +22,7 @@ FRICTION = "friction.friction_coefficient"
 def system(friction: float = 0.0, load: float = 14.0) -> fc.ContactSystem:
     """The beam, held by a spring at its left end."""
     body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)), thickness=0.01)
-    basis = body.modal_basis(20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
+    basis = fc.modal_basis(body, 20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
     return fc.ContactSystem(
         basis, normal=fc.RoughSurface(stiffness=10e6, roughness_height=10e-6, damping=40.0),
         friction=fc.ConstantFriction(friction, smoothing_slope=1e6),

@@ -30,6 +30,7 @@ from fecontact import (
     PrescribedForce,
     ProductFriction,
     basins,
+    basis_from_matrices,
     contact_field,
     equilibrium_branch,
     find_equilibrium,
@@ -55,7 +56,7 @@ def basis(D: float = 0.1) -> ModalBasis:
     """The masses, moving along the belt only."""
     rows = np.zeros((2, 3, 2))
     rows[:, 0] = np.eye(2)
-    return ModalBasis.from_matrices(
+    return basis_from_matrices(
         np.diag([2.5, 1.0]), [[3.0, -1.0], [-1.0, 1.0]], {"contact": rows},
         damping=2.0 * D * np.array([[2.0, -1.0], [-1.0, 1.0]]))
 

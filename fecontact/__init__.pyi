@@ -4,16 +4,17 @@ from .analysis.quantities import history
 from .analysis.receptance import frequency_response
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from .analysis.window import window
+from .assembled import basis_from_matrices
 from .basis import ModalBasis
 from .basis_report import BasisReport
 from .bifurcation.basins import Attractor, Axis, Basins, basins
 from .bifurcation.branch import Branch
-from .bifurcation.branch_file import load_branches, save_branches
 from .bifurcation.brute_force import BruteForce, brute_force
 from .bifurcation.contact_field import contact_field
 from .bifurcation.curves import fold_curve, hopf_curve
 from .bifurcation.equilibria import find_equilibrium
 from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
+from .bifurcation.function_field import vector_field
 from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
 from .bifurcation.observation import motion_of, observe
 from .bifurcation.orbit_curves import orbit_curve
@@ -26,6 +27,7 @@ from .bifurcation.stability_map import stability_map
 from .bifurcation.vector_field import VectorField
 from .body import ElasticBody, Material
 from .damping import LossFactor, Rayleigh
+from .eigen import eigenfrequencies_hz
 from .errors import FecontactError, InputError, ModelWarning
 from .forcing import forcing_period
 from .formats.matrices import read_matrix
@@ -75,6 +77,7 @@ from .laws.transients import Pulse, Step, Tabulated
 from .mesh import Mesh
 from .mesh_io import read_mesh, write_mesh
 from .mode_convergence import mode_convergence
+from .normalisation import basis_from_modes
 from .output.analysis_plots import (
     plot_friction_work,
     plot_poincare,
@@ -83,10 +86,12 @@ from .output.analysis_plots import (
     plot_spectrum,
 )
 from .output.basin_plots import plot_basins
+from .output.branches import read_branch, read_branches, write_branch, write_branches
 from .output.dataset import to_xarray
 from .output.diagram_extras import Inset, phase_inset
 from .output.diagrams import plot_branches
 from .output.export import export_csv, export_mat, export_netcdf
+from .output.hdf5 import read_basis, write_basis
 from .output.movie import picture, render
 from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from .output.pvd import export_pvd
@@ -94,6 +99,7 @@ from .output.stability_plots import plot_eigenvalues, plot_stability_map
 from .output.store import read_case, write_case
 from .output.sweep_plots import plot_sobol, plot_strobed, plot_sweep
 from .points import Patch
+from .reduction import modal_basis
 from .rows import rows_from_dofs
 from .statics import static_equilibrium
 from .study import Study
@@ -202,12 +208,15 @@ __all__ = [
     "amplitude",
     "amplitude_spectrum",
     "basins",
+    "basis_from_matrices",
+    "basis_from_modes",
     "brute_force",
     "check_law",
     "contact_field",
     "count_periods",
     "dask_executor",
     "doubled_by_shooting",
+    "eigenfrequencies_hz",
     "ensemble",
     "equilibrium_branch",
     "event",
@@ -226,9 +235,9 @@ __all__ = [
     "history",
     "hopf_curve",
     "hopf_orbits_by_shooting",
-    "load_branches",
     "lyapunov_exponents",
     "memory_friction_law",
+    "modal_basis",
     "mode_convergence",
     "motion_of",
     "normal_law",
@@ -261,6 +270,9 @@ __all__ = [
     "plot_sweep",
     "power_spectral_density",
     "quantity_range",
+    "read_basis",
+    "read_branch",
+    "read_branches",
     "read_case",
     "read_matrix",
     "read_mesh",
@@ -268,7 +280,6 @@ __all__ = [
     "read_uff",
     "render",
     "rows_from_dofs",
-    "save_branches",
     "sensitivity",
     "settled_motion",
     "simulate",
@@ -283,7 +294,11 @@ __all__ = [
     "sweep",
     "switched_branch",
     "to_xarray",
+    "vector_field",
     "window",
+    "write_basis",
+    "write_branch",
+    "write_branches",
     "write_case",
     "write_mesh",
 ]

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.basis import ModalBasis
 from fecontact.damping import Damping, LossFactor, Rayleigh, modal_damping
-from fecontact.eigen import FreeSystem, free_modes
+from fecontact.eigen import FreeSystem, fixed_signs, free_modes
 from fecontact.errors import InputError
-from fecontact.field import fixed_signs
 from fecontact.formats.matrices import AssembledMatrix
 from fecontact.null_space import lowest_vectors, null_space, relative_energies
 from fecontact.rows import GivenRows, gathered_rows
@@ -48,18 +47,54 @@ class Given:
         return replace(self, matrix=self.matrix[~dofs][:, ~dofs].tocsc(), labels=labels)
 
 
-def basis_of_matrices(
+def basis_from_matrices(
     mass: Any,
     stiffness: Any,
     rows: Mapping[str, Any],
     *,
-    damping: Any,
-    modes: int | None,
-    rigid: int | None,
-    contact_x: ArrayLike | None,
-    tributary: ArrayLike | None,
+    damping: Any = 0.0,
+    modes: int | None = None,
+    rigid: int | None = None,
+    contact_x: ArrayLike | None = None,
+    tributary: ArrayLike | None = None,
 ) -> ModalBasis:
-    """Modal basis of given matrices; see :meth:`fecontact.basis.ModalBasis.from_matrices`."""
+    """Basis of given matrices, for bodies meshed elsewhere or chains of masses.
+
+    Rigid modes are the displacements that the stiffness does not resist; they get the
+    frequency zero. The first of the largest components of each mode is positive.
+
+    Parameters
+    ----------
+    mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
+        Symmetric; the mass positive definite [kg], the stiffness positive semi-definite
+        [N/m]. Degrees of freedom with a stiffness of 1e35 or more on the diagonal are held.
+    rows : mapping
+        ``contact``: displacements x, y and rotation of each of the n contact nodes from the d
+        degrees of freedom, as (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several
+        contact groups a mapping of their names to such rows. ``B``, ``C``
+        and further named points: dense or sparse (3, d); B and C are zero when left out.
+        Two rows, x and y, in the place of three mean no rotation.
+        :func:`fecontact.rows.rows_from_dofs` makes them from numbers.
+    damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
+        Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
+        given degrees of freedom, dense, sparse or AssembledMatrix [N s/m].
+    modes : int, optional
+        Number m of modes, the rigid ones included, lowest first; all, up to d = 2000.
+    rigid : int, optional
+        Number of rigid modes, for stiffness matrices that carry few digits or were
+        condensed; found from the stiffness when left out.
+    contact_x, tributary : (n,) arrays, optional
+        Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes
+        [m].
+
+    Raises
+    ------
+    InputError
+        For matrices that are not square, of one size, finite, symmetric or definite as
+        required, and for rows of another width.
+    AnalysisError
+        If the modes cannot be computed accurately.
+    """
     M, K = given_matrix("mass", mass), given_matrix("stiffness", stiffness)
     same_dofs(M, K)
     d = M.matrix.shape[0]

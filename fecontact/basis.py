@@ -2,19 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fecontact.arguments import as_floats, as_integers, require_kind
-from fecontact.damping import Damping
 from fecontact.errors import InputError, choices, nearest
 from fecontact.field import Field, Quality
-
-if TYPE_CHECKING:
-    from fecontact.basis_report import BasisReport
 
 Array = NDArray[np.float64]
 
@@ -151,113 +145,6 @@ class ModalBasis:
         index = names.index(point)
         return index if index < 2 else index + self.contact_nodes
 
-    @classmethod
-    def from_matrices(
-        cls,
-        mass: Any,
-        stiffness: Any,
-        rows: Mapping[str, Any],
-        *,
-        damping: Any = 0.0,
-        modes: int | None = None,
-        rigid: int | None = None,
-        contact_x: ArrayLike | None = None,
-        tributary: ArrayLike | None = None,
-    ) -> "ModalBasis":
-        """Basis of given matrices, for bodies meshed elsewhere or chains of masses.
-
-        Rigid modes are the displacements that the stiffness does not resist; they get the
-        frequency zero. The first of the largest components of each mode is positive.
-
-        Parameters
-        ----------
-        mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
-            Symmetric; the mass positive definite [kg], the stiffness positive semi-definite
-            [N/m]. Degrees of freedom with a stiffness of 1e35 or more on the diagonal are held.
-        rows : mapping
-            ``contact``: displacements x, y and rotation of each of the n contact nodes from the d
-            degrees of freedom, as (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several
-            contact groups a mapping of their names to such rows. ``B``, ``C``
-            and further named points: dense or sparse (3, d); B and C are zero when left out.
-            Two rows, x and y, in the place of three mean no rotation.
-            :func:`fecontact.rows.rows_from_dofs` makes them from numbers.
-        damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
-            Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
-            given degrees of freedom, dense, sparse or AssembledMatrix [N s/m].
-        modes : int, optional
-            Number m of modes, the rigid ones included, lowest first; all, up to d = 2000.
-        rigid : int, optional
-            Number of rigid modes, for stiffness matrices that carry few digits or were
-            condensed; found from the stiffness when left out.
-        contact_x, tributary : (n,) arrays, optional
-            Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes
-            [m].
-
-        Raises
-        ------
-        InputError
-            For matrices that are not square, of one size, finite, symmetric or definite as
-            required, and for rows of another width.
-        AnalysisError
-            If the modes cannot be computed accurately.
-        """
-        from fecontact.assembled import basis_of_matrices
-
-        return basis_of_matrices(mass, stiffness, rows, damping=damping, modes=modes, rigid=rigid,
-                                 contact_x=contact_x, tributary=tributary)
-
-    @classmethod
-    def from_modes(
-        cls,
-        shapes: ArrayLike,
-        rows: Mapping[str, Any],
-        *,
-        frequencies_hz: ArrayLike | None = None,
-        angular_frequencies: ArrayLike | None = None,
-        mass: Any = None,
-        modal_mass: ArrayLike | None = None,
-        damping: Damping = 0.0,
-        orthogonality: float = 1e-3,
-        contact_x: ArrayLike | None = None,
-        tributary: ArrayLike | None = None,
-    ) -> "ModalBasis":
-        """Basis of modes that were computed elsewhere or measured.
-
-        The shapes are scaled to unit modal mass, ordered by frequency, and their signs fixed;
-        :func:`fecontact.normalisation.normalisation` says how they were scaled.
-
-        Parameters
-        ----------
-        shapes : (d, m) array
-            Real mode shapes, one a column.
-        rows : mapping
-            As for :meth:`from_matrices`.
-        frequencies_hz, angular_frequencies : (m,) array
-            One of the two [Hz, rad/s]; exactly zero for rigid modes.
-        mass : dense or sparse (d, d) array, or AssembledMatrix
-            Mass matrix [kg], to find the scale of the shapes and check that they are orthogonal.
-        modal_mass : float or (m,) array
-            In the place of a mass matrix: the shapes' modal masses, 1 for mass-normalised shapes.
-        damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
-            Ratios in the order of the shapes, Rayleigh factors, a loss factor, or the modal
-            damping matrix of the mass-normalised shapes [1/s].
-        orthogonality : float
-            Largest product ``|s_i^T M s_j|`` of two mass-normalised shapes that is accepted.
-        contact_x, tributary : (n,) arrays, optional
-            As for :meth:`from_matrices`.
-
-        Raises
-        ------
-        InputError
-            For arrays that do not fit, and for shapes that are complex or not mass-orthogonal.
-        """
-        from fecontact.normalisation import basis_of_modes
-
-        return basis_of_modes(
-            shapes, rows, frequencies_hz=frequencies_hz, angular_frequencies=angular_frequencies,
-            mass=mass, modal_mass=modal_mass, damping=damping, orthogonality=orthogonality,
-            contact_x=contact_x, tributary=tributary)
-
     @property
     def elastic_compliance(self) -> Array:
         """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes."""
@@ -317,31 +204,3 @@ class ModalBasis:
                 participation=quality.participation[:, chosen],
                 vibration_modes=int(np.count_nonzero(chosen < quality.vibration_modes))),
         )
-
-    def report(self) -> "BasisReport":
-        """How good the basis is, as numbers and as a text; see :class:`BasisReport`."""
-        from fecontact.basis_report import BasisReport
-
-        return BasisReport(self)
-
-    def save(self, path: str | Path) -> None:
-        """Write the basis to an HDF5 file, whole or not at all."""
-        from fecontact.output.hdf5 import new_file, write_basis
-
-        with new_file(path) as file:
-            write_basis(file.create_group("basis"), self)
-
-    @classmethod
-    def load(cls, path: str | Path) -> "ModalBasis":
-        """Read a basis that :meth:`save` wrote, or that of a case; exact to the last bit.
-
-        Raises
-        ------
-        InputError
-            If there is no such file, or it holds no basis or a damaged one.
-        """
-        from fecontact.output.hdf5 import open_file, read_basis
-        from fecontact.stored import member
-
-        with open_file(path, "basis") as file:
-            return read_basis(member(file, "basis"))

@@ -1,16 +1,14 @@
 """The elastic body: mesh, material and supports as stiffness and mass."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.arguments import require_kind
-from fecontact.basis import ModalBasis
-from fecontact.damping import Damping
 from fecontact.errors import (
     InputError,
     MeshError,
@@ -21,11 +19,7 @@ from fecontact.errors import (
 )
 from fecontact.memory import require_memory
 from fecontact.mesh import Mesh
-from fecontact.supports import check_supports, expansion, fixed_dofs
-
-if TYPE_CHECKING:
-    from fecontact.points import Place
-    from fecontact.reduction import Reduction
+from fecontact.supports import check_supports, expansion, fixed_dofs, hinges
 
 Array = NDArray[np.float64]
 
@@ -129,7 +123,7 @@ class ElasticBody:
         require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
                        _UNKNOWNS[corners, degree] * _BYTES[corners],
                        ", by a larger element_size, or triangles or degree = 1")
-        check_supports(self)
+        check_supports(self.mesh, self.fixed)
         pieces = _pieces(self.mesh)
         if pieces > 1:
             raise MeshError(f"The mesh falls into {pieces} pieces that share no node; a body must "
@@ -192,9 +186,7 @@ class ElasticBody:
     @cached_property
     def gradients(self) -> tuple[Any, Any]:
         """Derivatives to x and y at the nodes, sparse (N, N): means of the adjoining elements."""
-        from fecontact.points import nodal_gradients
-
-        return nodal_gradients(self)
+        return _nodal_gradients(self.basis)
 
     @property
     def elasticity(self) -> tuple[float, float, float]:
@@ -209,12 +201,24 @@ class ElasticBody:
     @cached_property
     def fixed_dofs(self) -> NDArray[np.int64]:
         """Degrees of freedom held at zero by the supports, ascending."""
-        return fixed_dofs(self)
+        return fixed_dofs(self.fixed, self._supported)
 
     @cached_property
     def expansion(self) -> Any:
         """All degrees of freedom from the free ones, sparse (2 N, f); see the supports."""
-        return expansion(self)
+        return expansion(self.nodes, self.fixed_dofs, self.hinges)
+
+    @cached_property
+    def hinges(self) -> list[tuple[NDArray[np.int64], Array]]:
+        """Nodes and centre (2,) [m] of each boundary that turns rigidly about its centre."""
+        return hinges(self.mesh, self.nodes, self.fixed, self._supported)
+
+    @cached_property
+    def _supported(self) -> dict[str, NDArray[np.int64]]:
+        # Meshes may hold a group both ways; only the boundary has the nodes in the middle of edges.
+        boundaries, points = self.mesh.boundaries, self.mesh.points
+        return {name: np.unique(self.edge_nodes(boundaries[name])) if name in boundaries
+                else np.asarray(points[name]) for name in self.fixed}
 
     def edge_nodes(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
         """Displacement nodes (k, degree + 1) of mesh edges (k, 2): start, (middle,) end."""
@@ -228,71 +232,6 @@ class ElasticBody:
         middle = size + order[np.searchsorted(keys, ends[:, 0] * size + ends[:, 1])]
         return np.column_stack([edges[:, 0], middle, edges[:, 1]])
 
-    def angular_frequencies(self, count: int = 20) -> Array:
-        """The lowest eigenfrequencies [rad/s], exactly zero for rigid modes."""
-        from fecontact.eigen import eigenmodes
-
-        return eigenmodes(self, count)[0]
-
-    def frequencies_hz(self, count: int = 20) -> Array:
-        """The lowest eigenfrequencies [Hz], exactly zero for rigid modes."""
-        return self.angular_frequencies(count) / (2.0 * np.pi)
-
-    def modal_basis(
-        self,
-        modes: int = 20,
-        *,
-        contact: str | Sequence[str] = "contact",
-        contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]] = "all",
-        B: "Place | None" = None,
-        C: "Place | None" = None,
-        points: "Mapping[str, Place] | None" = None,
-        damping: Damping = 0.0,
-        reduction: "Reduction" = "vibration",
-        tolerance: float = 0.1,
-    ) -> ModalBasis:
-        """Mass-normalised modes, and T at B, C and the contact nodes.
-
-        Parameters
-        ----------
-        modes : int
-            Number of modes, the rigid ones included, lowest first.
-        contact : str or sequence of str
-            Boundary that touches the ground; its outward normal must point down, to -y. Several
-            boundaries are as many contact groups, which may have laws of their own.
-        contact_nodes : int or 'all', or one of them for each boundary
-            Number of equal segments of the contact boundary, each with a node in its middle that
-            moves with the segment's mean displacement; or every displacement node of the
-            boundary.
-        B, C : place, optional
-            Excitation and load point: the name of a point or boundary of the mesh, (x, y), or
-            :class:`~fecontact.points.Patch`. Default: the mesh's point of that name; without
-            one, the rows are zero.
-        points : mapping of name to place, optional
-            Further points to observe.
-        damping : float, (m,) sequence, Rayleigh or (m, m) array
-            See :func:`fecontact.damping.modal_damping`; modes that complete the given number
-            take the last ratio.
-        reduction : 'vibration', 'residual' or 'craig-bampton'
-            The lowest vibration modes alone; these completed by residual vectors of forces at
-            B, C and the contact nodes, so that static deflections there are right; or that many
-            fixed-interface modes with constraint modes.
-        tolerance : float
-            For 'residual': the part of its own static compliance that may be missing at any of
-            these points, in x or y. Zero keeps all residual vectors; the larger, the fewer.
-
-        Raises
-        ------
-        InputError, MeshError
-            For names that do not exist, places outside the body, an upward contact face, more
-            modes than unknowns, more contact nodes than the boundary has.
-        """
-        from fecontact.reduction import reduce_body
-
-        return reduce_body(self, modes, contact=contact, contact_nodes=contact_nodes, B=B, C=C,
-                           points=points or {}, damping=damping, reduction=reduction,
-                           tolerance=tolerance)
-
 
 def _pieces(mesh: Mesh) -> int:
     import scipy.sparse as sp
@@ -302,3 +241,29 @@ def _pieces(mesh: Mesh) -> int:
     graph = sp.coo_array((np.ones(first.size), (first, mesh.cells[:, 1:].ravel())),
                          shape=(len(mesh.nodes),) * 2)
     return int(connected_components(graph, directed=False, return_labels=False))
+
+
+def _nodal_gradients(basis: Any) -> tuple[Any, Any]:
+    """Derivatives to x and to y at the nodes, sparse (N, N).
+
+    Each is the mean over the adjoining elements, weighted by their areas, of the gradient that
+    the element has at the node.
+    """
+    import scipy.sparse as sp
+
+    local = basis.elem.doflocs.T
+    dofs = basis.element_dofs.T
+    area = basis.dx.sum(axis=1)
+    count, size = basis.doflocs.shape[1], dofs.shape[1]
+    slopes = np.stack([basis.elem.gbasis(basis.mapping, local, i)[0].grad for i in range(size)])
+    # slopes: (function, direction, element, node)
+    slopes = np.moveaxis(slopes, (0, 1, 2, 3), (3, 0, 1, 2)) * area[None, :, None, None]
+    row = np.broadcast_to(dofs[:, :, None], slopes.shape[1:]).ravel()
+    column = np.broadcast_to(dofs[:, None, :], slopes.shape[1:]).ravel()
+    around = np.bincount(dofs.ravel(), np.repeat(area, size), minlength=count)
+    dx, dy = (
+        sp.csr_array(sp.coo_array((slope.ravel() / around[row], (row, column)),
+                                  shape=(count, count)))
+        for slope in slopes
+    )
+    return dx, dy

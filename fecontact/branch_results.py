@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fecontact.bifurcation.branch import Branch, BranchPoint
-from fecontact.bifurcation.branch_file import save_branches
-from fecontact.console import progress_bar, write_text
+from fecontact.console import progress_bar
+from fecontact.core.folders import write_text
+from fecontact.output.branches import write_branches
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.brute_force import BruteForce
@@ -22,7 +23,7 @@ _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "per
             "frequency_hz", "minimum", "maximum", "amplitude", "criticality", "parameter_error")
 
 
-def write_branches(
+def write_branch_results(
     result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
     beneath: "BruteForce | None" = None,
 ) -> list[Path]:
@@ -30,7 +31,7 @@ def write_branches(
     from fecontact.output.diagrams import plot_branches
     from fecontact.output.stability_plots import plot_eigenvalues
 
-    files = [save_branches(folder / f"{name}-branch.h5", result.found)]
+    files = [write_branches(folder / f"{name}-branch.h5", result.found)]
     table = folder / f"{name}-branch.csv"
     write_text(table, branches_csv(result.found))
     files.append(table)

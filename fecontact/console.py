@@ -1,18 +1,13 @@
-"""What commands show while they work, on stderr, and the files and folders they write to."""
+"""What commands show while they work, on stderr, and how signals end them."""
 
 import os
 import signal
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from types import FrameType
-
-from fecontact.errors import InputError
-from fecontact.whole_files import replaced
 
 INTERRUPTED = 130  # exit code after Ctrl-C
 _ENDING = ("SIGTERM", "SIGHUP")
@@ -144,64 +139,3 @@ def _leave_terminal(descriptors: list[int]) -> None:
         for descriptor in descriptors:
             os.dup2(nowhere, descriptor)
         os.close(nowhere)
-
-
-@contextmanager
-def held_back_interrupt() -> Iterator[Callable[[], None]]:
-    """A function that raises KeyboardInterrupt if Ctrl-C has come since the block began.
-
-    For libraries that call back into Python and swallow an exception that is raised there, or are
-    left in disorder by it. Where Ctrl-C is ignored it stays so.
-    """
-    came: list[int] = []
-
-    def check() -> None:
-        if came:
-            raise KeyboardInterrupt
-
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield check
-        return
-    signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
-    try:
-        yield check
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def output_folder(folder: Path) -> Iterator[Path]:
-    """A folder that can be written, made if need be; unmade if nothing was put there.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made or written.
-    """
-    made = [path for path in (folder, *folder.parents) if not path.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        _remove_empty(made)
-        raise InputError(f"The folder {folder} cannot be written "
-                         f"({(error.strerror or str(error)).lower()}); choose another "
-                         f"one.") from None
-    try:
-        yield folder
-    finally:
-        _remove_empty(made)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    with output_folder(path.parent), replaced(path) as part:
-        part.write_text(text, encoding="utf-8")
-
-
-def _remove_empty(folders: list[Path]) -> None:
-    for path in folders:
-        with suppress(OSError):
-            path.rmdir()

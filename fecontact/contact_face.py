@@ -3,17 +3,15 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.arguments import require_kind
+from fecontact.body import ElasticBody
 from fecontact.errors import InputError, choices
 from fecontact.points import Pieces, edge_weights, node_matrix, patch_rows
-
-if TYPE_CHECKING:
-    from fecontact.body import ElasticBody
 
 Array = NDArray[np.float64]
 
@@ -32,7 +30,7 @@ class ContactNodes:
 
 
 def contact_groups(
-    body: "ElasticBody", boundaries: str | Sequence[str],
+    body: ElasticBody, boundaries: str | Sequence[str],
     counts: Literal["all"] | int | Sequence[int | Literal["all"]],
 ) -> ContactNodes:
     """Contact nodes on one or several boundaries, one boundary after the other.
@@ -71,7 +69,7 @@ def contact_groups(
 
 
 def contact_nodes(
-    body: "ElasticBody", boundary: str, count: int | Literal["all"]
+    body: ElasticBody, boundary: str, count: int | Literal["all"]
 ) -> ContactNodes:
     """Contact nodes on a named boundary, in the order in which they lie along it.
 
@@ -122,7 +120,7 @@ def contact_nodes(
     )
 
 
-def _check_faces_down(body: "ElasticBody", boundary: str) -> None:
+def _check_faces_down(body: ElasticBody, boundary: str) -> None:
     outline = {(min(e), max(e)): e for e in map(tuple, body.mesh.outline.tolist())}
     edges = np.array([outline[min(e), max(e)]
                       for e in map(tuple, body.mesh.boundary(boundary).tolist())])
@@ -164,7 +162,7 @@ def _in_order(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
     return along if closed else np.append(along, nodes[-1, -1])
 
 
-def _lengths(body: "ElasticBody", nodes: NDArray[np.int64]) -> Array:
+def _lengths(body: ElasticBody, nodes: NDArray[np.int64]) -> Array:
     ends = body.nodes[nodes[:, -1]] - body.nodes[nodes[:, 0]]
     return np.asarray(np.linalg.norm(ends, axis=1))
 
@@ -177,7 +175,7 @@ def _shared_out(count: int, totals: Array) -> list[int]:
     return [int(share) for share in shares]
 
 
-def _cut(body: "ElasticBody", nodes: NDArray[np.int64], count: int) -> list[Pieces]:
+def _cut(body: ElasticBody, nodes: NDArray[np.int64], count: int) -> list[Pieces]:
     length = _lengths(body, nodes)
     reached = np.concatenate([[0.0], np.cumsum(length)])
     cuts = np.linspace(0.0, reached[-1], count + 1)

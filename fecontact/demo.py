@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fecontact.console import loading, output_folder, progress_bar, write_text
+from fecontact.console import loading, progress_bar
+from fecontact.core.folders import output_folder, write_text
 from fecontact.errors import MissingLibraryError
 from fecontact.templates import TEMPLATES, template
 

@@ -2,20 +2,17 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
+from fecontact.body import ElasticBody
 from fecontact.compiled import block, kernel, matrix, vector
 from fecontact.errors import AnalysisError, InputError
 from fecontact.factorisation import Factors, factorised
-from fecontact.field import fixed_signs
-from fecontact.supports import rigid_modes
-
-if TYPE_CHECKING:
-    from fecontact.body import ElasticBody
 
 Array = NDArray[np.float64]
 
@@ -43,7 +40,7 @@ class FreeSystem:
     component_mass: Any = None
 
     @classmethod
-    def of(cls, body: "ElasticBody") -> "FreeSystem":
+    def of(cls, body: ElasticBody) -> "FreeSystem":
         """The free degrees of freedom of a body."""
         E = body.expansion
         rigid = rigid_modes(body)
@@ -111,7 +108,16 @@ class FreeSystem:
         return self.without_rigid(deflection)
 
 
-def eigenmodes(body: "ElasticBody", count: int) -> tuple[Array, Array]:
+def eigenfrequencies_hz(body: ElasticBody, count: int = 20) -> Array:
+    """The lowest eigenfrequencies (m,) of a body [Hz], exactly zero for rigid modes.
+
+    Raises as :func:`eigenmodes`.
+    """
+    require_kind("eigenfrequencies_hz", ElasticBody, body=body)
+    return eigenmodes(body, count)[0] / (2.0 * np.pi)
+
+
+def eigenmodes(body: ElasticBody, count: int) -> tuple[Array, Array]:
     """The lowest angular frequencies (m,) [rad/s] and mass-normalised shapes (2 N, m).
 
     Rigid modes that the supports leave are built from the geometry: frequency exactly zero,
@@ -132,6 +138,37 @@ def eigenmodes(body: "ElasticBody", count: int) -> tuple[Array, Array]:
     return w, shapes
 
 
+def rigid_modes(body: ElasticBody) -> Array:
+    """Mass-normalised rigid modes (2 N, r) that the supports leave, r = 0 ... 3.
+
+    Translation in x, in y, and a counter-clockwise rotation about the place where the lines of
+    the held displacements meet, about the centre of mass where they leave it open.
+    """
+    M = body.mass
+    x, y = body.nodes.T
+    held_x, held_y = (body.fixed_dofs[body.fixed_dofs % 2 == axis] // 2 for axis in range(2))
+    centres = np.array([centre for _, centre in body.hinges]).reshape(-1, 2)
+    lines_x = np.concatenate([x[held_y], centres[:, 0]])
+    lines_y = np.concatenate([y[held_x], centres[:, 1]])
+    ones = np.zeros(2 * len(x))
+    ones[0::2] = 1.0
+    inertia = (M @ ones)[0::2] / (ones @ (M @ ones))
+    pivot_x = lines_x.mean() if lines_x.size else inertia @ x
+    pivot_y = lines_y.mean() if lines_y.size else inertia @ y
+    shapes = np.column_stack([ones, np.roll(ones, 1)])[:, [not lines_y.size, not lines_x.size]]
+    off = np.concatenate([lines_x - pivot_x, lines_y - pivot_y])
+    if np.abs(off).max(initial=0.0) <= 1e-9 * body.mesh.extent:
+        rotation = np.column_stack([pivot_y - y, x - pivot_x]).ravel()
+        rotation[body.fixed_dofs] = 0.0
+        shapes = np.column_stack([shapes, rotation])
+    for column in range(shapes.shape[1]):
+        for _ in range(2):
+            earlier = shapes[:, :column]
+            shapes[:, column] -= earlier @ (earlier.T @ (M @ shapes[:, column]))
+        shapes[:, column] /= np.sqrt(shapes[:, column] @ (M @ shapes[:, column]))
+    return shapes
+
+
 def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     """The same over the free degrees of freedom: frequencies (m,) and shapes (f, m)."""
     unknowns = system.stiffness.shape[0]
@@ -147,7 +184,7 @@ def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
             np.hstack([rigid, shapes * fixed_signs(shapes)]))
 
 
-def strain_energies(body: "ElasticBody", shapes: Array) -> Array:
+def strain_energies(body: ElasticBody, shapes: Array) -> Array:
     """Strain energies (m,) [J] of displacement fields (2 N, m), from the strains in the elements.
 
     The product with K would lose the digits by which the stiffest cells exceed the body as a
@@ -240,3 +277,14 @@ def backward_error(K: Any, M: Any, squares: Array, shapes: Array) -> Array:
 def _largest(K: Any, M: Any) -> float:
     """An upper bound of the largest squared frequency, from element-like diagonal ratios."""
     return float(10.0 * (K.diagonal() / M.diagonal()).max())
+
+
+def fixed_signs(shapes: Array) -> Array:
+    """Signs (m,) that make the first of the largest components of each column positive.
+
+    Components within one per cent of the largest count as equal to it, so that round-off
+    between the two ends of a symmetric body does not decide.
+    """
+    size = np.abs(shapes)
+    first = np.argmax(size >= 0.99 * size.max(axis=0), axis=0)
+    return np.where(shapes[first, np.arange(shapes.shape[1])] < 0.0, -1.0, 1.0)

@@ -66,14 +66,3 @@ class Quality:
     orthogonality: float
     participation: Array
     compliance: Array
-
-
-def fixed_signs(shapes: Array) -> Array:
-    """Signs (m,) that make the first of the largest components of each column positive.
-
-    Components within one per cent of the largest count as equal to it, so that round-off
-    between the two ends of a symmetric body does not decide.
-    """
-    size = np.abs(shapes)
-    first = np.argmax(size >= 0.99 * size.max(axis=0), axis=0)
-    return np.where(shapes[first, np.arange(shapes.shape[1])] < 0.0, -1.0, 1.0)

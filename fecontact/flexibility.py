@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.eigen import FreeSystem
-from fecontact.field import fixed_signs
+from fecontact.eigen import FreeSystem, fixed_signs
 from fecontact.substitution import SymmetricFactors
 
 Array = NDArray[np.float64]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fecontact.arguments import require_kind
 from fecontact.basis import ModalBasis
+from fecontact.basis_report import BasisReport
 from fecontact.body import ElasticBody
 
 Array = NDArray[np.float64]
@@ -106,7 +107,7 @@ def mode_convergence(
         frequencies_hz=np.array([basis.frequencies_hz[first : first + shown] for basis in meshes]),
         compliance=np.array([_compliance(basis).mean(axis=0) for basis in meshes]),
         modes=np.array(counts),
-        missing=np.array([basis.report().contact_error.max(axis=0) for basis in bases]),
+        missing=np.array([BasisReport(basis).contact_error.max(axis=0) for basis in bases]),
     )
 
 

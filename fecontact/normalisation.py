@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.assembled import assembled_basis, given_matrix
 from fecontact.basis import ModalBasis
 from fecontact.damping import Damping, LossFactor, Rayleigh
+from fecontact.eigen import fixed_signs
 from fecontact.errors import InputError
-from fecontact.field import fixed_signs
 from fecontact.rows import gathered_rows
 
 Array = NDArray[np.float64]
@@ -81,20 +81,49 @@ def normalisation(shapes: ArrayLike, mass: Any) -> Normalisation:
     return Normalisation(name, masses, float(coupling[first, second]), (int(first), int(second)))
 
 
-def basis_of_modes(
+def basis_from_modes(
     shapes: ArrayLike,
     rows: Mapping[str, Any],
     *,
-    frequencies_hz: ArrayLike | None,
-    angular_frequencies: ArrayLike | None,
-    mass: Any,
-    modal_mass: ArrayLike | None,
-    damping: Damping,
-    orthogonality: float,
-    contact_x: ArrayLike | None,
-    tributary: ArrayLike | None,
+    frequencies_hz: ArrayLike | None = None,
+    angular_frequencies: ArrayLike | None = None,
+    mass: Any = None,
+    modal_mass: ArrayLike | None = None,
+    damping: Damping = 0.0,
+    orthogonality: float = 1e-3,
+    contact_x: ArrayLike | None = None,
+    tributary: ArrayLike | None = None,
 ) -> ModalBasis:
-    """Modal basis of given modes; see :meth:`fecontact.basis.ModalBasis.from_modes`."""
+    """Basis of modes that were computed elsewhere or measured.
+
+    The shapes are scaled to unit modal mass, ordered by frequency, and their signs fixed;
+    :func:`normalisation` says how they were scaled.
+
+    Parameters
+    ----------
+    shapes : (d, m) array
+        Real mode shapes, one a column.
+    rows : mapping
+        As for :func:`~fecontact.assembled.basis_from_matrices`.
+    frequencies_hz, angular_frequencies : (m,) array
+        One of the two [Hz, rad/s]; exactly zero for rigid modes.
+    mass : dense or sparse (d, d) array, or AssembledMatrix
+        Mass matrix [kg], to find the scale of the shapes and check that they are orthogonal.
+    modal_mass : float or (m,) array
+        In the place of a mass matrix: the shapes' modal masses, 1 for mass-normalised shapes.
+    damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
+        Ratios in the order of the shapes, Rayleigh factors, a loss factor, or the modal
+        damping matrix of the mass-normalised shapes [1/s].
+    orthogonality : float
+        Largest product ``|s_i^T M s_j|`` of two mass-normalised shapes that is accepted.
+    contact_x, tributary : (n,) arrays, optional
+        As for :func:`~fecontact.assembled.basis_from_matrices`.
+
+    Raises
+    ------
+    InputError
+        For arrays that do not fit, and for shapes that are complex or not mass-orthogonal.
+    """
     S = _shapes(shapes)
     d, m = S.shape
     w = _frequencies(frequencies_hz, angular_frequencies, m)

@@ -1,4 +1,4 @@
-"""Units of parameters, from the docstrings of the classes that have them."""
+"""Labels of parameters with their units, from the docstrings of the classes that have them."""
 
 import re
 from collections.abc import Iterator
@@ -6,28 +6,28 @@ from dataclasses import is_dataclass
 from functools import cache
 from typing import Any, get_args, get_type_hints
 
+from fecontact.core.docstrings import documented
 from fecontact.laws.names import is_kind, law_names
-from fecontact.study import Study
-from fecontact.study_keys import documented
+from fecontact.system import ContactSystem
 
 
-def parameter_label(name: str) -> str:
+def parameter_label(name: str, owner: type = ContactSystem) -> str:
     """A parameter's name as the label of an axis, with its unit where there is one.
 
-    ``ground.speed`` becomes ``ground speed [m/s]``. Names that are no keys of study files, and
-    those whose unit differs from law to law, stay without.
+    ``ground.speed`` becomes ``ground speed [m/s]``. Names that are no parameters of ``owner``, a
+    dataclass, and those whose unit differs from law to law, stay without.
     """
     inner = re.sub(r"^contact\.[^.]+\.", "", name)
-    units = _units().get(inner, frozenset())
+    units = _units(owner).get(inner, frozenset())
     words = re.sub(r"\b(\w+) \1\b", r"\1", re.sub(r"[._]", " ", name.removeprefix("contact.")))
     return f"{words} [{next(iter(units))}]" if len(units) == 1 else words
 
 
 @cache
-def _units() -> dict[str, frozenset[str]]:
+def _units(owner: type) -> dict[str, frozenset[str]]:
     """Units of each dotted name; several or none where the laws do not agree on one."""
     found: dict[str, set[str]] = {"gap": {"m"}}
-    for entry, hint in get_type_hints(Study).items():
+    for entry, hint in get_type_hints(owner).items():
         section = entry.removesuffix("_settings")
         for place, cls in _classes(hint, section):
             for names, meaning in documented(cls):

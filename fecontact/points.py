@@ -6,15 +6,13 @@ the nodes, so that both do the same virtual work.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.body import ElasticBody
 from fecontact.errors import InputError, MeshError, choices, nearest, require_positive
-
-if TYPE_CHECKING:
-    from fecontact.body import ElasticBody
 
 Array = NDArray[np.float64]
 
@@ -60,7 +58,7 @@ class Pieces:
     end: Array
 
 
-def place_rows(body: "ElasticBody", place: Place, name: str) -> Rows:
+def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
     """Rows of a place: a mesh point, a boundary, coordinates or a patch.
 
     Raises
@@ -94,12 +92,12 @@ def place_rows(body: "ElasticBody", place: Place, name: str) -> Rows:
     return _inner_rows(body, centre, name)
 
 
-def node_rows(body: "ElasticBody", node: int) -> Rows:
+def node_rows(body: ElasticBody, node: int) -> Rows:
     """Rows of a displacement node; its rotation is that of the adjoining elements there."""
     return Rows(node_matrix(body, np.array([node])), body.nodes[node])
 
 
-def node_matrix(body: "ElasticBody", nodes: NDArray[np.int64]) -> Any:
+def node_matrix(body: ElasticBody, nodes: NDArray[np.int64]) -> Any:
     """Rows (3 k, 2 N) of k displacement nodes, one after the other."""
     import scipy.sparse as sp
 
@@ -112,7 +110,7 @@ def node_matrix(body: "ElasticBody", nodes: NDArray[np.int64]) -> Any:
     return sp.csr_array(sum(sp.kron(matrix, pattern) for matrix, pattern in parts))
 
 
-def patch_rows(body: "ElasticBody", pieces: Pieces) -> Rows:
+def patch_rows(body: ElasticBody, pieces: Pieces) -> Rows:
     """Rows of a patch of the outline: its length-weighted best-fitting rigid motion.
 
     The displacement is the mean over the patch, the rotation the mean moment of the
@@ -145,37 +143,10 @@ def whole(nodes: NDArray[np.int64]) -> Pieces:
     return Pieces(nodes, np.zeros(len(nodes)), np.ones(len(nodes)))
 
 
-def edge_weights(body: "ElasticBody", nodes: NDArray[np.int64]) -> Array:
+def edge_weights(body: ElasticBody, nodes: NDArray[np.int64]) -> Array:
     """Integrals (k, degree + 1) of the shape functions over whole edges [m]."""
     _, values, lengths = _sampled(whole(nodes), body.nodes)
     return np.einsum("kg,kgn->kn", lengths, values)
-
-
-def nodal_gradients(body: "ElasticBody") -> tuple[Any, Any]:
-    """Derivatives to x and to y at the nodes, sparse (N, N).
-
-    Each is the mean over the adjoining elements, weighted by their areas, of the gradient that
-    the element has at the node.
-    """
-    import scipy.sparse as sp
-
-    basis = body.basis
-    local = basis.elem.doflocs.T
-    dofs = basis.element_dofs.T
-    area = basis.dx.sum(axis=1)
-    count, size = len(body.nodes), dofs.shape[1]
-    slopes = np.stack([basis.elem.gbasis(basis.mapping, local, i)[0].grad for i in range(size)])
-    # slopes: (function, direction, element, node)
-    slopes = np.moveaxis(slopes, (0, 1, 2, 3), (3, 0, 1, 2)) * area[None, :, None, None]
-    row = np.broadcast_to(dofs[:, :, None], slopes.shape[1:]).ravel()
-    column = np.broadcast_to(dofs[:, None, :], slopes.shape[1:]).ravel()
-    around = np.bincount(dofs.ravel(), np.repeat(area, size), minlength=count)
-    dx, dy = (
-        sp.csr_array(sp.coo_array((slope.ravel() / around[row], (row, column)),
-                                  shape=(count, count)))
-        for slope in slopes
-    )
-    return dx, dy
 
 
 def _sampled(
@@ -193,7 +164,7 @@ def _sampled(
     return pieces.nodes, values, (length * half)[:, None] * _WEIGHTS
 
 
-def _within(body: "ElasticBody", centre: Array, radius: float) -> Pieces:
+def _within(body: ElasticBody, centre: Array, radius: float) -> Pieces:
     nodes = body.edge_nodes(body.mesh.outline)
     begin = body.nodes[nodes[:, 0]] - centre
     along = body.nodes[nodes[:, -1]] - centre - begin
@@ -209,7 +180,7 @@ def _within(body: "ElasticBody", centre: Array, radius: float) -> Pieces:
     return Pieces(nodes[kept], start[kept], end[kept])
 
 
-def _centre(body: "ElasticBody", at: str | tuple[float, float], name: str) -> Array:
+def _centre(body: ElasticBody, at: str | tuple[float, float], name: str) -> Array:
     if isinstance(at, str):
         if at not in body.mesh.points:
             raise MeshError(f"Point {name}: the mesh has no point '{at}'"
@@ -222,7 +193,7 @@ def _centre(body: "ElasticBody", at: str | tuple[float, float], name: str) -> Ar
     return centre
 
 
-def _node_set_rows(body: "ElasticBody", nodes: NDArray[np.int64]) -> Rows:
+def _node_set_rows(body: ElasticBody, nodes: NDArray[np.int64]) -> Rows:
     """Rows of several nodes: their best-fitting rigid motion, all weighted alike."""
     import scipy.sparse as sp
 
@@ -236,7 +207,7 @@ def _node_set_rows(body: "ElasticBody", nodes: NDArray[np.int64]) -> Rows:
     return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), centre)
 
 
-def _inner_rows(body: "ElasticBody", place: Array, name: str) -> Rows:
+def _inner_rows(body: ElasticBody, place: Array, name: str) -> Rows:
     import scipy.sparse as sp
 
     basis = body.basis

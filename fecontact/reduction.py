@@ -1,13 +1,14 @@
 """From the finite-element body to its modal basis."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.arguments import as_floats, require_kind
 from fecontact.basis import ModalBasis
+from fecontact.body import ElasticBody
 from fecontact.contact_face import contact_groups
 from fecontact.craig_bampton import craig_bampton
 from fecontact.damping import Damping, LossFactor, Rayleigh, modal_damping
@@ -17,31 +18,67 @@ from fecontact.field import Field, Quality
 from fecontact.flexibility import Flexibility, residual_modes
 from fecontact.points import Place, Rows, place_rows
 
-if TYPE_CHECKING:
-    from fecontact.body import ElasticBody
-
 Array = NDArray[np.float64]
 
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
 
-def reduce_body(
-    body: "ElasticBody",
-    modes: int,
+def modal_basis(
+    body: ElasticBody,
+    modes: int = 20,
     *,
-    contact: str | Sequence[str],
-    contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]],
-    B: Place | None,
-    C: Place | None,
-    points: Mapping[str, Place],
-    damping: Damping,
-    reduction: Reduction,
-    tolerance: float,
+    contact: str | Sequence[str] = "contact",
+    contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]] = "all",
+    B: Place | None = None,
+    C: Place | None = None,
+    points: Mapping[str, Place] | None = None,
+    damping: Damping = 0.0,
+    reduction: Reduction = "vibration",
+    tolerance: float = 0.1,
 ) -> ModalBasis:
-    """Modal basis of a body; see :meth:`fecontact.body.ElasticBody.modal_basis`."""
+    """Mass-normalised modes, and T at B, C and the contact nodes.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        The finite-element body.
+    modes : int
+        Number of modes, the rigid ones included, lowest first.
+    contact : str or sequence of str
+        Boundary that touches the ground; its outward normal must point down, to -y. Several
+        boundaries are as many contact groups, which may have laws of their own.
+    contact_nodes : int or 'all', or one of them for each boundary
+        Number of equal segments of the contact boundary, each with a node in its middle that
+        moves with the segment's mean displacement; or every displacement node of the
+        boundary.
+    B, C : place, optional
+        Excitation and load point: the name of a point or boundary of the mesh, (x, y), or
+        :class:`~fecontact.points.Patch`. Default: the mesh's point of that name; without
+        one, the rows are zero.
+    points : mapping of name to place, optional
+        Further points to observe.
+    damping : float, (m,) sequence, Rayleigh or (m, m) array
+        See :func:`fecontact.damping.modal_damping`; modes that complete the given number
+        take the last ratio.
+    reduction : 'vibration', 'residual' or 'craig-bampton'
+        The lowest vibration modes alone; these completed by residual vectors of forces at
+        B, C and the contact nodes, so that static deflections there are right; or that many
+        fixed-interface modes with constraint modes.
+    tolerance : float
+        For 'residual': the part of its own static compliance that may be missing at any of
+        these points, in x or y. Zero keeps all residual vectors; the larger, the fewer.
+
+    Raises
+    ------
+    InputError, MeshError
+        For names that do not exist, places outside the body, an upward contact face, more
+        modes than unknowns, more contact nodes than the boundary has.
+    """
     import scipy.sparse as sp
 
+    require_kind("modal_basis", ElasticBody, body=body)
+    points = {} if points is None else points
     require_kind("points", Mapping, points=points)
     require_finite("modal_basis", tolerance=tolerance)
     for name in points:
@@ -111,7 +148,7 @@ def _modes(
 
 
 def _quality(
-    body: "ElasticBody", system: FreeSystem, flexibility: Flexibility, w: Array, shapes: Array,
+    body: ElasticBody, system: FreeSystem, flexibility: Flexibility, w: Array, shapes: Array,
     vibration: int,
 ) -> Quality:
     inertia = system.mass @ shapes
@@ -126,7 +163,7 @@ def _quality(
     )
 
 
-def linear_cells(body: "ElasticBody") -> NDArray[np.int64]:
+def linear_cells(body: ElasticBody) -> NDArray[np.int64]:
     """First-order cells between all displacement nodes, counter-clockwise."""
     # Indices are 64-bit integers in files too.
     dofs = body.basis.element_dofs.astype(np.int64)
@@ -145,7 +182,7 @@ def linear_cells(body: "ElasticBody") -> NDArray[np.int64]:
     return np.where((ux * vy - uy * vx < 0.0)[:, None], cells[:, ::-1], cells)
 
 
-def modal_stress(body: "ElasticBody", shapes: Array) -> Array:
+def modal_stress(body: ElasticBody, shapes: Array) -> Array:
     """Stresses xx, yy, zz, xy (N, 4, m) of displacement fields (2 N, m), means at nodes [Pa]."""
     dx, dy = body.gradients
     direct, lateral, shear = body.elasticity
@@ -156,7 +193,7 @@ def modal_stress(body: "ElasticBody", shapes: Array) -> Array:
     return np.stack([sxx, syy, szz, shear * slide], axis=1)
 
 
-def _point(body: "ElasticBody", place: Place | None, name: str) -> Rows:
+def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
     import scipy.sparse as sp
 
     if place is None:

@@ -42,7 +42,7 @@ def rows_from_dofs(
     C: Place | None = None,
     points: Mapping[str, Place] | None = None,
 ) -> dict[str, Any]:
-    """Rows for :meth:`ModalBasis.from_matrices` from numbers of degrees of freedom.
+    """Rows for :meth:`basis_from_matrices` from numbers of degrees of freedom.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def rows_from_dofs(
 
 
 def gathered_rows(rows: Mapping[str, Any], d: int) -> GivenRows:
-    """All rows as one sparse matrix; see :meth:`ModalBasis.from_matrices` for the forms.
+    """All rows as one sparse matrix; see :meth:`basis_from_matrices` for the forms.
 
     Raises
     ------

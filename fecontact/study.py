@@ -18,7 +18,7 @@ from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
-from fecontact.laws.names import with_folder
+from fecontact.laws.names import PART_CLASSES, with_folder
 from fecontact.mesh import Mesh
 from fecontact.study_branch import BranchSettings
 from fecontact.study_geometry import Geometry, MeshFile, geometry_from_table, geometry_table
@@ -34,7 +34,6 @@ from fecontact.study_system import contact_system
 from fecontact.sweeps.settings import SweepSettings, flat_axes
 from fecontact.system import ContactSystem
 from fecontact.tables import (
-    PART_CLASSES,
     convert,
     from_table,
     located,

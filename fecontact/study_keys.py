@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
+from fecontact.core.docstrings import documented
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Crown
 from fecontact.laws.names import is_kind, law_names
@@ -43,23 +44,6 @@ def study_keys(section: str | None = None) -> str:
         raise InputError(f"Study files have no section [{name}]{nearest(name, parts)}; there are: "
                          f"{choices(parts)}.")
     return parts[name].rstrip() + "\n"
-
-
-def documented(cls: type) -> list[tuple[tuple[str, ...], str]]:
-    """Parameters of a class and what its docstring says of them, those together that stand so.
-
-    Where it says nothing of a parameter but its values, these.
-    """
-    text = inspect.getdoc(cls) or ""
-    found = re.search(r"^Parameters\n-+\n(.*?)(?:\n\n\w[\w ]*\n-+\n|\Z)", text, re.S | re.M)
-    entries: list[tuple[tuple[str, ...], str, list[str]]] = []
-    for line in (found.group(1) if found else "").splitlines():
-        if line and not line.startswith(" "):
-            names, _, values = line.partition(" : ")
-            entries.append((tuple(name.strip() for name in names.split(",")), values, []))
-        elif line.strip():
-            entries[-1][2].append(line.strip())
-    return [(names, " ".join(lines) or values) for names, values, lines in entries]
 
 
 def _parts() -> Iterator[tuple[str, str]]:

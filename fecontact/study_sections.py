@@ -20,6 +20,7 @@ from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.mesh import Mesh
 from fecontact.output.frames import require_frame_rate, require_scale
 from fecontact.points import Patch
+from fecontact.reduction import modal_basis
 from fecontact.tables import located
 
 Place = str | tuple[float, float] | Patch
@@ -170,8 +171,8 @@ class BasisSettings:
         """The modal basis of a body."""
         given = self.damping
         damping: Damping = LossFactor(given.loss_factor) if isinstance(given, Loss) else given
-        basis = body.modal_basis(
-            self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
+        basis = modal_basis(
+            body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
             C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
             damping=damping)
         if self.dashpots:

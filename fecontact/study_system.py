@@ -8,9 +8,10 @@ import numpy as np
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Crown, gap_values
+from fecontact.laws.names import PART_CLASSES
 from fecontact.laws.soundness import require_sound
 from fecontact.system import NO_NORMAL_LAW, ContactSystem
-from fecontact.tables import PART_CLASSES, located
+from fecontact.tables import located
 
 if TYPE_CHECKING:
     from fecontact.study import Study

@@ -5,30 +5,50 @@ import re
 import sys
 import tomllib
 import types
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from numbers import Integral, Real
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from fecontact.basis import ModalBasis
 from fecontact.errors import FecontactError, InputError, choices, nearest
-from fecontact.laws.contract import FrictionLaw, NormalLaw
-from fecontact.laws.drive import Drive, Load
-from fecontact.laws.ground import Ground
-from fecontact.laws.names import is_kind, law_class, name_of
-from fecontact.system import ContactSystem
 
 T = TypeVar("T")
 
-PART_CLASSES: Mapping[str, type] = {
-    "normal": NormalLaw, "friction": FrictionLaw, "ground": Ground, "drive": Drive, "load": Load,
-}
-
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """Classes whose subclasses are told apart in tables by the key ``law``.
+
+    Attributes
+    ----------
+    is_kind : function
+        Whether a type is one of these classes.
+    law_class : function
+        The subclass of such a class by its name, which may be None; the last argument is where
+        the name stands, for messages.
+    name_of : function
+        The name of an instance of a subclass; None for a default and for all other instances.
+    """
+
+    is_kind: Callable[[Any], bool]
+    law_class: Callable[[type, Any, str], type]
+    name_of: Callable[[Any], str | None]
+
+
+_kinds = Kinds(lambda hint: False, lambda kind, name, where: kind, lambda instance: None)
+
+
+def register_kinds(kinds: Kinds) -> None:
+    """Let tables hold the subclasses of these classes by name."""
+    global _kinds
+    _kinds = kinds
+
 
 _DEEPEST = 30  # tables and lists within each other; studies need less than ten
 
@@ -111,8 +131,8 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
     """
     if not isinstance(table, Mapping):
         raise InputError(f"{where} must be a table of keys and values, not {shown(table)}.")
-    if is_kind(cls):
-        chosen = law_class(cls, table.get("law"), where)
+    if _kinds.is_kind(cls):
+        chosen = _kinds.law_class(cls, table.get("law"), where)
         parameters = {key: value for key, value in table.items() if key != "law"}
         return cast(T, from_table(chosen, parameters, where))
     hints = _hints(cast(Any, cls))
@@ -146,7 +166,7 @@ def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
         Whether fields that have their default value are in the table; those that are None never
         are.
     """
-    name = name_of(instance)
+    name = _kinds.name_of(instance)
     table: dict[str, Any] = {} if name is None else {"law": name}
     for entry in fields(instance):
         value = getattr(instance, entry.name)
@@ -154,45 +174,6 @@ def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
         if value is not None and (defaults or default is MISSING or value != default):
             table[entry.name] = plain(value)
     return table
-
-
-def system_tables(system: ContactSystem) -> dict[str, Any]:
-    """Laws, ground, drive, load and gap of a contact system as tables."""
-    tables: dict[str, Any] = {}
-    for part in PART_CLASSES:
-        given = getattr(system, part)
-        if isinstance(given, Mapping):
-            for group, law in given.items():
-                tables.setdefault("contact", {}).setdefault(group, {})[part] = to_table(law)
-        else:
-            tables[part] = to_table(given)
-    tables["gap"] = plain(system.gap)
-    return tables
-
-
-def system_from_tables(
-    basis: ModalBasis, tables: Mapping[str, Any], where: str = "The system"
-) -> ContactSystem:
-    """The contact system of a basis and tables ``normal``, ``friction``, ... , ``gap``."""
-    parts = system_parts(tables, where, PART_CLASSES)
-    groups = convert(tables.get("contact", {}), Mapping[str, Mapping[str, Any]], where, "contact")
-    for group, laws in groups.items():
-        for part, table in laws.items():
-            require_known(part, ("normal", "friction"), f"{where}: [contact.{group}]")
-            if not isinstance(parts.get(part), dict):
-                parts[part] = {}
-            parts[part][group] = from_table(PART_CLASSES[part], table,
-                                            f"{where}: [contact.{group}.{part}]")
-    gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
-    return ContactSystem(basis, gap=gap, **parts)
-
-
-def system_parts(
-    tables: Mapping[str, Any], where: str, names: Iterable[str]
-) -> dict[str, Any]:
-    """Those of the parts of :func:`system_tables` that are named."""
-    return {part: from_table(PART_CLASSES[part], tables.get(part, {}), f"{where}: [{part}]")
-            for part in names if part in tables or part != "normal"}
 
 
 def require_known(key: str, valid: Mapping[str, Any] | Sequence[str], where: str) -> None:
@@ -329,7 +310,7 @@ def _words(hint: Any, plural: bool) -> list[str]:
     if origin is tuple:
         number = "" if args[-1] is Ellipsis else f"{_COUNTS.get(len(args), len(args))} "
         return [f"{'lists' if plural else 'a list'} of {number}{described(args[0], plural=True)}"]
-    content = ("a law and its parameters" if is_kind(hint) else
+    content = ("a law and its parameters" if _kinds.is_kind(hint) else
                ", ".join(entry.name for entry in fields(hint)) if is_dataclass(hint)
                else f"names and {described(args[1], plural=True)}")
     return [f"{'tables' if plural else 'a table'} of {content}"]

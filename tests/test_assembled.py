@@ -5,13 +5,14 @@ import pytest
 import scipy.sparse as sp
 from meshes_for_tests import rectangle, skewed
 
-from fecontact.basis import ModalBasis
+from fecontact.assembled import basis_from_matrices
 from fecontact.body import ElasticBody
 from fecontact.damping import LossFactor, Rayleigh
 from fecontact.errors import InputError
 from fecontact.formats.matrices import AssembledMatrix
-from fecontact.normalisation import normalisation
+from fecontact.normalisation import basis_from_modes, normalisation
 from fecontact.null_space import null_space, relative_energies
+from fecontact.reduction import modal_basis
 from fecontact.rows import rows_from_dofs
 
 SUPPORTS = {"free": {}, "hinged": {"hinge": "xy"}, "on rollers": {"left": "x"},
@@ -23,7 +24,7 @@ def body_and_matrices(columns, rows, fixed, warp=None):
     body = ElasticBody(rectangle(0.1, 0.05, columns, rows, warp=warp,
                                  points={"hinge": (0.0, 0.025), "B": (0.1, 0.05)}), fixed=fixed)
     free = np.setdiff1d(np.arange(2 * len(body.nodes)), body.fixed_dofs)
-    basis = body.modal_basis(12, contact="bottom", contact_nodes=3, damping=0.01)
+    basis = modal_basis(body, 12, contact="bottom", contact_nodes=3, damping=0.01)
     restriction = basis.field.restriction[:, free]
     given = {"B": restriction[:3], "C": restriction[3:6], "contact": restriction[6:]}
     return basis, body.mass[free][:, free], body.stiffness[free][:, free], given
@@ -49,10 +50,10 @@ def test_matrices_give_the_basis_of_their_body(fixed, columns):
     """The dense solver below 600 degrees of freedom, Lanczos above."""
     expected, M, K, rows = body_and_matrices(columns, columns // 2, fixed)
     assert (M.shape[0] > 600) == (columns == 24)
-    sparse = ModalBasis.from_matrices(M, K, rows, modes=12, damping=0.01)
+    sparse = basis_from_matrices(M, K, rows, modes=12, damping=0.01)
     assert_same(sparse, expected)
     assert sparse.damping_ratios == pytest.approx(expected.damping_ratios, rel=1e-12)
-    dense = ModalBasis.from_matrices(M.toarray(), K.toarray(), rows, modes=12)
+    dense = basis_from_matrices(M.toarray(), K.toarray(), rows, modes=12)
     assert dense.angular_frequencies == pytest.approx(sparse.angular_frequencies, rel=1e-12)
     assert np.abs(dense.T - sparse.T).max() < 1e-9 * np.abs(sparse.T).max()
 
@@ -61,15 +62,15 @@ def test_matrices_give_the_basis_of_their_body(fixed, columns):
 def test_a_turned_and_skewed_body(columns):
     _, M, K, _ = body_and_matrices(columns, columns // 2, {}, warp=skewed)
     x = np.zeros((1, 3, M.shape[0]))
-    basis = ModalBasis.from_matrices(M, K, {"contact": x}, modes=6)
+    basis = basis_from_matrices(M, K, {"contact": x}, modes=6)
     assert basis.rigid_modes == 3
 
 
 def test_all_modes_are_kept_without_a_number():
     expected, M, K, rows = body_and_matrices(3, 1, {})
-    basis = ModalBasis.from_matrices(M, K, rows)
+    basis = basis_from_matrices(M, K, rows)
     assert basis.modes == M.shape[0]
-    assert_same(ModalBasis.from_matrices(M, K, rows, modes=12), expected)
+    assert_same(basis_from_matrices(M, K, rows, modes=12), expected)
     # All modes span everything: Phi Phi^T = M^-1.
     inverse = np.linalg.inv(M.toarray())
     T = basis.T_matrix
@@ -81,7 +82,7 @@ def test_all_modes_are_kept_without_a_number():
 
 def test_fewer_modes_than_rigid_ones():
     _, M, K, rows = body_and_matrices(6, 3, {})
-    basis = ModalBasis.from_matrices(M, K, rows, modes=2)
+    basis = basis_from_matrices(M, K, rows, modes=2)
     assert basis.angular_frequencies.tolist() == [0.0, 0.0]
 
 
@@ -96,7 +97,7 @@ def test_soft_springs_are_not_taken_for_rigid():
     softened = sp.lil_array(K)
     for corner in (0, 12 * 25):
         softened[2 * corner, 2 * corner] += k
-    basis = ModalBasis.from_matrices(M, softened, {"contact": np.zeros((1, 3, d))}, modes=4)
+    basis = basis_from_matrices(M, softened, {"contact": np.zeros((1, 3, d))}, modes=4)
     assert basis.rigid_modes == 1
     tilt = 2.0 * k * 0.025**2 / (m * (0.1**2 + 0.05**2) / 12.0)
     assert basis.angular_frequencies[1:3] ** 2 == pytest.approx([tilt, 2.0 * k / m], rel=2e-4)
@@ -108,9 +109,9 @@ def test_several_pieces_have_more_rigid_modes(pieces):
     _, M, K, _ = body_and_matrices(6, 3, {})
     all_of = [sp.block_diag([one] * pieces) for one in (M, K)]
     r, d = 3 * pieces, pieces * M.shape[0]
-    basis = ModalBasis.from_matrices(*all_of, {"contact": sp.csr_array((3, d))}, modes=r + pieces)
+    basis = basis_from_matrices(*all_of, {"contact": sp.csr_array((3, d))}, modes=r + pieces)
     assert basis.rigid_modes == r
-    alone = ModalBasis.from_matrices(M, K, {"contact": np.zeros((1, 3, M.shape[0]))}, modes=4)
+    alone = basis_from_matrices(M, K, {"contact": np.zeros((1, 3, M.shape[0]))}, modes=4)
     assert basis.angular_frequencies[r:] == pytest.approx(
         np.full(pieces, alone.angular_frequencies[3]), rel=1e-10)
 
@@ -118,8 +119,8 @@ def test_several_pieces_have_more_rigid_modes(pieces):
 @pytest.mark.parametrize("d", [4, 700])
 def test_masses_without_springs(d):
     mass = 1.0 + np.arange(d)
-    basis = ModalBasis.from_matrices(sp.diags_array(mass), sp.csc_array((d, d)),
-                                     rows_from_dofs(d, [(0, None), (1, 2)]), modes=3)
+    basis = basis_from_matrices(sp.diags_array(mass), sp.csc_array((d, d)),
+                                rows_from_dofs(d, [(0, None), (1, 2)]), modes=3)
     assert basis.angular_frequencies.tolist() == [0.0] * 3
     # The rigid modes are the single masses: 1 / sqrt(m) in turn.
     assert basis.contact_T[0, 0] == pytest.approx([1.0, 0.0, 0.0])
@@ -132,8 +133,8 @@ def test_long_chain_by_lanczos():
     main = np.full(n, 2.0 * c)
     main[[0, -1]] = c
     K = sp.diags_array([main, np.full(n - 1, -c), np.full(n - 1, -c)], offsets=[0, 1, -1])
-    basis = ModalBasis.from_matrices(sp.diags_array(np.full(n, m)), K,
-                                     rows_from_dofs(n, [(0, -1), (n - 1, -1)]), modes=6)
+    basis = basis_from_matrices(sp.diags_array(np.full(n, m)), K,
+                                rows_from_dofs(n, [(0, -1), (n - 1, -1)]), modes=6)
     k = np.arange(6)
     assert basis.angular_frequencies[0] == 0.0
     assert basis.angular_frequencies == pytest.approx(
@@ -147,36 +148,36 @@ def test_long_chain_by_lanczos():
 def test_condensed_matrices_with_a_given_number_of_rigid_modes():
     """A stiffness with few digits resists rigid motion; saying rigid=3 puts it right."""
     _, M, K, rows = body_and_matrices(6, 3, {})
-    exact = ModalBasis.from_matrices(M, K, rows, modes=8)
+    exact = basis_from_matrices(M, K, rows, modes=8)
     rng = np.random.default_rng(3)
     K = K.toarray()
     noise = 1e-11 * np.abs(K).max() * rng.standard_normal(K.shape)
     K = K + noise + noise.T
     with pytest.raises(InputError, match=r"not positive semi-definite: its lowest eigenvalue .* "
                                          r"\(rigid=3 for a free"):
-        ModalBasis.from_matrices(M, K, rows, modes=8)
-    assert_same(ModalBasis.from_matrices(M, K, rows, modes=8, rigid=3), exact, 1e-7, 1e-6)
+        basis_from_matrices(M, K, rows, modes=8)
+    assert_same(basis_from_matrices(M, K, rows, modes=8, rigid=3), exact, 1e-7, 1e-6)
     with pytest.raises(InputError, match="rigid = 4 modes are asked for, but the stiffness"):
-        ModalBasis.from_matrices(M, K, rows, modes=8, rigid=4)
+        basis_from_matrices(M, K, rows, modes=8, rigid=4)
 
 
 @pytest.mark.parametrize("columns", [6, 24])
 def test_too_few_rigid_modes(columns):
     _, M, K, rows = body_and_matrices(columns, columns // 2, {})
     with pytest.raises(InputError, match="rigid = 1, but the stiffness matrix leaves 3 displ"):
-        ModalBasis.from_matrices(M, K, rows, modes=8, rigid=1)
+        basis_from_matrices(M, K, rows, modes=8, rigid=1)
 
 
 def test_asymmetry_of_the_last_digits():
     expected, M, K, rows = body_and_matrices(6, 3, {"left": "xy"})
     noise = sp.csr_array(np.triu(np.random.default_rng(1).standard_normal(K.shape)))
     uneven = [A + 1e-12 * np.abs(A).max() * noise for A in (M, K)]
-    assert_same(ModalBasis.from_matrices(*uneven, rows, modes=12), expected, 1e-7, 1e-6)
+    assert_same(basis_from_matrices(*uneven, rows, modes=12), expected, 1e-7, 1e-6)
 
 
 def test_large_matrices_with_a_given_number_of_rigid_modes():
     expected, M, K, rows = body_and_matrices(24, 12, {})
-    assert_same(ModalBasis.from_matrices(M, K, rows, modes=12, rigid=3), expected)
+    assert_same(basis_from_matrices(M, K, rows, modes=12, rigid=3), expected)
 
 
 def test_null_space_does_not_depend_on_its_start():
@@ -202,11 +203,11 @@ def test_held_degrees_of_freedom_of_abaqus():
     held = np.array([0, 1, 7])
     for dof in held:
         clamped[dof, dof] = 1e36
-    basis = ModalBasis.from_matrices(M, clamped, rows, modes=6, damping=0.3 * M + 1e-6 * K)
+    basis = basis_from_matrices(M, clamped, rows, modes=6, damping=0.3 * M + 1e-6 * K)
     kept = np.setdiff1d(np.arange(M.shape[0]), held)
     M, K = M[kept][:, kept], K[kept][:, kept]
     rows = {name: block[:, kept] for name, block in rows.items()}
-    expected = ModalBasis.from_matrices(M, K, rows, modes=6, damping=Rayleigh(0.3, 1e-6))
+    expected = basis_from_matrices(M, K, rows, modes=6, damping=Rayleigh(0.3, 1e-6))
     assert_same(basis, expected)
     assert basis.damping == pytest.approx(
         expected.damping, rel=1e-9, abs=1e-9 * expected.damping.max())
@@ -217,11 +218,11 @@ def test_held_degrees_of_freedom_of_abaqus():
 def test_damping_matrices_and_factors():
     _, M, K, rows = body_and_matrices(6, 3, {"left": "xy"})
     C = 0.3 * M + 1e-6 * K
-    expected = ModalBasis.from_matrices(M, K, rows, modes=5, damping=Rayleigh(0.3, 1e-6)).damping
+    expected = basis_from_matrices(M, K, rows, modes=5, damping=Rayleigh(0.3, 1e-6)).damping
     for damping in (C, C.toarray(), AssembledMatrix(C, None, "C.mtx")):
-        found = ModalBasis.from_matrices(M, K, rows, modes=5, damping=damping).damping
+        found = basis_from_matrices(M, K, rows, modes=5, damping=damping).damping
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * expected.max())
-    lossy = ModalBasis.from_matrices(M, K, rows, modes=5, damping=LossFactor(0.04))
+    lossy = basis_from_matrices(M, K, rows, modes=5, damping=LossFactor(0.04))
     assert lossy.damping_ratios == pytest.approx(np.full(5, 0.02))
 
 
@@ -236,9 +237,9 @@ def test_forms_of_rows():
         ([sp.csr_array(one[:2]) for one in contact], flat),
     ]
     for given, meant in forms:
-        basis = ModalBasis.from_matrices(M, K, {"contact": given, "B": rows["B"][:2]}, modes=12)
+        basis = basis_from_matrices(M, K, {"contact": given, "B": rows["B"][:2]}, modes=12)
         assert basis.T_matrix.shape == (15, 12)
-        reference = ModalBasis.from_matrices(M, K, {"contact": meant, "B": rows["B"]}, modes=12)
+        reference = basis_from_matrices(M, K, {"contact": meant, "B": rows["B"]}, modes=12)
         assert (basis.contact_T == reference.contact_T).all()
         assert (basis.T[0, :2] == reference.T[0, :2]).all()
         assert (basis.T[0, 2] == 0.0).all()
@@ -254,7 +255,7 @@ def test_rows_from_numbers():
     assert (contact == expected).all()
     assert rows["B"].toarray().tolist() == [[0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 1], [0] * 6]
     assert list(rows) == ["contact", "B", "tip"]
-    basis = ModalBasis.from_matrices(np.eye(6), np.diag(np.arange(1.0, 7.0)), rows)
+    basis = basis_from_matrices(np.eye(6), np.diag(np.arange(1.0, 7.0)), rows)
     assert basis.extra == ("tip",)
     assert basis.contact_T[1].tolist() == [[0, 0, 1, 0, 0, 0], [0] * 6, [0, 0, 0, 0, 0, 1]]
 
@@ -313,7 +314,7 @@ OTHERS = np.array([[8, 1], [8, 2]])
 ])
 def test_matrices_are_checked(mass, stiffness, options, message):
     with pytest.raises(InputError, match=message):
-        ModalBasis.from_matrices(mass, stiffness, ONE_ROW, **options)
+        basis_from_matrices(mass, stiffness, ONE_ROW, **options)
 
 
 def test_large_matrices_are_checked():
@@ -323,17 +324,17 @@ def test_large_matrices_are_checked():
     chain = sp.diags_array([np.full(d, 2.0), np.full(d - 1, -1.0), np.full(d - 1, -1.0)],
                            offsets=[0, 1, -1])
     with pytest.raises(InputError, match="there are 2100 degrees of freedom, more than 2000; say"):
-        ModalBasis.from_matrices(identity, chain, rows)
+        basis_from_matrices(identity, chain, rows)
     negative = sp.lil_array(chain)
     negative[5, 5] = negative[100, 100] = -9.0
     with pytest.raises(InputError, match="not positive semi-definite: it has 2 negative eigenval"):
-        ModalBasis.from_matrices(identity, negative, rows, modes=3)
+        basis_from_matrices(identity, negative, rows, modes=3)
     with pytest.raises(InputError, match="leaves more than 500 displacements without resistance"):
-        ModalBasis.from_matrices(identity, sp.csc_array((d, d)), rows, modes=3)
+        basis_from_matrices(identity, sp.csc_array((d, d)), rows, modes=3)
     with pytest.raises(InputError, match="not positive semi-definite: its diagonal"):
-        ModalBasis.from_matrices(identity, -chain, rows, modes=3)
+        basis_from_matrices(identity, -chain, rows, modes=3)
     with pytest.raises(InputError, match="mass matrix is not positive definite, although"):
-        ModalBasis.from_matrices(chain - 1.5 * identity, chain, rows, modes=3)
+        basis_from_matrices(chain - 1.5 * identity, chain, rows, modes=3)
 
 
 # Given modes -------------------------------------------------------------------------------------
@@ -359,7 +360,7 @@ def test_normalisation_is_found_and_put_right(scale):
     assert found.worst_off_diagonal < 1e-9
     f = expected.frequencies_hz
     for given in ({"mass": M}, {"mass": M.toarray()}, {"modal_mass": masses}):
-        basis = ModalBasis.from_modes(shapes, rows, frequencies_hz=f, damping=0.01, **given)
+        basis = basis_from_modes(shapes, rows, frequencies_hz=f, damping=0.01, **given)
         assert_same(basis, expected, 1e-14, 1e-9)
         assert basis.damping_ratios == pytest.approx(expected.damping_ratios, rel=1e-12)
 
@@ -368,7 +369,7 @@ def test_modes_in_another_order_and_with_other_signs():
     expected, _, rows, shapes, masses = given_modes("other")
     order = np.random.default_rng(2).permutation(12)
     ratios = 0.001 * (1.0 + np.arange(12))
-    basis = ModalBasis.from_modes(
+    basis = basis_from_modes(
         -shapes[:, order], rows, angular_frequencies=expected.angular_frequencies[order],
         modal_mass=masses[order], damping=ratios[order])
     assert basis.angular_frequencies == pytest.approx(expected.angular_frequencies, rel=1e-14)
@@ -383,7 +384,7 @@ def test_modal_damping_matrix_turns_with_the_modes():
     C = C @ C.T
     order = np.r_[0:3, 11:2:-1]
     signs = (-1.0) ** np.arange(12)
-    basis = ModalBasis.from_modes(
+    basis = basis_from_modes(
         (shapes * signs)[:, order], rows, frequencies_hz=expected.frequencies_hz[order],
         modal_mass=1.0, damping=(C * np.outer(signs, signs))[np.ix_(order, order)])
     seen = expected.T_matrix @ C @ expected.T_matrix.T
@@ -400,9 +401,9 @@ def test_modes_of_another_order_of_unknowns_are_not_orthogonal():
     i, j = np.unravel_index(np.argmax(worst), worst.shape)
     with pytest.raises(InputError, match=f"not mass-orthogonal: modes {i} and {j} .* product "
                                          f"{worst.max():.3g}, more than 0.001"):
-        ModalBasis.from_modes(wrong, rows, frequencies_hz=expected.frequencies_hz, mass=M)
-    basis = ModalBasis.from_modes(wrong, rows, frequencies_hz=expected.frequencies_hz, mass=M,
-                                  orthogonality=1.0)
+        basis_from_modes(wrong, rows, frequencies_hz=expected.frequencies_hz, mass=M)
+    basis = basis_from_modes(wrong, rows, frequencies_hz=expected.frequencies_hz, mass=M,
+                             orthogonality=1.0)
     assert basis.modes == 12
 
 
@@ -427,13 +428,13 @@ EYE = np.eye(2)
 ])
 def test_modes_are_checked(shapes, options, message):
     with pytest.raises(InputError, match=message):
-        ModalBasis.from_modes(shapes, ONE_ROW, **options)
+        basis_from_modes(shapes, ONE_ROW, **options)
 
 
 def test_a_single_mode():
     found = normalisation([[1.0], [0.0]], np.diag([4.0, 1.0]))
     assert found.worst_off_diagonal == 0.0
     assert found.worst_pair == (0, 0)
-    basis = ModalBasis.from_modes([[1.0], [0.0]], rows_from_dofs(2, [(0, 1)]), mass=np.diag([4, 1]),
-                                  frequencies_hz=[3.0])
+    basis = basis_from_modes([[1.0], [0.0]], rows_from_dofs(2, [(0, 1)]), mass=np.diag([4, 1]),
+                             frequencies_hz=[3.0])
     assert basis.contact_T[0].tolist() == [[0.5], [0.0], [0.0]]

@@ -12,7 +12,7 @@ import pytest
 from oscillators import friction_oscillator
 
 import fecontact
-from fecontact import memory
+from fecontact import memory, modal_basis
 from fecontact.body import ElasticBody
 from fecontact.errors import FecontactError, InputError
 
@@ -64,31 +64,31 @@ Mesh([[0,0],[1,0],[0,1]],[[0.5,1,2]])
 Mesh([[0,0],[1,0],[0,1]],[[0,1,2]],{"a":[[5,6]]})
 Mesh([[0,0],[1,0],[0,1]],[[0,1,2]],{},{"a":9})
 Mesh([[0,0],[1,0],[0,1]],[[0,1,2]],{},{"a":"x"})
-body.modal_basis(None)
-body.modal_basis("a")
-body.modal_basis(2.5)
-body.modal_basis(nan)
-body.modal_basis(0)
-body.modal_basis(5,contact=None)
-body.modal_basis(5,contact=3)
-body.modal_basis(5,contact_nodes=None)
-body.modal_basis(5,contact_nodes=2.5)
-body.modal_basis(5,contact_nodes="a")
-body.modal_basis(5,contact_nodes=-1)
-body.modal_basis(5,B=3)
-body.modal_basis(5,B=(nan,0))
-body.modal_basis(5,B=(0,))
-body.modal_basis(5,points=3)
-body.modal_basis(5,points={"P":None})
-body.modal_basis(5,points={3:(0,0)})
-body.modal_basis(5,damping=None)
-body.modal_basis(5,damping="a")
-body.modal_basis(5,damping=[nan]*5)
-body.modal_basis(5,damping=np.zeros((3,3)))
-body.modal_basis(5,reduction=None)
-body.modal_basis(5,reduction="x")
-body.modal_basis(5,reduction="residual",tolerance=None)
-body.modal_basis(5,reduction="residual",tolerance=nan)
+modal_basis(body, None)
+modal_basis(body, "a")
+modal_basis(body, 2.5)
+modal_basis(body, nan)
+modal_basis(body, 0)
+modal_basis(body, 5,contact=None)
+modal_basis(body, 5,contact=3)
+modal_basis(body, 5,contact_nodes=None)
+modal_basis(body, 5,contact_nodes=2.5)
+modal_basis(body, 5,contact_nodes="a")
+modal_basis(body, 5,contact_nodes=-1)
+modal_basis(body, 5,B=3)
+modal_basis(body, 5,B=(nan,0))
+modal_basis(body, 5,B=(0,))
+modal_basis(body, 5,points=3)
+modal_basis(body, 5,points={"P":None})
+modal_basis(body, 5,points={3:(0,0)})
+modal_basis(body, 5,damping=None)
+modal_basis(body, 5,damping="a")
+modal_basis(body, 5,damping=[nan]*5)
+modal_basis(body, 5,damping=np.zeros((3,3)))
+modal_basis(body, 5,reduction=None)
+modal_basis(body, 5,reduction="x")
+modal_basis(body, 5,reduction="residual",tolerance=None)
+modal_basis(body, 5,reduction="residual",tolerance=nan)
 basis.select(None)
 basis.select("a")
 basis.select([1.5])
@@ -99,9 +99,9 @@ basis.with_dashpots({"B":(1,)})
 basis.with_dashpots({"B":"ab"})
 basis.point_index(None)
 basis.point_index(1.5)
-ModalBasis.load(None)
-ModalBasis.load("none.h5")
-ModalBasis.load(".")
+read_basis(None)
+read_basis("none.h5")
+read_basis(".")
 Rayleigh(None,None)
 Rayleigh("a",1)
 Rayleigh(-1,1)
@@ -271,10 +271,10 @@ settled_motion(None)
 settled_motion(osc,transient=nan)
 smoothing_cost(None,1)
 mode_convergence(None,None,5)
-load_branches(None)
-load_branches("none.h5")
-save_branches("x.h5",None)
-save_branches("x.h5",{})
+read_branches(None)
+read_branches("none.h5")
+write_branches("x.h5",None)
+write_branches("x.h5",{})
 read_case(None)
 read_case("none.vtkhdf")
 read_case("a\\0b")
@@ -381,7 +381,7 @@ def names():
     """What the calls are about: a mesh, its body and modes, systems, a run."""
     mesh = fecontact.generate(fecontact.Beam(0.1, 0.01, element_size=0.01))
     body = ElasticBody(mesh)
-    basis = body.modal_basis(5, contact_nodes=4)
+    basis = modal_basis(body, 5, contact_nodes=4)
     system = fecontact.ContactSystem(basis, fecontact.RoughSurface(0.3e6, 5.2e-6, 6.0),
                                      ground=fecontact.Ground(speed=0.1),
                                      load=fecontact.Load(normal=10.0))
@@ -427,8 +427,8 @@ READERS = {
     "part.msh": fecontact.read_mesh, "part.inp": fecontact.read_mesh,
     "part.med": fecontact.read_mesh, "part.vtk": fecontact.read_mesh,
     "part.vtu": fecontact.read_mesh, "part.bdf": fecontact.read_mesh,
-    "run.vtkhdf": fecontact.read_case, "basis.h5": fecontact.ModalBasis.load,
-    "branches.h5": fecontact.load_branches, "index.csv": fecontact.read_table,
+    "run.vtkhdf": fecontact.read_case, "basis.h5": fecontact.read_basis,
+    "branches.h5": fecontact.read_branches, "index.csv": fecontact.read_table,
 }
 
 
@@ -440,7 +440,7 @@ def whole(names, tmp_path_factory):
         shutil.copy(DATA / name, folder)
     fecontact.write_mesh(names["mesh"], folder / "part.msh")
     fecontact.write_case(folder / "run.vtkhdf", names["run"])
-    names["basis"].save(folder / "basis.h5")
+    fecontact.write_basis(folder / "basis.h5", names["basis"])
     return folder
 
 

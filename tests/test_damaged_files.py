@@ -8,8 +8,15 @@ import pytest
 from sweep_study import Serial, write_study
 from synthetic import basis, run
 
-from fecontact import Range, load_branches, read_table, save_branches, sweep
-from fecontact.basis import ModalBasis
+from fecontact import (
+    Range,
+    read_basis,
+    read_branches,
+    read_table,
+    sweep,
+    write_basis,
+    write_branches,
+)
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.errors import InputError
 from fecontact.integrate.events import Events
@@ -182,26 +189,26 @@ def branches():
     other("branches/0", np.zeros(2)), linked("branches/0/u"),
 ])
 def test_a_damaged_branch_is_one_sentence(change, tmp_path):
-    path = save_branches(tmp_path / "b.h5", branches())
-    found = load_branches(path)["main"]
+    path = write_branches(tmp_path / "b.h5", branches())
+    found = read_branches(path)["main"]
     assert [point.kind for point in found.points] == [None, "fold", None, None]
     assert found.points[1].details == {"coefficient": 3.0}
     assert np.array_equal(found.column("observed"), 0.2 * np.arange(4))
     with h5py.File(path, "a") as file:
         change(file)
     with pytest.raises(InputError) as caught:
-        load_branches(path)
+        read_branches(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
 
 
 def test_a_damaged_basis_is_one_sentence(tmp_path):
     path = tmp_path / "basis.h5"
-    run(times=3).system.basis.save(path)
+    write_basis(path, run(times=3).system.basis)
     with h5py.File(path, "a") as file:
         huge("basis/T", (10**6, 3, 10**6))(file)
     with pytest.raises(InputError, match=r"basis\.h5 is damaged"):
-        ModalBasis.load(path)
+        read_basis(path)
 
 
 SHARDS = {

@@ -44,8 +44,8 @@ def blocks(page, language):
 def laws_setup(folder):
     """What the page takes for granted: modules, a basis."""
     rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
-    basis = fc.ModalBasis.from_matrices(np.eye(2), np.zeros((2, 2)),
-                                        {"contact": rows[None], "B": rows, "C": rows})
+    basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)),
+                                   {"contact": rows[None], "B": rows, "C": rows})
     names = {"fc": fc, "basis": basis}
     exec("import math\nfrom dataclasses import dataclass\nfrom typing import ClassVar\n"
          "import numpy as np", names)
@@ -79,7 +79,7 @@ SETUP = {"laws.md": laws_setup, "sweeps.md": sweeps_setup, "orbits.md": orbits_s
 
 def check_readme(names, printed, folder):
     assert "The run reached its end." in printed
-    assert "right to" in names["basis"].report().recommendation
+    assert "right to" in fc.BasisReport(names["basis"]).recommendation
     assert names["run"].energies.imbalance < 2e-5
     assert set(names["run"].contact_state.ravel().tolist()) == {0, 1, 2}
     assert (folder / "contact.png").stat().st_size > 10_000

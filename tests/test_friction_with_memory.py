@@ -14,9 +14,9 @@ from fecontact import (
     JenkinsFriction,
     Load,
     LuGreFriction,
-    ModalBasis,
     PrescribedForce,
     RoughSurface,
+    basis_from_matrices,
     simulate,
 )
 
@@ -35,8 +35,8 @@ def basis(groups=None):
     nodes = np.array([[[1.0, 0, 0.01], [0, 1, -0.05], [0, 0, 1]],
                       [[1.0, 0, 0.01], [0, 1, 0.05], [0, 0, 1]]])
     contact = nodes if groups is None else dict(zip(groups, nodes[:, None], strict=True))
-    return ModalBasis.from_matrices(np.diag([2.0, 2.0, 2e-3]), np.zeros((3, 3)),
-                                    {**rows, "contact": contact}, rigid=3)
+    return basis_from_matrices(np.diag([2.0, 2.0, 2e-3]), np.zeros((3, 3)),
+                               {**rows, "contact": contact}, rigid=3)
 
 
 def block(friction, **changes):
@@ -103,7 +103,7 @@ def test_small_oscillation_on_the_contacts_own_stiffness(name, stiffness):
     """Before it slides, the contact is a spring: free motion has the frequency sqrt(k / m)."""
     law = LAWS[name] if name != "lugre" else LuGreFriction(
         0.5, 0.4, 1e-3, bristle_stiffness=2e4, bristle_damping=0.0)
-    point = ModalBasis.from_matrices([[2.0]], [[0.0]], {"contact": [[[1.0], [0.0], [0.0]]]})
+    point = basis_from_matrices([[2.0]], [[0.0]], {"contact": [[[1.0], [0.0], [0.0]]]})
     system = ContactSystem(point, normal=PrescribedForce(20.0), friction=law)
     w = np.sqrt(stiffness / 2.0)
     y = np.zeros(system.size)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fecontact.basis import ModalBasis
+from fecontact.assembled import basis_from_matrices
 from fecontact.errors import InputError
 from fecontact.gap import Crown, gap_values
 from fecontact.laws.drive import Load
@@ -16,8 +16,8 @@ def rigid_mass(count, length):
     """A mass that moves in y alone, with contact nodes in the middle of equal segments."""
     row = np.array([[0.0], [1.0], [0.0]])
     middles = ((np.arange(count) + 0.5) / count - 0.5) * length
-    return ModalBasis.from_matrices([[1.0]], [[0.0]], {"C": row, "contact": [row] * count},
-                                    contact_x=middles, tributary=np.full(count, length / count))
+    return basis_from_matrices([[1.0]], [[0.0]], {"C": row, "contact": [row] * count},
+                               contact_x=middles, tributary=np.full(count, length / count))
 
 
 def test_crown_is_the_circle_to_the_last_digit():

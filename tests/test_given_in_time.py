@@ -11,7 +11,7 @@ MASS, STIFFNESS, DASHPOT = 2.0, 800.0, 3.0
 
 def point(**parts):
     """A mass on the drive's spring and dashpot, moving along x alone."""
-    basis = fc.ModalBasis.from_matrices(
+    basis = fc.basis_from_matrices(
         [[MASS]], [[0.0]], {"contact": [[[1.0], [0.0], [0.0]]], "B": [[1.0], [0.0], [0.0]],
                             "C": [[1.0], [0.0], [0.0]]})
     options = {"normal": fc.PrescribedForce(1e-12), "drive": fc.Drive(
@@ -108,7 +108,7 @@ def test_friction_varies_along_the_ground():
 
 
 def test_moment_and_constant_loads_at_points():
-    basis = fc.ModalBasis.from_matrices(
+    basis = fc.basis_from_matrices(
         np.diag([2.0, 2.0, 0.01]), np.diag([0.0, 0.0, 50.0]),
         {"contact": [[[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]],
          "C": [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]], "tip": [[1.0, 0, -0.2], [0, 1, 0.1], [0, 0, 1]]})

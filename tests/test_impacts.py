@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from fecontact.analysis.impacts import find_impacts, find_rests
 from fecontact.analysis.window import window
-from fecontact.basis import ModalBasis
+from fecontact.assembled import basis_from_matrices
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
 from fecontact.laws.drive import Drive, Load
@@ -26,7 +26,7 @@ def ball(normal, nodes=1, weight=0.0, **parts):
     """A mass that moves up and down, on one contact node or several side by side."""
     rows = np.zeros((nodes, 3, 1))
     rows[:, 1] = 1.0
-    basis = ModalBasis.from_matrices([[MASS]], [[0.0]], {"contact": rows, "B": rows[0],
+    basis = basis_from_matrices([[MASS]], [[0.0]], {"contact": rows, "B": rows[0],
                                                          "C": rows[0]})
     return ContactSystem(basis, normal=normal, load=Load(weight), **parts)
 
@@ -163,8 +163,8 @@ def test_nodes_that_do_not_exist():
 def test_set_valued_friction_has_impacts_and_rigid_stops_have_none():
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
-                                     {"contact": rows[None], "B": rows})
+    basis = basis_from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "B": rows})
     law = LinearContact(C, 2.0 * 0.2 * np.sqrt(C * MASS))
     q = np.linalg.solve(basis.T[2, :2], [0.0, 1e-4])
     system = ContactSystem(basis, normal=law, friction=ExponentialFriction(0.3, 0.3))
@@ -204,7 +204,7 @@ def test_impacts_per_period_of_a_driven_mass():
     """The rigid mass of the impact oscillator: one impact a period at 64.32 rad/s."""
     w = 64.32
     rows = np.array([[0.0], [1.0], [0.0]])
-    basis = ModalBasis.from_matrices([[0.092]], [[0.0]], {"contact": rows[None], "B": rows})
+    basis = basis_from_matrices([[0.092]], [[0.0]], {"contact": rows[None], "B": rows})
     system = ContactSystem(basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0), drive=Drive(
         stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3, angular_frequency=w))
     period = 2.0 * np.pi / w

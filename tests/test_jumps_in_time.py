@@ -13,7 +13,7 @@ MASS, STIFFNESS, AT, FORCE = 2.0, 800.0, 0.3, 5.0
 def point(dashpot=0.0, load=None, motion=None):
     """A mass on the drive's spring and dashpot, moving along x alone, without friction."""
     row = [[1.0], [0.0], [0.0]]
-    basis = fc.ModalBasis.from_matrices([[MASS]], [[0.0]], {"contact": [row], "B": row, "C": row})
+    basis = fc.basis_from_matrices([[MASS]], [[0.0]], {"contact": [row], "B": row, "C": row})
     loads = () if load is None else (fc.PointLoad("C", "x", signal=load),)
     return fc.ContactSystem(
         basis, normal=fc.PrescribedForce(1e-12), friction=fc.ConstantFriction(0.0),
@@ -68,7 +68,7 @@ def test_step_response_of_set_valued_schemes(scheme):
 def test_a_sticking_mass_breaks_away_at_the_step():
     """Held by friction of 1 N until a force of 3 N comes; then it slides with the rest of it."""
     row = [[1.0], [0.0], [0.0]]
-    basis = fc.ModalBasis.from_matrices([[1.0]], [[0.0]], {"contact": [row], "B": row, "C": row})
+    basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": [row], "B": row, "C": row})
     system = fc.ContactSystem(
         basis, normal=fc.PrescribedForce(2.0), friction=fc.ConstantFriction(0.5),
         load=fc.Load(0.0, (fc.PointLoad("C", "x", signal=fc.Step(AT, 3.0)),)))
@@ -96,8 +96,8 @@ def test_one_steep_piece_does_not_shorten_all_steps(method):
 def test_from_rest_under_point_loads():
     """A rough surface of nanometres, hardly touched, does not set the scale of the motion."""
     row = [[1.0], [0.0], [0.0]]
-    basis = fc.ModalBasis.from_matrices([[1.0]], [[1e4]], {"contact": [row], "C": row},
-                                        damping=[[5.0]])
+    basis = fc.basis_from_matrices([[1.0]], [[1e4]], {"contact": [row], "C": row},
+                                   damping=[[5.0]])
     system = fc.ContactSystem(
         basis, normal=fc.RoughSurface(1e6, 1e-9, 0.0), friction=fc.ConstantFriction(0.5),
         load=fc.Load(0.0, (fc.PointLoad("C", "x", signal=fc.Step(10.0, 3e3)),)))

@@ -10,12 +10,12 @@ from fecontact import (
     ContactSystem,
     InputError,
     Load,
-    ModalBasis,
     ModelWarning,
     NormalLaw,
     RigidStart,
     RoughSurface,
     Status,
+    basis_from_matrices,
     normal_law,
     simulate,
     smoothing_cost,
@@ -122,8 +122,8 @@ def test_energies_beyond_all_numbers_have_a_status(change):
     """(1e300)^2 overflows, a motion at 1e300 m/s does not."""
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
-                                     {"contact": rows[None], "C": rows})
+    basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "C": rows})
     system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), load=Load(14.0))
     start = "rest"
     if change == "velocity":
@@ -139,8 +139,8 @@ def test_runs_warn_where_they_leave_the_limits_of_the_model():
     """A mass on two nodes, 20 mm apart: thrown up farther than that, pressed in deeper than it."""
     rows = np.zeros((2, 3, 1))
     rows[:, 1, 0] = 1.0
-    basis = ModalBasis.from_matrices([[1.0]], [[0.0]], {"contact": rows, "C": rows[0]},
-                                     contact_x=[0.0, 0.02])
+    basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows, "C": rows[0]},
+                                contact_x=[0.0, 0.02])
     system = ContactSystem(basis, RoughSurface(1e6, 1e-5))
     with pytest.warns(ModelWarning, match=r"In this run points of the body move by 0\.021 m, more "
                                           r"than its own size of 0\.02 m"):
@@ -157,8 +157,8 @@ def test_sliding_far_along_the_ground_is_within_the_limits():
     """Two metres over level ground, on a face of 20 mm: a rigid translation is exact."""
     rows = np.zeros((2, 3, 2))
     rows[:, 0, 0] = rows[:, 1, 1] = 1.0
-    basis = ModalBasis.from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows, "C": rows[0]},
-                                     contact_x=[0.0, 0.02])
+    basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows, "C": rows[0]},
+                                contact_x=[0.0, 0.02])
     system = ContactSystem(basis, RoughSurface(1e6, 1e-5), ConstantFriction(0.1), load=Load(10.0))
     start = np.concatenate([static_equilibrium(system), [2.0, 0.0]])
     run = simulate(system, 3.0, initial=start)

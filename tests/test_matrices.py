@@ -12,7 +12,7 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 
-from fecontact.basis import ModalBasis
+from fecontact import basis_from_matrices, modal_basis
 from fecontact.errors import InputError
 from fecontact.formats.matrices import AssembledMatrix, read_matrix
 
@@ -43,7 +43,7 @@ def full(found):
 # One body in every format ------------------------------------------------------------------------
 
 def test_every_way_in_gives_the_same_basis(make):
-    expected = make.block().modal_basis(example.MODES, contact="bottom", contact_nodes="all")
+    expected = modal_basis(make.block(), example.MODES, contact="bottom", contact_nodes="all")
     for name, basis in example.bases().items():
         of_frequencies, _ = example.difference(basis, expected)
         assert of_frequencies < (2e-5 if name == "universal file" else 1e-10), name
@@ -111,7 +111,7 @@ def test_square_files_are_taken_as_they_are(tmp_path):
     found = read_matrix(written(tmp_path / "K.mtx", text))
     assert full(found).tolist() == [[2.0, -1.0], [-1.5, 3.0]]
     with pytest.raises(InputError, match=r"stiffness matrix \(.*K\.mtx\) is not symmetric"):
-        ModalBasis.from_matrices(np.eye(2), found, {"contact": np.zeros((1, 3, 2))})
+        basis_from_matrices(np.eye(2), found, {"contact": np.zeros((1, 3, 2))})
 
 
 def test_matrix_input_with_internal_nodes(tmp_path):
@@ -167,7 +167,7 @@ def test_held_nodes_of_a_beam(tmp_path):
             for name, text in zip(("M.mtx", "K.mtx"), texts, strict=True))
     row = np.zeros((1, 3, 4))
     row[0, 1, K.dof(2, 2)] = row[0, 2, K.dof(2, 6)] = 1.0
-    basis = ModalBasis.from_matrices(M, K, {"contact": row})
+    basis = basis_from_matrices(M, K, {"contact": row})
     # (12 - 156 s)(4 - 4 s) = (6 - 22 s)^2 with w^2 = 420 s: 35 s^2 - 102 s + 3 = 0.
     roots = 420.0 * (102.0 + np.array([-1.0, 1.0]) * np.sqrt(102.0**2 - 420.0)) / 70.0
     assert basis.angular_frequencies == pytest.approx(np.sqrt(roots), rel=1e-12)
@@ -195,7 +195,7 @@ def test_damaged_abaqus_files(tmp_path, text, message):
     path = written(tmp_path / "K.mtx", text)
     if message is None:
         with pytest.raises(InputError, match=r"\(.*K\.mtx\) holds values that are not finite"):
-            ModalBasis.from_matrices(np.eye(1), read_matrix(path), {"contact": np.zeros((1, 3, 1))})
+            basis_from_matrices(np.eye(1), read_matrix(path), {"contact": np.zeros((1, 3, 1))})
         return
     with pytest.raises(InputError, match=r"K\.mtx: .*" + message):
         read_matrix(path)
@@ -206,7 +206,7 @@ def test_two_files_of_different_models(tmp_path):
     K = read_matrix(written(tmp_path / "K.mtx", "1,1, 1,1, 2.\n2,1, 2,1, 2.\n2,2, 2,2, 1.\n"))
     with pytest.raises(InputError, match=r"K\.mtx\) has node 2, direction 2, but the mass matrix "
                                          r"\(.*M\.mtx\) has not; write both from one model"):
-        ModalBasis.from_matrices(M, K, {"contact": np.zeros((1, 3, 3))})
+        basis_from_matrices(M, K, {"contact": np.zeros((1, 3, 3))})
 
 
 def test_files_without_names_of_degrees_of_freedom():

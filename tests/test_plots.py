@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
+from fecontact import basis_from_matrices
 from fecontact import contact_kernels as kernels
-from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Energies, Trajectory
 from fecontact.output import figures, plots
@@ -197,7 +197,7 @@ def test_modes_are_titled_by_their_frequencies():
     assert sum(bool(axis.get_title()) for axis in modes_figure(body, 2).axes) == 2
     with pytest.raises(InputError, match="count = 0"):
         modes_figure(body, 0)
-    plain = ModalBasis.from_matrices(np.eye(1), np.eye(1), {"contact": np.ones((1, 3, 1))})
+    plain = basis_from_matrices(np.eye(1), np.eye(1), {"contact": np.ones((1, 3, 1))})
     with pytest.raises(InputError, match="no shapes"):
         modes_figure(plain)
 

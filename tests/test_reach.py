@@ -10,7 +10,7 @@ def basis():
     """Two masses along x on two contact nodes, B at the first of them."""
     rows = np.zeros((2, 3, 2))
     rows[:, 0] = np.eye(2)
-    return fc.ModalBasis.from_matrices(
+    return fc.basis_from_matrices(
         np.eye(2), [[2.0, -1.0], [-1.0, 1.0]], {"B": rows[0], "contact": rows})
 
 

@@ -5,7 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 
 from fecontact.analysis.receptance import frequency_response
-from fecontact.basis import ModalBasis
+from fecontact.assembled import basis_from_matrices
 from fecontact.body import ElasticBody, Material
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
@@ -17,6 +17,7 @@ from fecontact.laws.normal_stop import LinearContact
 from fecontact.laws.signals import Harmonic
 from fecontact.output.analysis_figures import response_figure
 from fecontact.output.redraw import Choice, redraw
+from fecontact.reduction import modal_basis
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -27,8 +28,8 @@ SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 def mass(**parts):
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
-                                     {"contact": rows[None], "B": rows, "C": rows})
+    basis = basis_from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "B": rows, "C": rows})
     return ContactSystem(basis, **{"normal": SURFACE, **parts})
 
 
@@ -134,7 +135,7 @@ def cantilever():
 
 def test_tip_of_a_cantilever():
     """Euler-Bernoulli between the first resonances at 4.18, 26.2 and 73.3 Hz, and above them."""
-    basis = cantilever().modal_basis(25, contact="bottom", contact_nodes=1, B=(LENGTH, HEIGHT))
+    basis = modal_basis(cantilever(), 25, contact="bottom", contact_nodes=1, B=(LENGTH, HEIGHT))
     f = np.array([0.5, 2.0, 3.5, 5.0, 10.0, 20.0, 30.0, 50.0, 80.0])
     found = frequency_response(basis, f, [("B", "y")]).values[:, 0, 0]
     EI = 2.1e11 * THICKNESS * HEIGHT**3 / 12.0
@@ -157,7 +158,7 @@ def test_inverse_of_the_dynamic_stiffness_of_all_degrees_of_freedom():
     rows["B"][[0, 1], dofs["B"][0]] = 1.0
     M, K = body.mass.toarray(), body.stiffness.toarray()
     C = 3.0 * M + 2e-6 * K
-    basis = ModalBasis.from_matrices(M, K, rows, damping=C)
+    basis = basis_from_matrices(M, K, rows, damping=C)
     system = ContactSystem(basis, SURFACE,
                            drive=Drive(stiffness_x=1e7, stiffness_y=3e6, damping_x=400.0))
     K[d - 2, d - 2] += 1e7
@@ -176,8 +177,8 @@ def test_inverse_of_the_dynamic_stiffness_of_all_degrees_of_freedom():
 def test_beam_on_its_contact_against_jacobian_of_the_statics():
     """At low frequency the response is the change of the equilibrium under a small force."""
     body = ElasticBody(rectangle(0.2, 0.02, 12, 2), Material(), 0.01)
-    basis = body.modal_basis(8, contact="bottom", contact_nodes=5, C=(0.1, 0.02),
-                             B=(0.0, 0.01), points={"side": (0.05, 0.02)}, damping=0.01)
+    basis = modal_basis(body, 8, contact="bottom", contact_nodes=5, C=(0.1, 0.02),
+                        B=(0.0, 0.01), points={"side": (0.05, 0.02)}, damping=0.01)
 
     def system(force=0.0):
         return ContactSystem(basis, normal=RoughSurface(1e8, 1e-5, 1e3),

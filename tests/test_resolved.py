@@ -20,7 +20,7 @@ def point_mass(axis, **parts):
     """One mass, free to move along x or y."""
     rows = np.zeros((3, 1))
     rows["xy".index(axis)] = 1.0
-    basis = fc.ModalBasis.from_matrices(
+    basis = fc.basis_from_matrices(
         [[MASS]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
     return fc.ContactSystem(basis, **{"normal": fc.RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 

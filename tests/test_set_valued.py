@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fecontact.basis import ModalBasis
+from fecontact.assembled import basis_from_matrices
 from fecontact.errors import InputError
 from fecontact.integrate.set_valued import integrate_set_valued
 from fecontact.integrate.set_valued_cost import smoothing_cost
@@ -26,7 +26,7 @@ def block(mass=1.0, spring=1.0, nodes=1, **parts):
     """A mass that moves along the ground and up and down, on some nodes at one place."""
     row = np.zeros((3, 2))
     row[0, 0] = row[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(
+    basis = basis_from_matrices(
         mass * np.eye(2), np.diag([spring, 0.0]),
         {"contact": np.repeat(row[None], nodes, axis=0), "B": row, "C": row})
     return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-4, 0.0), **parts})
@@ -106,8 +106,8 @@ def test_belt_with_a_jump_from_static_to_kinetic_friction():
 def section_4(amplitude=0.0, **friction):
     row = np.zeros((3, 2))
     row[0, 0] = row[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
-                                     {"contact": row[None], "B": row, "C": row})
+    basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
+                                {"contact": row[None], "B": row, "C": row})
     return ContactSystem(
         basis, normal=RoughSurface(10e6, 10e-6, 40.0), load=Load(14.0),
         friction=ExponentialFriction(0.8, 0.55, 1000.0, **friction), ground=Ground(speed=1e-3),
@@ -167,9 +167,9 @@ def test_two_independent_nodes_against_two_single_masses(scheme, rtol, tolerance
                     ground=Ground(speed=0.02)) for mass, spring in ((1.0, 100.0), (2.0, 300.0))]
     rows = np.zeros((2, 3, 4))
     rows[0, 0, 0] = rows[0, 1, 1] = rows[1, 0, 2] = rows[1, 1, 3] = 1.0
-    basis = ModalBasis.from_matrices(np.diag([1.0, 1.0, 2.0, 2.0]),
-                                     np.diag([100.0, 0.0, 300.0, 0.0]),
-                                     {"contact": rows, "C": rows[0] + rows[1]})
+    basis = basis_from_matrices(np.diag([1.0, 1.0, 2.0, 2.0]),
+                                np.diag([100.0, 0.0, 300.0, 0.0]),
+                                {"contact": rows, "C": rows[0] + rows[1]})
     both = ContactSystem(basis, normal=RoughSurface((1e5, 1e5), 1e-4, 0.0), load=Load(2.0),
                          friction=ConstantFriction(0.5), ground=Ground(speed=0.02))
     times = np.linspace(0.0, 2.0, 401)
@@ -187,7 +187,7 @@ def test_two_independent_nodes_against_two_single_masses(scheme, rtol, tolerance
 def test_order_while_nothing_changes(scheme, longest, order):
     """Sliding all the time under a driven spring; linear, with a closed form."""
     row = [[1.0], [0.0], [0.0]]
-    basis = ModalBasis.from_matrices([[1.0]], [[0.5]], {"contact": [row], "B": row, "C": row})
+    basis = basis_from_matrices([[1.0]], [[0.5]], {"contact": [row], "B": row, "C": row})
     system = ContactSystem(basis, normal=PrescribedForce(1.0), friction=ConstantFriction(0.5),
                            ground=Ground(speed=50.0), drive=Drive(
                                stiffness_x=0.5, amplitude_x=1.0, angular_frequency=2.0))
@@ -205,8 +205,8 @@ def test_order_while_nothing_changes(scheme, longest, order):
 
 def ball(**parts):
     row = np.array([[0.0], [1.0], [0.0]])
-    return ContactSystem(ModalBasis.from_matrices([[1.0]], [[0.0]],
-                                                  {"contact": row[None], "C": row}),
+    return ContactSystem(basis_from_matrices([[1.0]], [[0.0]],
+                                             {"contact": row[None], "C": row}),
                          RoughSurface(1e5, 1e-4), **parts)
 
 
@@ -236,7 +236,7 @@ def test_bouncing_ball(restitution):
 def test_mass_lifted_off_a_rigid_stop():
     """A load a sin(w t) - F lifts it where a sin(w t) = F; until then the stop holds it."""
     row = np.array([[0.0], [1.0], [0.0]])
-    basis = ModalBasis.from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
+    basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
     system = ContactSystem(basis, RoughSurface(1e5, 1e-4), load=Load(1.0), drive=Drive(
         stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5))
     times = np.linspace(0.0, 2.0, 201)

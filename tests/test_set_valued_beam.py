@@ -13,6 +13,7 @@ from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
+from fecontact.reduction import modal_basis
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -22,8 +23,8 @@ TIMES = np.linspace(0.0, 0.01, 201)
 @pytest.fixture(scope="module")
 def basis():
     body = ElasticBody(rectangle(0.2, 0.02, 39, 4), Material(), 0.01)
-    return body.modal_basis(20, contact="bottom", contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02),
-                            damping=0.01)
+    return modal_basis(body, 20, contact="bottom", contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02),
+                       damping=0.01)
 
 
 def beam(basis, slope=1e6):

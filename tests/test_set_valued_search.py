@@ -13,8 +13,8 @@ SIDEWAYS, UPWARDS = [[1.0], [0.0], [0.0]], [[0.0], [1.0], [0.0]]
 
 def mass(row, spring=1.0, dashpot=0.0, **parts):
     """A mass of 1 kg that moves in one direction."""
-    basis = fc.ModalBasis.from_matrices([[1.0]], [[spring]], {"contact": [row], "B": row, "C": row},
-                                        damping=[[dashpot]])
+    basis = fc.basis_from_matrices([[1.0]], [[spring]], {"contact": [row], "B": row, "C": row},
+                                   damping=[[dashpot]])
     return fc.ContactSystem(basis, **{"normal": fc.RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 

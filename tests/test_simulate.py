@@ -7,6 +7,7 @@ import pytest
 from meshes_for_tests import rectangle
 from scipy.optimize import brentq
 
+from fecontact.assembled import basis_from_matrices
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
 from fecontact.errors import AnalysisError, InputError
@@ -17,6 +18,7 @@ from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
+from fecontact.reduction import modal_basis
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -28,7 +30,7 @@ BALANCE = 20.0 * RTOL
 def mass_in_y(mass=1.0, spring=0.0, **parts):
     """A mass that moves up and down only."""
     rows = np.array([[0.0], [1.0], [0.0]])
-    basis = ModalBasis.from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
+    basis = basis_from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
     return ContactSystem(basis, **{"normal": SURFACE, **parts})
 
 
@@ -36,8 +38,8 @@ def mass_in_plane(mass=1.0, spring=0.0, **parts):
     """A mass that moves along the ground and up and down."""
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(mass * np.eye(2), np.diag([spring, 0.0]),
-                                     {"contact": rows[None], "B": rows, "C": rows})
+    basis = basis_from_matrices(mass * np.eye(2), np.diag([spring, 0.0]),
+                                {"contact": rows[None], "B": rows, "C": rows})
     return ContactSystem(basis, **{"normal": SURFACE, **parts})
 
 
@@ -304,8 +306,8 @@ def test_regimes_of_the_impact_oscillator(w, repeats):
 
 def beam(n=4, modes=6, **parts):
     body = ElasticBody(rectangle(0.2, 0.02, 12, 2), Material(), 0.01)
-    basis = body.modal_basis(modes, contact="bottom", contact_nodes=n, B=(0.0, 0.01),
-                             C=(0.1, 0.02), damping=0.01)
+    basis = modal_basis(body, modes, contact="bottom", contact_nodes=n, B=(0.0, 0.01),
+                        C=(0.1, 0.02), damping=0.01)
     return ContactSystem(basis, **{
         "normal": RoughSurface(1e7, 1e-5, 100.0), "load": Load(50.0),
         "friction": ExponentialFriction(0.4, 0.2, 100.0, 1e4), **parts})
@@ -440,7 +442,7 @@ def test_start_at_rest_on_wavy_ground():
 
 def test_rigid_start_about_a_hinge():
     body = ElasticBody(rectangle(0.2, 0.02, 12, 2), Material(), 0.01, fixed={"left": "hinge"})
-    basis = body.modal_basis(4, contact="bottom", contact_nodes=2, C=(0.2, 0.02))
+    basis = modal_basis(body, 4, contact="bottom", contact_nodes=2, C=(0.2, 0.02))
     system = ContactSystem(basis, SURFACE)
     # The hinge at (0, 0.01) stays: the origin moves by (0.01 phi, 0).
     y = initial_state(system, RigidStart((1e-5, 0.0, 1e-3)), 0.0)
@@ -573,7 +575,7 @@ def test_other_errors_in_progress_are_passed_on():
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_a_motion_that_grows_beyond_all_numbers(method):
     rows = np.array([[[0.0], [1.0], [0.0]]])
-    basis = ModalBasis.from_matrices([[1.0]], [[1.0]], {"contact": rows}, damping=[[-1e4]])
+    basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": rows}, damping=[[-1e4]])
     run = simulate(ContactSystem(basis, SURFACE), 1.0, initial=np.array([1.0, 0.0]), outputs=10001,
                    method=method)
     assert run.status is Status.FAILED

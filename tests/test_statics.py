@@ -6,13 +6,14 @@ from meshes_for_tests import rectangle
 from model_for_tests import Model
 from scipy.optimize import brentq, minimize
 
-from fecontact.basis import ModalBasis
+from fecontact.assembled import basis_from_matrices
 from fecontact.body import ElasticBody, Material
 from fecontact.errors import AnalysisError, ModelWarning
 from fecontact.laws.drive import Drive, Load
 from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.normal import RoughSurface
+from fecontact.reduction import modal_basis
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -28,16 +29,16 @@ def mass_point(**parts):
     """5.632 kg, free in x and y: the oscillator of section 4."""
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
-                                     {"contact": rows[None], "B": rows, "C": rows})
+    basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "B": rows, "C": rows})
     return ContactSystem(basis, **{"normal": NORMAL, "load": Load(14.0), **parts})
 
 
 def beam(contact_nodes=8, modes=12, B=(0.0, 0.01), C=(0.1, 0.02), fixed=None, **parts):
     mesh = rectangle(LENGTH, HEIGHT, 16, 2)
     body = ElasticBody(mesh, Material(), THICKNESS, fixed=fixed or {})
-    basis = body.modal_basis(modes, contact="bottom", contact_nodes=contact_nodes, B=B, C=C,
-                             damping=0.01)
+    basis = modal_basis(body, modes, contact="bottom", contact_nodes=contact_nodes, B=B, C=C,
+                        damping=0.01)
     return ContactSystem(basis, **{"normal": NORMAL, "load": Load(14.0), **parts})
 
 
@@ -167,8 +168,9 @@ def test_pressed_beam_against_energy_minimum(load, C_at):
 @deep
 def test_stiff_body_pressed_off_its_middle():
     """Rigid body on linear springs c / L: p = N / L (1 + 12 e s / L^2), s from the middle."""
-    basis = ElasticBody(rectangle(LENGTH, 0.1, 16, 8), Material(), THICKNESS).modal_basis(
-        3, contact="bottom", contact_nodes=8, C=(0.12, 0.1))
+    basis = modal_basis(
+        ElasticBody(rectangle(LENGTH, 0.1, 16, 8), Material(), THICKNESS), 3, contact="bottom",
+        contact_nodes=8, C=(0.12, 0.1))
     system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0))
     q = static_equilibrium(system)
     force = contact(system, q)[0]
@@ -182,8 +184,8 @@ def test_stiff_body_lifts_off_on_one_side():
     """Load outside the middle third: a triangle of pressure over 3 (L / 2 - e)."""
     n = 40
     mesh = rectangle(LENGTH, 0.1, 40, 4)
-    basis = ElasticBody(mesh, Material(), THICKNESS).modal_basis(
-        3, contact="bottom", contact_nodes=n, C=(0.15, 0.1))
+    basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 3, contact="bottom",
+                        contact_nodes=n, C=(0.15, 0.1))
     system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0))
     q = static_equilibrium(system)
     force = contact(system, q)[0]
@@ -200,8 +202,8 @@ def test_number_of_nodes_does_not_matter_for_a_uniformly_pressed_body():
     """With rigid modes only and the load in the middle, the depth is that of one mass."""
     for n in (1, 2, 7, "all"):
         mesh = rectangle(LENGTH, HEIGHT, 16, 2)
-        basis = ElasticBody(mesh, Material(), THICKNESS).modal_basis(
-            3, contact="bottom", contact_nodes=n, C=(0.1, 0.02))
+        basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 3, contact="bottom",
+                            contact_nodes=n, C=(0.1, 0.02))
         system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, R, 0.0), load=Load(14.0))
         depth = contact(system, static_equilibrium(system))[2]
         assert depth == pytest.approx(np.full(len(depth), penetration_of(14.0)), rel=1e-8)
@@ -280,8 +282,8 @@ def test_nothing_presses_the_mass():
 
 def test_load_beside_the_face_tips_the_body():
     mesh = rectangle(LENGTH, HEIGHT, 16, 2, split=((0.0, 0.1),))
-    basis = ElasticBody(mesh, Material(), THICKNESS).modal_basis(
-        8, contact="feet", contact_nodes=4, C=(0.15, 0.02))
+    basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 8, contact="feet",
+                        contact_nodes=4, C=(0.15, 0.02))
     with pytest.raises(AnalysisError, match="tips over"):
         static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0)))
 
@@ -289,8 +291,8 @@ def test_load_beside_the_face_tips_the_body():
 def test_sliding_block_tips_over_its_short_face():
     """Contact length below 2 mu times the height of the spring: no steady sliding."""
     mesh = rectangle(0.02, 0.1, 4, 10)
-    basis = ElasticBody(mesh, Material(), THICKNESS).modal_basis(
-        6, contact="bottom", contact_nodes=4, B=(0.0, 0.08), C=(0.01, 0.1))
+    basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 6, contact="bottom",
+                        contact_nodes=4, B=(0.0, 0.08), C=(0.01, 0.1))
     friction = ExponentialFriction(0.5, 0.5, 0.0)
     system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, R, 1.0), load=Load(14.0),
                            friction=friction, ground=Ground(speed=0.1),
@@ -321,8 +323,8 @@ def test_point_pushed_across_names_both():
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
     slanted = np.array([[0.0, 0.0], [0.6, 0.8], [0.0, 0.0]])
-    basis = ModalBasis.from_matrices(np.eye(2), np.zeros((2, 2)),
-                                     {"contact": rows[None], "C": slanted})
+    basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "C": slanted})
     with pytest.raises(AnalysisError, match=r"translation along the ground \(x\)"):
         static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0)))
 
@@ -333,9 +335,9 @@ def test_ground_far_from_the_reference_place(height):
     ground = Ground(amplitude=abs(height), wavelength=0.08)
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(np.eye(2), np.zeros((2, 2)),
-                                     {"contact": rows[None], "C": rows},
-                                     contact_x=[np.sign(height) * 0.02])
+    basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "C": rows},
+                                contact_x=[np.sign(height) * 0.02])
     q = static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0), ground=ground))
     assert q[1] == pytest.approx(height - penetration_of(14.0), rel=1e-9)
 
@@ -347,8 +349,8 @@ def test_light_bodies_on_waves_and_gaps(seed):
     rng = np.random.default_rng(seed)
     for n, modes, at in ((2, 5, 0.1), (8, 5, 0.05), (16, 12, 0.13), (33, 3, 0.17), (33, 20, 0.03)):
         mesh = rectangle(LENGTH, HEIGHT, 16, 2)
-        basis = ElasticBody(mesh, Material(), THICKNESS).modal_basis(
-            modes, contact="bottom", contact_nodes=n, C=(at, HEIGHT))
+        basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), modes, contact="bottom",
+                            contact_nodes=n, C=(at, HEIGHT))
         load = 10.0 ** rng.uniform(-3.0, 1.0)
         system = ContactSystem(
             basis, normal=RoughSurface(10.0 ** rng.uniform(6.0, 9.0), 1e-7, 0.0), load=Load(load),
@@ -365,8 +367,8 @@ def test_light_bodies_on_waves_and_gaps(seed):
 def bracket(reduction="residual", B=(LENGTH, HEIGHT), **parts):
     """Feet under the left half, the load beyond them, a spring that cannot hold the rotation."""
     mesh = rectangle(LENGTH, HEIGHT, 16, 2, split=((0.0, 0.1),))
-    basis = ElasticBody(mesh, Material(), THICKNESS).modal_basis(
-        8, reduction=reduction, contact="feet", contact_nodes=4, C=(0.19, HEIGHT), B=B)
+    basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 8, reduction=reduction,
+                        contact="feet", contact_nodes=4, C=(0.19, HEIGHT), B=B)
     return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-6, 0.0), "load": Load(100.0),
                                    "drive": Drive(stiffness_x=1e5), **parts})
 

@@ -7,9 +7,10 @@ from typing import get_args, get_type_hints
 import pytest
 
 from fecontact.cli import execute
+from fecontact.core.docstrings import documented
 from fecontact.laws.names import is_kind, law_names
 from fecontact.study import Study
-from fecontact.study_keys import documented, study_keys
+from fecontact.study_keys import study_keys
 
 PAGE = Path(__file__).parents[1] / "docs" / "study.md"
 

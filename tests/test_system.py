@@ -5,6 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 from model_for_tests import Model
 
+from fecontact import basis_from_matrices, modal_basis
 from fecontact import contact_kernels as kernels
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
@@ -192,8 +193,8 @@ def mass_point(mass=2.0, **parts):
     """One mass, free in x and y, everything at the same point."""
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(mass * np.eye(2), np.zeros((2, 2)),
-                                     {"contact": rows[None], "B": rows, "C": rows})
+    basis = basis_from_matrices(mass * np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "B": rows, "C": rows})
     return ContactSystem(basis, **{"normal": RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 
@@ -247,8 +248,8 @@ def test_waviness_travels_with_the_ground():
 def test_node_places_enter_the_phase():
     rows = np.zeros((2, 3, 2))
     rows[:, 0, 0] = rows[:, 1, 1] = 1.0
-    basis = ModalBasis.from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows},
-                                     contact_x=[0.0125, 0.0375])
+    basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows},
+                                contact_x=[0.0125, 0.0375])
     system = ContactSystem(basis, normal=RoughSurface(2e6, 1e-5, 0.0),
                            ground=Ground(amplitude=1e-4, wavelength=0.05))
     history = system.contact_history(np.zeros(1), np.zeros((1, 4)))[0]
@@ -276,8 +277,9 @@ def test_ground_lifting_follows_the_chain_rule():
 
 def beam(contact_nodes, **options):
     mesh = rectangle(0.2, 0.02, 12, 2, points={"B": (0.0, 0.01), "C": (0.1, 0.02)})
-    return ElasticBody(mesh, Material(), 0.01).modal_basis(
-        8, contact="bottom", contact_nodes=contact_nodes, damping=0.01, **options)
+    return modal_basis(
+        ElasticBody(mesh, Material(), 0.01), 8, contact="bottom", contact_nodes=contact_nodes,
+        damping=0.01, **options)
 
 
 @pytest.mark.parametrize("n", [2, 5, 12, "all"])

@@ -11,7 +11,6 @@ from fecontact import (
     Ground,
     LinearContact,
     Load,
-    VectorField,
     contact_field,
     equilibrium_branch,
     find_equilibrium,
@@ -19,6 +18,7 @@ from fecontact import (
     orbits_from_hopf,
     orbits_from_motion,
     switched_branch,
+    vector_field,
 )
 from fecontact.bifurcation.problem import Settings
 
@@ -48,7 +48,7 @@ def stuart_landau() -> list[Comparison]:
         out[0] = (p[0] - square) * x[0] - 2.0 * x[1]
         out[1] = (p[0] - square) * x[1] + 2.0 * x[0]
 
-    field = VectorField.from_function(landau, {"r": -0.5}, 2)
+    field = vector_field(landau, {"r": -0.5}, 2)
     still = equilibrium_branch(field, "r", bounds=(-0.5, 1.0))
     hopf, = still.of_kind("Hopf")
     end = orbits_from_hopf(field, still, hopf, bounds=(-0.5, 1.0)).points[-1]
@@ -67,7 +67,7 @@ def lorenz() -> list[Comparison]:
         out[1] = x[0] * (p[0] - x[2]) - x[1]
         out[2] = x[0] * x[1] - 8.0 / 3.0 * x[2]
 
-    field = VectorField.from_function(flow, {"rho": 280.0}, 3)
+    field = vector_field(flow, {"rho": 280.0}, 3)
     root = np.sqrt(8.0 / 3.0 * 19.0)
     still = find_equilibrium(field, {"rho": 20.0}, start=[root, root, 19.0])
     hopf, = equilibrium_branch(field, "rho", still, bounds=(20.0, 30.0)).of_kind("Hopf")
@@ -103,7 +103,7 @@ def reactor() -> list[Comparison]:
     for p2, kind, wanted in ((14.0, "Hopf", (0.165042, 0.336550)),
                              (17.0, "Hopf", (0.120866, 0.217081)),
                              (17.0, "fold", (0.121901, 0.117015))):
-        field = VectorField.from_function(reaction, {"p1": 0.0, "p2": p2}, 2)
+        field = vector_field(reaction, {"p1": 0.0, "p2": p2}, 2)
         branch = equilibrium_branch(field, "p1", bounds=(0.0, 0.5))
         rows += [Comparison(f"AUTO's ab, p2 = {p2:g}: p1 of {kind} point {k + 1}", value,
                             point.parameter)
@@ -120,7 +120,7 @@ def predator() -> list[Comparison]:
                   - p[0] * (1.0 - np.exp(-5.0 * x[0])))
         out[1] = -x[1] + 3.0 * x[0] * x[1]
 
-    field = VectorField.from_function(species, {"p1": 0.0}, 2)
+    field = vector_field(species, {"p1": 0.0}, 2)
     empty = equilibrium_branch(field, "p1", bounds=(0.0, 1.0))
     first, = empty.of_kind("branch point")
     prey = switched_branch(field, "p1", first, bounds=(0.01, 1.0))

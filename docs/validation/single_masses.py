@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from fecontact import ContactSystem, ModalBasis, RoughSurface, static_equilibrium
+from fecontact import (
+    ContactSystem,
+    RoughSurface,
+    basis_from_matrices,
+    static_equilibrium,
+)
 
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 
@@ -10,7 +15,7 @@ SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 def mass_above(mass: float = 1.0, spring: float = 0.0, **parts: object) -> ContactSystem:
     """A mass that moves up and down only."""
     rows = np.array([[0.0], [1.0], [0.0]])
-    basis = ModalBasis.from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
+    basis = basis_from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
     return ContactSystem(basis, **{"normal": SURFACE, **parts})
 
 
@@ -22,7 +27,7 @@ def mass_in_plane(mass: float = 1.0, stiffness: np.ndarray | None = None,
     """
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(
+    basis = basis_from_matrices(
         mass * np.eye(2), np.zeros((2, 2)) if stiffness is None else stiffness,
         {"contact": rows[None], "B": rows, "C": rows},
         damping=np.zeros((2, 2)) if damping is None else damping)

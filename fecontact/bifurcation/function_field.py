@@ -22,7 +22,7 @@ _NOT_ANALYTIC = {"abs", "absolute", "fabs", "sign", "real", "imag", "conj", "con
 
 
 class FunctionField(VectorField):
-    """See :meth:`VectorField.from_function`.
+    """See :meth:`vector_field`.
 
     Attributes
     ----------
@@ -122,16 +122,53 @@ class FunctionField(VectorField):
         return self._scales
 
 
-def function_field(
+def vector_field(
     function: Callable[..., Any],
     parameters: Mapping[str, float],
     states: int | Iterable[str],
-    jacobian: Callable[..., Any] | None,
-    differentiation: str,
-    scales: ArrayLike | None,
-    period: Callable[[Mapping[str, float]], float] | None,
-) -> FunctionField:
-    """See :meth:`VectorField.from_function`."""
+    *,
+    jacobian: Callable[..., Any] | None = None,
+    differentiation: str = "automatic",
+    scales: ArrayLike | None = None,
+    period: Callable[[Mapping[str, float]], float] | None = None,
+) -> VectorField:
+    """A vector field from a function of one state, compiled by numba.
+
+    Parameters
+    ----------
+    function : callable
+        ``f(t, x, p, out)`` that fills out (d,) with the rates at the state x (d,), for the
+        parameters p (k,). It is compiled: arithmetic, ``math`` or ``numpy`` functions, loops.
+    parameters : mapping
+        Names and base values, in the order of p.
+    states : int or sequence of str
+        Number of states, or their names.
+    jacobian : callable, optional
+        ``g(t, x, p, out)`` that fills out (d, d) with df_i/dx_j.
+    differentiation : 'automatic', 'complex' or 'differences'
+        How derivatives that are not given are formed. 'differences' are central ones,
+        extrapolated to order six, over steps that are halved, from 2e-3 of the larger of the
+        state and its scale on, until truncation is below rounding: good to some 1e-11 of the
+        rates over the scale, with kinks and steep laws beside the state too. 'complex' is the
+        complex step, exact to round-off for functions that are analytic and accept complex
+        numbers (``numpy`` functions instead of those of ``math``; no comparisons, abs, sign,
+        min or max of states, no powers of negative numbers). It is compared with differences
+        wherever it is used, and refused where it is wrong by more than 1e-7. 'automatic' is
+        complex if that is right at samples of either sign around zero, up to twice the
+        scales, else differences; see :attr:`differentiation` of the result. Where it turns
+        out wrong later, as functions do that overflow, differences take its place there, with
+        a warning.
+    scales : sequence, optional
+        Typical size (d,) of each state; one by default. Smaller states are fine.
+    period : callable, optional
+        Period in t from the parameters by name, for a function that depends on t.
+
+    Raises
+    ------
+    InputError
+        If the function cannot be compiled, or does not allow the differentiation asked for.
+        With 'complex', derivatives raise :class:`AnalysisError` where it turns out wrong.
+    """
     if differentiation not in _WAYS:
         raise InputError(f"differentiation = {differentiation!r} must be one of "
                          f"{choices(_WAYS)}.")

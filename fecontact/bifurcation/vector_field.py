@@ -1,11 +1,10 @@
 """Vector fields x' = f(t, x, p), evaluated at many places at once."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fecontact.errors import InputError, choices, nearest
 
@@ -81,63 +80,10 @@ class VectorField(ABC):
             values[self.index(name)] = value
         return values
 
-    @staticmethod
-    def from_function(
-        function: Callable[..., Any],
-        parameters: Mapping[str, float],
-        states: int | Iterable[str],
-        *,
-        jacobian: Callable[..., Any] | None = None,
-        differentiation: str = "automatic",
-        scales: ArrayLike | None = None,
-        period: Callable[[Mapping[str, float]], float] | None = None,
-    ) -> "VectorField":
-        """A vector field from a function of one state, compiled by numba.
-
-        Parameters
-        ----------
-        function : callable
-            ``f(t, x, p, out)`` that fills out (d,) with the rates at the state x (d,), for the
-            parameters p (k,). It is compiled: arithmetic, ``math`` or ``numpy`` functions, loops.
-        parameters : mapping
-            Names and base values, in the order of p.
-        states : int or sequence of str
-            Number of states, or their names.
-        jacobian : callable, optional
-            ``g(t, x, p, out)`` that fills out (d, d) with df_i/dx_j.
-        differentiation : 'automatic', 'complex' or 'differences'
-            How derivatives that are not given are formed. 'differences' are central ones,
-            extrapolated to order six, over steps that are halved, from 2e-3 of the larger of the
-            state and its scale on, until truncation is below rounding: good to some 1e-11 of the
-            rates over the scale, with kinks and steep laws beside the state too. 'complex' is the
-            complex step, exact to round-off for functions that are analytic and accept complex
-            numbers (``numpy`` functions instead of those of ``math``; no comparisons, abs, sign,
-            min or max of states, no powers of negative numbers). It is compared with differences
-            wherever it is used, and refused where it is wrong by more than 1e-7. 'automatic' is
-            complex if that is right at samples of either sign around zero, up to twice the
-            scales, else differences; see :attr:`differentiation` of the result. Where it turns
-            out wrong later, as functions do that overflow, differences take its place there, with
-            a warning.
-        scales : sequence, optional
-            Typical size (d,) of each state; one by default. Smaller states are fine.
-        period : callable, optional
-            Period in t from the parameters by name, for a function that depends on t.
-
-        Raises
-        ------
-        InputError
-            If the function cannot be compiled, or does not allow the differentiation asked for.
-            With 'complex', derivatives raise :class:`AnalysisError` where it turns out wrong.
-        """
-        from fecontact.bifurcation.function_field import function_field
-
-        return function_field(function, parameters, states, jacobian, differentiation, scales,
-                              period)
-
 
 def require_field(given: object) -> None:
     """InputError for what is no vector field, such as a contact system itself."""
     if not isinstance(given, VectorField):
         raise InputError(f"A vector field is needed, not a {type(given).__name__}; make one with "
                          f"contact_field(system, names of parameters), or with "
-                         f"VectorField.from_function.")
+                         f"vector_field(function, ...).")

@@ -33,13 +33,14 @@ def branch(
     (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, frequencies and growth rates of the
     modes in steady sliding. Ctrl-C stops it; what was computed until then is written.
     """
-    from fecontact.console import INTERRUPTED, output_folder, waiting
+    from fecontact.console import INTERRUPTED, waiting
+    from fecontact.core.folders import output_folder
     from fecontact.results import read_study
 
     described = read_study(study, set_)
     wanted = _wanted(described.branch, parameter, start, end)
     _ = wanted.name, wanted.bounds
-    from fecontact.branch_results import runs_beneath, special_table, write_branches
+    from fecontact.branch_results import runs_beneath, special_table, write_branch_results
     from fecontact.branching import follow_branches
 
     with output_folder(output or described.results) as folder:
@@ -50,7 +51,7 @@ def branch(
         if wanted.brute_force and not result.interrupted:
             beneath = runs_beneath(system, wanted, described.simulation.initial)
         with waiting("Writing"):
-            files = write_branches(result, wanted, folder, described.name, beneath)
+            files = write_branch_results(result, wanted, folder, described.name, beneath)
         for name, found in result.found.items():
             say(f"\n{name}: {found.status.value}")
             if found.message:

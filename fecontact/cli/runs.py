@@ -31,7 +31,7 @@ def render(
     """Draw a run as a movie or as numbered pictures; [render] of the study holds the defaults."""
     from dataclasses import replace
 
-    from fecontact.console import output_folder
+    from fecontact.core.folders import output_folder
     from fecontact.results import movie, stored_run
 
     changes: dict[str, Any] = {
@@ -72,7 +72,8 @@ def plot(
     trust: Trust = False,
 ) -> None:
     """Draw a plot of a run, again or of another kind."""
-    from fecontact.console import output_folder, waiting
+    from fecontact.console import waiting
+    from fecontact.core.folders import output_folder
     from fecontact.results import stored_run
 
     stored = stored_run(file, trust)
@@ -98,7 +99,8 @@ def export(
     trust: Trust = False,
 ) -> None:
     """Write a run in another format."""
-    from fecontact.console import output_folder, waiting
+    from fecontact.console import waiting
+    from fecontact.core.folders import output_folder
     from fecontact.results import stored_run
 
     stored = stored_run(file, trust)

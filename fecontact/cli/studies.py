@@ -21,7 +21,7 @@ def init(
     = False,
 ) -> None:
     """Write a commented study file to start from."""
-    from fecontact.console import write_text
+    from fecontact.core.folders import write_text
     from fecontact.templates import template
 
     if file.suffix.lower() != ".toml":
@@ -35,7 +35,7 @@ def init(
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
     """Make the mesh of a study, and print its size and its groups."""
-    from fecontact.console import output_folder
+    from fecontact.core.folders import output_folder
     from fecontact.mesh_io import write_mesh
     from fecontact.report import mesh_table
     from fecontact.results import read_study
@@ -63,7 +63,9 @@ def modes(
     = False,
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
-    from fecontact.console import output_folder, progress_bar, waiting
+    from fecontact.basis_report import BasisReport
+    from fecontact.console import progress_bar, waiting
+    from fecontact.core.folders import output_folder
     from fecontact.results import convergence_of, read_study
 
     described = read_study(study, set_)
@@ -72,7 +74,7 @@ def modes(
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             basis = described.basis()
-        say(str(basis.report()))
+        say(str(BasisReport(basis)))
         picture = folder / f"{described.name}-modes.png"
         plot_modes(basis, picture)
         say_written(picture)
@@ -99,7 +101,8 @@ def run(
     Ctrl-C stops the run, and so do SIGTERM and SIGHUP; what was computed until then is written, and
     --resume goes on from there.
     """
-    from fecontact.console import output_folder, progress_bar, waiting
+    from fecontact.console import progress_bar, waiting
+    from fecontact.core.folders import output_folder
     from fecontact.locks import locked
     from fecontact.report import notes, run_table
     from fecontact.results import read_study, write_run

@@ -23,6 +23,7 @@ from fecontact.formats.uff_sets import (
     require_displacements,
     units,
 )
+from fecontact.normalisation import basis_from_modes
 
 if TYPE_CHECKING:
     from fecontact.basis import ModalBasis
@@ -96,7 +97,7 @@ class UffModes:
         damping : float, (m,) sequence, Rayleigh or (m, m) array, optional
             In the place of the file's damping ratios.
         contact_x, tributary : (n,) arrays, optional
-            As for :meth:`ModalBasis.from_modes`; the default for contact_x is the file's.
+            As for :meth:`basis_from_modes`; the default for contact_x is the file's.
 
         Raises
         ------
@@ -104,7 +105,6 @@ class UffModes:
             For labels that are not there, axes that are not at right angles, and where neither
             the file nor the call gives modal masses.
         """
-        from fecontact.basis import ModalBasis
         from fecontact.rows import rows_from_dofs
 
         (first, sign_x), (second, sign_y) = self._axis(axes[0]), self._axis(axes[1])
@@ -134,7 +134,7 @@ class UffModes:
         if contact_x is None:
             where = sign_x * self.coordinates[[self.node(label) for label in contact], first]
             contact_x = where if np.isfinite(where).all() else None
-        return ModalBasis.from_modes(
+        return basis_from_modes(
             shapes.reshape(-1, m), rows, frequencies_hz=self.frequencies_hz, modal_mass=masses,
             damping=self.damping_ratios if damping is None else damping, contact_x=contact_x,
             tributary=tributary)

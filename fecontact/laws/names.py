@@ -14,9 +14,12 @@ from typing import Any
 
 from fecontact.errors import InputError, choices, nearest
 from fecontact.laws.contract import FrictionLaw, NormalLaw
+from fecontact.laws.drive import Drive, Load
+from fecontact.laws.ground import Ground
 from fecontact.laws.ground_motion import GroundMotion
 from fecontact.laws.profile_base import Profile
 from fecontact.laws.signal_base import Signal
+from fecontact.tables import Kinds, register_kinds
 
 
 @cache
@@ -93,6 +96,11 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         },
     }
 
+
+# The parts of a contact system that tables describe.
+PART_CLASSES: Mapping[str, type] = {
+    "normal": NormalLaw, "friction": FrictionLaw, "ground": Ground, "drive": Drive, "load": Load,
+}
 
 # The law of a table that names none.
 _DEFAULTS: dict[type, str] = {NormalLaw: "rough-surface", FrictionLaw: "exponential"}
@@ -281,3 +289,6 @@ def _module(path: str) -> Any:
         del sys.modules[name]
         raise
     return module
+
+
+register_kinds(Kinds(is_kind, law_class, name_of))

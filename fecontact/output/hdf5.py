@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.arguments import as_path
+from fecontact.arguments import as_path, require_kind
 from fecontact.basis import ModalBasis
-from fecontact.console import held_back_interrupt
+from fecontact.core.interrupts import held_back_interrupt
 from fecontact.errors import InputError
 from fecontact.field import Field, Quality
 from fecontact.stored import (
@@ -109,7 +109,32 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
         yield file
 
 
-def write_basis(group: Any, basis: ModalBasis) -> None:
+def write_basis(path: str | Path, basis: ModalBasis) -> None:
+    """Write a modal basis to an HDF5 file, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    require_kind("write_basis", ModalBasis, basis=basis)
+    with new_file(path) as file:
+        store_basis(file.create_group("basis"), basis)
+
+
+def read_basis(path: str | Path) -> ModalBasis:
+    """Read a basis that :func:`write_basis` wrote, or that of a case; exact to the last bit.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it holds no basis or a damaged one.
+    """
+    with open_file(path, "basis") as file:
+        return stored_basis(member(file, "basis"))
+
+
+def store_basis(group: Any, basis: ModalBasis) -> None:
     """Write a basis into an HDF5 group."""
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
@@ -131,8 +156,8 @@ def write_basis(group: Any, basis: ModalBasis) -> None:
     field["restriction"].attrs["shape"] = restriction.shape
 
 
-def read_basis(group: Any) -> ModalBasis:
-    """Read a basis from an HDF5 group that :func:`write_basis` filled.
+def stored_basis(group: Any) -> ModalBasis:
+    """Read a basis from an HDF5 group that :func:`store_basis` filled.
 
     Raises
     ------

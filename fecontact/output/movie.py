@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.arguments import as_path
-from fecontact.console import held_back_interrupt
+from fecontact.core.interrupts import held_back_interrupt
 from fecontact.errors import InputError, MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.frames import frame_indices, require_field, require_frame_rate

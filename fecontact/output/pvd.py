@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fecontact.console import output_folder
+from fecontact.core.folders import output_folder
 from fecontact.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.frames import (

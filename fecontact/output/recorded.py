@@ -16,7 +16,7 @@ from fecontact.errors import InputError
 from fecontact.gap import gap_values
 from fecontact.laws.names import UntrustedError
 from fecontact.system import ContactSystem
-from fecontact.tables import system_parts
+from fecontact.system_tables import system_parts
 
 Array = NDArray[np.float64]
 

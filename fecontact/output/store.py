@@ -20,11 +20,11 @@ from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.names import UntrustedError, law_files, movable, trusting, with_folder
 from fecontact.output.frames import frame_indices
-from fecontact.output.hdf5 import new_file, open_file, read_basis, write_basis
+from fecontact.output.hdf5 import new_file, open_file, store_basis, stored_basis
 from fecontact.output.vtkhdf import write_vtkhdf
 from fecontact.stored import DamagedError, array, from_json, member, reading, text, texts
 from fecontact.system import ContactSystem
-from fecontact.tables import system_from_tables, system_tables
+from fecontact.system_tables import system_from_tables, system_tables
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
 _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
@@ -98,7 +98,7 @@ def write_case(
     with new_file(path) as file:
         for name, text in _versions().items():
             file.require_group("versions").attrs[name] = text
-        write_basis(file.create_group("basis"), trajectory.system.basis)
+        store_basis(file.create_group("basis"), trajectory.system.basis)
         file.create_group("system").attrs["json"] = json.dumps(
             movable(system_tables(trajectory.system), folder, root))
         if study is not None:
@@ -134,8 +134,8 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
     with open_file(path, "basis") as file:
         if "trajectory" not in file:
             raise InputError(f"{path} holds a modal basis but no run; read it with "
-                             f"ModalBasis.load.")
-        basis = read_basis(member(file, "basis"))
+                             f"read_basis.")
+        basis = stored_basis(member(file, "basis"))
         tables = with_folder(from_json(text(member(file, "system"), "json"), dict, "the system"),
                              Path(path).parent)
         stored = member(file, "trajectory")

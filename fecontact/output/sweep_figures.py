@@ -10,6 +10,7 @@ from fecontact.errors import InputError
 from fecontact.output.figures import COLOURS, distinct_colours, new_figure
 from fecontact.output.units import suitable_unit
 from fecontact.parameter_units import parameter_label
+from fecontact.study import Study
 from fecontact.sweeps.statistics import SobolIndices
 from fecontact.sweeps.summaries import unit_of
 from fecontact.sweeps.table import SweepTable, is_numeric
@@ -64,10 +65,10 @@ def diagram_figure(
                   marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
                   label=None if by is None else f"{_shown(value)}")
     _mark_failed(axes, table, x)
-    axes.set_xlabel(parameter_label(parameter))
+    axes.set_xlabel(parameter_label(parameter, Study))
     _spaced(axes, "x", x, labels)
     if by is not None:
-        figure.legend(title=parameter_label(by), loc="outside right upper")
+        figure.legend(title=parameter_label(by, Study), loc="outside right upper")
     return figure
 
 
@@ -84,7 +85,7 @@ def strobed_figure(table: SweepTable, parameter: str) -> "Figure":
               color="#1a1a1a", markersize=float(np.clip(60.0 / np.sqrt(len(table)), 0.8, 4.0)),
               markeredgewidth=0, rasterized=True)
     _mark_failed(axes, table, x)
-    axes.set_xlabel(parameter_label(parameter))
+    axes.set_xlabel(parameter_label(parameter, Study))
     axes.set_ylabel(f"displacement once per period [{unit}]")
     _spaced(axes, "x", x, labels)
     return figure
@@ -121,8 +122,8 @@ def map_figure(table: SweepTable, name: str, first: str, second: str) -> "Figure
     bar = figure.colorbar(drawn, ax=axes, pad=0.02)
     bar.set_label(_with_unit(name, unit))
     bar.outline.set_visible(False)
-    axes.set_xlabel(parameter_label(first))
-    axes.set_ylabel(parameter_label(second))
+    axes.set_xlabel(parameter_label(first, Study))
+    axes.set_ylabel(parameter_label(second, Study))
     if len(known) < values.size:
         axes.set_title("grey: failed or not computed", loc="right", fontsize=9, color="#606060")
     return figure
@@ -141,7 +142,7 @@ def scatter_figure(table: SweepTable, name: str, parameters: Sequence[str]) -> "
                   markersize=float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0)),
                   alpha=0.7)
         _mark_failed(axes, table, x)
-        axes.set_xlabel(parameter_label(parameter))
+        axes.set_xlabel(parameter_label(parameter, Study))
         _spaced(axes, "x", x, labels)
     last = grid[len(parameters)]
     known = table.values[name][np.isfinite(table.values[name])]
@@ -175,7 +176,7 @@ def sensitivity_figure(found: Mapping[str, SobolIndices]) -> "Figure":
             axes.errorbar(value, places + shift,
                           xerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
                           fmt="none", ecolor="#303030", elinewidth=0.9, capsize=2)
-        axes.set_yticks(places, [parameter_label(key) for key in parameters])
+        axes.set_yticks(places, [parameter_label(key, Study) for key in parameters])
         axes.grid(False, axis="y")
         axes.set_title(name.replace("_", " "), loc="left")
     grid[-1].set_xlabel("part of the variance")

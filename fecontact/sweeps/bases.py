@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError
+from fecontact.output.hdf5 import read_basis
 from fecontact.study import Study
 from fecontact.sweeps.batch import Batch, make_basis, packed, run_batch
 from fecontact.sweeps.dispatch import Job, LostError
@@ -43,7 +44,7 @@ class Bases:
         jobs = []
         for key, batch in self.makers.items():
             if self.store.basis_file(key).exists():
-                self._put(key, ModalBasis.load(self.store.basis_file(key)), batch)
+                self._put(key, read_basis(self.store.basis_file(key)), batch)
             elif self.only:
                 self._put(key, self.study.with_(**batch.cases[0].basis_changes).basis(), batch)
             else:

@@ -15,11 +15,12 @@ from typing import Any, NotRequired, TypedDict, cast
 from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, FecontactError, ModelWarning
 from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.laws.names import PART_CLASSES
+from fecontact.output.hdf5 import read_basis
 from fecontact.parameters import with_parameters
 from fecontact.study import Study
 from fecontact.sweeps.settings import Strobing
 from fecontact.sweeps.summaries import functions_for, summarise
-from fecontact.tables import PART_CLASSES
 from fecontact.whole_files import unwritable
 
 BASIS_SECTIONS = ("geometry", "body", "basis")
@@ -215,7 +216,7 @@ def _basis(batch: Batch, study: Study, key: str) -> ModalBasis:
         given = batch.bases.get(key)
         if isinstance(given, str):
             raise AnalysisError(given)
-        basis = (study.basis() if given is None else ModalBasis.load(given)
+        basis = (study.basis() if given is None else read_basis(given)
                  if isinstance(given, Path) else pickle.loads(given))
         _bases[mark] = basis
         while len(_bases) > _BASES_KEPT:

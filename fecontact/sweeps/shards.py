@@ -15,6 +15,7 @@ from typing import Any
 
 from fecontact.basis import ModalBasis
 from fecontact.locks import locked
+from fecontact.output.hdf5 import write_basis
 from fecontact.stored import DamagedError, from_json, reading
 from fecontact.sweeps.batch import Row, case_file
 from fecontact.whole_files import clear_leftovers, replaced
@@ -91,7 +92,7 @@ class Store:
         path = self.basis_file(key)
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            basis.save(path)
+            write_basis(path, basis)
 
     def kept(self, what: str) -> list[Path]:
         """The files that sweeps have kept in ``shards``, ``cases`` or ``bases``, by their names."""

@@ -227,7 +227,7 @@ def _settings(
 
 @contextlib.contextmanager
 def _folder(folder: Path) -> Iterator[None]:
-    from fecontact.console import output_folder
+    from fecontact.core.folders import output_folder
 
     with output_folder(folder):
         yield

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fecontact.bifurcation.vector_field import VectorField
+from fecontact.bifurcation.function_field import vector_field
 
 
 def lorenz(t, x, p, out):
@@ -15,7 +15,7 @@ def lorenz(t, x, p, out):
 
 
 def lorenz_field():
-    return VectorField.from_function(lorenz, {"rho": 280.0, "sigma": 10.0, "b": 8.0 / 3.0}, 3)
+    return vector_field(lorenz, {"rho": 280.0, "sigma": 10.0, "b": 8.0 / 3.0}, 3)
 
 
 @njit
@@ -52,8 +52,8 @@ def two_masses_jacobian(t, x, p, out):
 
 
 def two_masses_field(**changes):
-    return VectorField.from_function(two_masses, {"B": 1.0, "v0": 1.0, "D": 0.1} | changes, 4,
-                                     jacobian=two_masses_jacobian)
+    return vector_field(two_masses, {"B": 1.0, "v0": 1.0, "D": 0.1} | changes, 4,
+                        jacobian=two_masses_jacobian)
 
 
 def settled(field, end, start, period, values=None):

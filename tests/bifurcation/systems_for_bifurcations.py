@@ -13,9 +13,10 @@ from fecontact import (
     ModalBasis,
     PrescribedForce,
     ProductFriction,
+    basis_from_matrices,
+    vector_field,
 )
 from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.vector_field import VectorField
 
 
 def lorenz(t, x, p, out):
@@ -25,14 +26,14 @@ def lorenz(t, x, p, out):
 
 
 def lorenz_field(**options):
-    return VectorField.from_function(lorenz, {"rho": 2.0, "sigma": 10.0, "b": 8.0 / 3.0}, 3,
-                                     **options)
+    return vector_field(lorenz, {"rho": 2.0, "sigma": 10.0, "b": 8.0 / 3.0}, 3,
+                        **options)
 
 
 def two_masses(D=0.1, gamma=2.5, kappa=2.0, delta=1.0):
     rows = np.zeros((2, 3, 2))
     rows[:, 0] = np.eye(2)
-    return ModalBasis.from_matrices(
+    return basis_from_matrices(
         np.diag([gamma, 1.0]), [[1.0 + kappa, -1.0], [-1.0, 1.0]], {"contact": rows},
         damping=2.0 * D * np.array([[1.0 + delta, -1.0], [-1.0, 1.0]]))
 
@@ -87,9 +88,9 @@ def mode_coupling(damping=0.0, mu=0.1):
     """Hoffmann's model as a contact system: x and y of one mass, a contact spring of 4/3."""
     rows = np.zeros((1, 3, 2))
     rows[0, 0, 0] = rows[0, 1, 1] = 1.0
-    basis = ModalBasis.from_matrices(np.eye(2), [[2.0, 1.0], [1.0, 2.0 / 3.0]],
-                                     {"contact": rows, "C": rows[0]},
-                                     damping=damping * np.eye(2))
+    basis = basis_from_matrices(np.eye(2), [[2.0, 1.0], [1.0, 2.0 / 3.0]],
+                                {"contact": rows, "C": rows[0]},
+                                damping=damping * np.eye(2))
     return ContactSystem(basis, normal=LinearContact(4.0 / 3.0),
                          friction=ConstantFriction(mu, 1e9), ground=Ground(speed=-100.0),
                          load=Load(1.0))

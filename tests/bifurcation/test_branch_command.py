@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from fecontact import Study, load_branches, settled_motion
-from fecontact.bifurcation.branch import Branch, Status
+from fecontact import Study, read_branch, read_branches, settled_motion
+from fecontact.bifurcation.branch import Status
 from fecontact.cli import execute
 
 STUDY = """
@@ -32,7 +32,7 @@ def test_block_on_a_belt(study, capsys):
     """Near the closed form of one mass, 8.3365 mm/s."""
     assert execute(["branch", str(study), "ground.speed", "--from", "12e-3", "--to", "7e-3"]) == 0
     said = capsys.readouterr().out
-    found = Branch.load("results/block-branch.h5")
+    found = read_branch("results/block-branch.h5")
     hopf, = found.of_kind("Hopf")
     assert hopf.parameter == pytest.approx(8.3365e-3, rel=1e-3)
     assert f"{hopf.parameter:.7g}" in said
@@ -62,7 +62,7 @@ def test_the_friction_oscillators_loop_is_one_branch(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert execute(["branch", str(study)]) == 0
     written, = tmp_path.rglob("*-branch.h5")
-    found = load_branches(written)
+    found = read_branches(written)
     sliding, orbits = found.values()
     hopf, = sliding.special
     assert hopf.parameter == pytest.approx(8.336533e-3, rel=1e-7)

@@ -5,13 +5,12 @@ import csv
 import numpy as np
 import pytest
 
-from fecontact import InputError, simulate
+from fecontact import InputError, read_branch, simulate
 from fecontact import branching as module
-from fecontact.bifurcation.branch import Branch
-from fecontact.bifurcation.branch_file import load_branches, save_branches
 from fecontact.bifurcation.observation import motion_of
 from fecontact.branching import follow_branches
 from fecontact.cli import execute
+from fecontact.output.branches import read_branches, write_branches
 from fecontact.study import Study
 from fecontact.study_branch import BranchSettings
 
@@ -83,12 +82,12 @@ def test_sliding_and_the_orbits_of_its_hopf_point(study, capsys):
     assert execute(["branch", str(study)]) == 0
     said = capsys.readouterr().out
     results = study.parent / "results"
-    found = load_branches(results / "block-branch.h5")
+    found = read_branches(results / "block-branch.h5")
     assert list(found) == ["steady sliding", "orbits"]
     hopf, = found["steady sliding"].of_kind("Hopf")
     assert hopf.parameter == pytest.approx(8.336533e-3, rel=1e-5)
     assert f"{hopf.parameter:.7g}" in said
-    assert Branch.load(results / "block-branch.h5").name == "ground.speed"
+    assert read_branch(results / "block-branch.h5").name == "ground.speed"
     for name in ("block-branch.png", "block-stability.png"):
         assert (results / name).stat().st_size > 10_000
     rows = rows_of(results / "block-branch.csv")
@@ -140,7 +139,7 @@ def test_interruption_keeps_what_is_there(study, monkeypatch):
 
     monkeypatch.setattr(module, "_beyond", interrupted)
     assert execute(["branch", str(study)]) == 130
-    assert list(load_branches("results/block-branch.h5")) == ["steady sliding"]
+    assert list(read_branches("results/block-branch.h5")) == ["steady sliding"]
 
 
 def test_branches_that_cannot_be_followed_are_named(study, monkeypatch, capsys):
@@ -182,5 +181,5 @@ def test_settings_without_their_parts():
 
 def test_no_branches_no_file(tmp_path):
     with pytest.raises(InputError, match="no branches to write"):
-        save_branches(tmp_path / "none.h5", {})
+        write_branches(tmp_path / "none.h5", {})
     assert not list(tmp_path.iterdir())

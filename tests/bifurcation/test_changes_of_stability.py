@@ -17,9 +17,9 @@ from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
 from fecontact.bifurcation.follow import follow
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.output.stability_plots import plot_eigenvalues
 
 CHANGES = {"fold": {-1, 1}, "branch point": {-1, 0, 1}, "period doubling": {-1, 1},
@@ -61,7 +61,7 @@ def reactor(t, x, p, out):
     (two_mass_field(20.0, 8.0), "ground.speed", (0.05, 8.0), None),
     (two_mass_field(0.1), "B", (0.1, 30.0), None),
     (lorenz_field(), "rho", (0.5, 40.0), [1.0, 1.0, 1.0]),
-    (VectorField.from_function(reactor, {"p": 0.0}, 2), "p", (0.0, 0.5), None),
+    (vector_field(reactor, {"p": 0.0}, 2), "p", (0.0, 0.5), None),
     (contact_field(mode_coupling(0.05), ["friction.friction_coefficient"]),
      "friction.friction_coefficient", (0.0, 1.0), None),
     (contact_field(belt(1e6, 0.012), ["ground.speed"]), "ground.speed", (2e-3, 0.012), None),
@@ -98,7 +98,7 @@ def test_two_masses_from_a_slow_belt():
 
 
 def test_crossings_that_no_test_tells_apart_are_marked():
-    field = VectorField.from_function(twice, {"p": -0.3}, 4)
+    field = vector_field(twice, {"p": -0.3}, 4)
     branch = equilibrium_branch(field, "p", bounds=(-0.3, 0.4))
     assert_explained(branch, unresolved=1)
     mark, = branch.special
@@ -128,7 +128,7 @@ def round_a_circle(t, x, p, out):
 
 
 def test_orbits_whose_multipliers_cross_together():
-    field = VectorField.from_function(round_a_circle, {"p": -0.2}, 6)
+    field = vector_field(round_a_circle, {"p": -0.2}, 6)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.zeros((400, 6))
     circle[:, 0], circle[:, 1] = np.cos(2.0 * t), np.sin(2.0 * t)

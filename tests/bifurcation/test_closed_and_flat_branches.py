@@ -8,9 +8,9 @@ from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.curves import hopf_curve
 from fecontact.bifurcation.equilibria import find_equilibrium
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
 
 
 def island(t, x, p, out):
@@ -30,7 +30,7 @@ def circle(radius, period):
 @pytest.mark.parametrize("largest", [0.02, 0.05])
 def test_an_island_of_orbits_is_gone_round_once(largest):
     """The phase has moved on when the branch comes back, and the mesh is another one."""
-    field = VectorField.from_function(island, {"p": 0.1}, 2)
+    field = vector_field(island, {"p": 0.1}, 2)
     square = 1.0 + np.sqrt(0.24)
     t, x = circle(np.sqrt(square), 2.0 * np.pi / np.sqrt(4.0 - 0.25 * square))
     branch = orbits_from_motion(field, "p", t, x, period=t[-1], bounds=(-1.0, 1.0),
@@ -61,7 +61,7 @@ def band(t, x, p, out):
 
 
 def test_a_loop_of_doubled_orbits_ends_where_it_is_single():
-    field = VectorField.from_function(band, {"q": -0.4}, 3)
+    field = vector_field(band, {"q": -0.4}, 3)
     t, x = circle(1.0, np.pi)
     single = orbits_from_motion(field, "q", t, np.column_stack([x, 0.0 * t]), period=np.pi,
                                 bounds=(-0.5, 0.5), intervals=20, scales=np.ones(3))
@@ -88,7 +88,7 @@ def test_no_fold_beside_a_fork(largest):
     """The bent branch turns at the pitchfork, at p = 0 where the mean growth of z is zero."""
     from scipy.integrate import solve_ivp
 
-    field = VectorField.from_function(fork, {"p": 0.5}, 3)
+    field = vector_field(fork, {"p": 0.5}, 3)
     run = solve_ivp(lambda t, x: field.rates(np.zeros(1), x[None], field.values)[0], (0.0, 60.0),
                     [1.0, 0.0, 0.7], rtol=1e-9, atol=1e-11, dense_output=True)
     t = np.linspace(50.0, 60.0, 3000)
@@ -109,7 +109,7 @@ def test_no_folds_on_a_canard():
 
     Where its multipliers grow beyond what numbers hold, the branch may say that it has lost them.
     """
-    field = VectorField.from_function(canard, {"a": 1.2}, 2)
+    field = vector_field(canard, {"a": 1.2}, 2)
     rest = equilibrium_branch(field, "a", [1.2, 1.2**3 / 3.0 - 1.2], bounds=(0.8, 1.3),
                               direction=-1.0)
     orbits = orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=(0.8, 1.3),
@@ -125,7 +125,7 @@ def pendulum(t, x, p, out):
 
 
 def test_a_conservative_family_has_no_special_points():
-    field = VectorField.from_function(pendulum, {"a": 0.1}, 2)
+    field = vector_field(pendulum, {"a": 0.1}, 2)
     rest = equilibrium_branch(field, "a", bounds=(-0.5, 0.5), direction=-1.0)
     centre, = rest.of_kind("Hopf")
     assert centre.details["criticality"] == "undecided"
@@ -143,7 +143,7 @@ def lotka(t, x, p, out):
 
 def test_terms_that_cancel_decide_nothing():
     """Lotka's equations have closed orbits only: l1 is zero, its terms are of the order of one."""
-    field = VectorField.from_function(lotka, {"a": -0.1}, 2)
+    field = vector_field(lotka, {"a": -0.1}, 2)
     point, = equilibrium_branch(field, "a", [1.0, 1.0], bounds=(-0.3, 0.3)).of_kind("Hopf")
     assert abs(point.details["first_lyapunov"]) < 1e-12
     assert point.details["criticality"] == "undecided"
@@ -156,7 +156,7 @@ def takens(t, x, p, out):
 
 @pytest.mark.parametrize("k", [39, 59])
 def test_two_states_have_no_zero_hopf_point(k):
-    field = VectorField.from_function(takens, {"b": -1.0 - 0.013 * k, "c": 1.5}, 2)
+    field = vector_field(takens, {"b": -1.0 - 0.013 * k, "c": 1.5}, 2)
     rest = equilibrium_branch(field, "c", [-np.sqrt(1.0 + 0.013 * k), 0.0], bounds=(0.2, 1.9),
                               direction=-1.0)
     curve = hopf_curve(field, ("c", "b"), rest.of_kind("Hopf")[0],

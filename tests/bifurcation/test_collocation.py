@@ -9,6 +9,7 @@ from collocation_fields import settled
 from fecontact.bifurcation import elimination
 from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.continuation import continuation
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.interpolation import (
     equidistributed,
     extremes,
@@ -19,7 +20,6 @@ from fecontact.bifurcation.interpolation import (
 from fecontact.bifurcation.orbit_starts import corrected, from_samples
 from fecontact.bifurcation.orbits import orbits_from_motion
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import AnalysisError, InputError
 
 
@@ -47,7 +47,7 @@ def drift(t, x, p, out):
 
 @pytest.fixture(scope="module")
 def landau():
-    return VectorField.from_function(stuart_landau, {"r": 0.5, "w": 2.0}, 2)
+    return vector_field(stuart_landau, {"r": 0.5, "w": 2.0}, 2)
 
 
 def orbit_on(field, mesh, degree, r=0.5):
@@ -89,8 +89,8 @@ def test_condensed_solution_is_that_of_the_whole_system(landau):
 
 
 def test_parameter_that_moves_the_period_of_the_forcing():
-    field = VectorField.from_function(resonator, {"w": 0.8, "D": 0.1}, 2,
-                                      period=lambda p: 2.0 * np.pi / p["w"])
+    field = vector_field(resonator, {"w": 0.8, "D": 0.1}, 2,
+                         period=lambda p: 2.0 * np.pi / p["w"])
     rng = np.random.default_rng(4)
     nodes = rng.normal(size=(12, 2))
     problem = Collocation(field, field.values, 0, np.linspace(0.0, 1.0, 5), 3, nodes, np.ones(4))
@@ -126,8 +126,8 @@ def test_error_between_mesh_points_falls_with_order_m_plus_one(landau):
 
 def test_resonance_curve():
     D = 0.1
-    field = VectorField.from_function(resonator, {"w": 0.5, "D": D}, 2,
-                                      period=lambda p: 2.0 * np.pi / p["w"])
+    field = vector_field(resonator, {"w": 0.5, "D": D}, 2,
+                         period=lambda p: 2.0 * np.pi / p["w"])
     period = 4.0 * np.pi
     t = np.linspace(0.0, period, 400)
     X = 1.0 / np.hypot(1.0 - 0.25, 2.0 * D * 0.5)
@@ -236,7 +236,7 @@ def test_rule_integrates_and_differentiates_polynomials():
     (1e4, 11.80799363, 1.1158705968),
 ])
 def test_mass_on_a_belt_with_steep_friction(slope, period, largest):
-    field = VectorField.from_function(belt, {"slope": slope, "V": 0.2}, 2)
+    field = vector_field(belt, {"slope": slope, "V": 0.2}, 2)
     times, states = settled(field, 60.0, [1.0, 0.2], period)
     problem, u = corrected(*from_samples(field, field.values, 0, times, states, None, 200, 4, 1,
                                          np.ones(3)))
@@ -261,7 +261,7 @@ def test_kind_errors(landau):
         orbits_from_motion(landau, "r", t, circle, scales=[1.0])
     with pytest.raises(AnalysisError, match=r"at r = -0\.5, from the period .*larger amplitude"):
         orbits_from_motion(landau, "r", t, circle, values=[-0.5, 2.0])
-    drifting = VectorField.from_function(drift, {"r": 0.5}, 2)
+    drifting = vector_field(drift, {"r": 0.5}, 2)
     with pytest.raises(AnalysisError, match=r"at r = 0\.5, from the period 5 s: the "
                                             r"iteration ends without any motion"):
         orbits_from_motion(drifting, "r", t, circle, period=5.0, intervals=20)
@@ -269,7 +269,7 @@ def test_kind_errors(landau):
 
 def test_no_convergence_is_told_with_what_to_try():
     # Far too few intervals for friction that is steep.
-    field = VectorField.from_function(belt, {"slope": 1e5, "V": 0.2}, 2)
+    field = vector_field(belt, {"slope": 1e5, "V": 0.2}, 2)
     times, states = settled(field, 60.0, [1.0, 0.2], 12.0)
     with pytest.raises(AnalysisError, match=r"at slope = 100000, from the period 11\.\d+ s: "
                                             r"Newton's method does not converge .* 3 intervals"):

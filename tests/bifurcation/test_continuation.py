@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from fecontact.bifurcation.branch import Branch, Status
+from fecontact import write_branch
+from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.continuation import Problem, Settings, continuation
 from fecontact.bifurcation.follow import follow
 from fecontact.errors import AnalysisError, InputError
+from fecontact.output.branches import read_branch
 
 
 class Linear:
@@ -190,8 +192,8 @@ def test_files(tmp_path):
 
     branch = follow(Ragged(CUBIC.function, CUBIC.slopes), np.array([-1.2, -0.5]),
                     Settings(bounds=(-1.0, 1.0)), name="p", attributes={"who": ["a", "b"]})
-    path = branch.save(tmp_path / "branch.h5")
-    found = Branch.load(path)
+    path = write_branch(tmp_path / "branch.h5", branch)
+    found = read_branch(path)
     assert (found.name, found.status, len(found)) == ("p", branch.status, len(branch))
     for mine, theirs in zip(branch, found, strict=True):
         assert (mine.u == theirs.u).all()
@@ -207,4 +209,4 @@ def test_files(tmp_path):
         branch.column("y")
     path.write_bytes(b"nothing")
     with pytest.raises(InputError, match="not an HDF5 file"):
-        Branch.load(path)
+        read_branch(path)

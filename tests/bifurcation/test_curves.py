@@ -8,7 +8,7 @@ from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.curves import fold_curve, hopf_curve
 from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.vector_field import VectorField
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.errors import InputError
 
 BOX = {"b": (-2.0, 2.0), "c": (-2.0, 2.0)}
@@ -34,7 +34,7 @@ def bautin(t, x, p, out):
 
 
 def test_bogdanov_takens():
-    field = VectorField.from_function(takens, {"b": -1.0, "c": -1.0}, 2)
+    field = vector_field(takens, {"b": -1.0, "c": -1.0}, 2)
     branch = equilibrium_branch(field, "b", [-0.6, 0.0], bounds=(-2.0, 2.0))
     hopf = hopf_curve(field, ("b", "c"), branch.of_kind("Hopf")[0], bounds=BOX)
     assert hopf.status is Status.STOPPED
@@ -55,7 +55,7 @@ def test_bogdanov_takens():
 
 
 def test_cusp():
-    field = VectorField.from_function(cusp, {"b": -1.0, "c": 1.0}, 1)
+    field = vector_field(cusp, {"b": -1.0, "c": 1.0}, 1)
     branch = equilibrium_branch(field, "b", [-1.5], bounds=(-2.0, 2.0))
     curve = fold_curve(field, ("b", "c"), branch.of_kind("fold")[0], bounds=BOX)
     assert 27.0 * curve.column("b") ** 2 == pytest.approx(4.0 * curve.column("c") ** 3, abs=1e-10)
@@ -67,7 +67,7 @@ def test_cusp():
 
 
 def test_bautin():
-    field = VectorField.from_function(bautin, {"b": -1.0, "c": 1.0}, 2)
+    field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
     start, = equilibrium_branch(field, "b", bounds=(-2.0, 2.0)).of_kind("Hopf")
     curve = hopf_curve(field, ("b", "c"), start, bounds=BOX)
     point, = curve.special
@@ -91,7 +91,7 @@ def double_hopf(t, x, p, out):
 
 
 def test_zero_hopf_and_double_hopf():
-    field = VectorField.from_function(zero_hopf, {"a": 0.25, "b": 0.3}, 3)
+    field = vector_field(zero_hopf, {"a": 0.25, "b": 0.3}, 3)
     branch = equilibrium_branch(field, "a", [0.5, 0.0, 0.0], bounds=(-1.0, 1.0), direction=-1.0)
     box = {"a": (-1.0, 1.0), "b": (-1.0, 1.0)}
     folds = fold_curve(field, ("a", "b"), branch.of_kind("fold")[0], bounds=box)
@@ -102,7 +102,7 @@ def test_zero_hopf_and_double_hopf():
     curve = hopf_curve(field, ("a", "b"), branch.of_kind("Hopf")[0], bounds=box)
     assert curve.column("a") == pytest.approx(curve.column("b") ** 2, abs=1e-12)
     assert "zero-Hopf" in [point.kind for point in curve.special]
-    field = VectorField.from_function(double_hopf, {"a": -1.0, "b": -0.5}, 4)
+    field = vector_field(double_hopf, {"a": -1.0, "b": -0.5}, 4)
     start, = equilibrium_branch(field, "a", bounds=(-1.0, 1.0)).of_kind("Hopf")
     curve = hopf_curve(field, ("a", "b"), start, bounds=box)
     point, = curve.of_kind("double Hopf")
@@ -158,6 +158,6 @@ def test_kind_errors():
         hopf_curve(field, ("B", "B"), start)
     with pytest.raises(InputError, match=r"bounds are given for 'v', .*: 'B', 'ground\.speed'"):
         hopf_curve(field, ("B", "ground.speed"), start, bounds={"v": (0.0, 1.0)})
-    plain = VectorField.from_function(cusp, {"b": -1.0, "c": 1.0}, 1)
+    plain = vector_field(cusp, {"b": -1.0, "c": 1.0}, 1)
     with pytest.raises(InputError, match="all eigenvalues are real"):
         hopf_curve(plain, ("b", "c"), Equilibrium(plain, plain.values, np.zeros(1)))

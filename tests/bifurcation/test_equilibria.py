@@ -21,12 +21,13 @@ from fecontact import (
     Material,
     Mesh,
     RoughSurface,
+    modal_basis,
     simulate,
+    vector_field,
 )
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.equilibria import find_equilibrium
 from fecontact.bifurcation.stability_map import stability_map
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import AnalysisError, InputError
 from fecontact.laws.signals import Constant
 
@@ -93,7 +94,7 @@ def beam(mu=0.55):
     mesh = Mesh(np.column_stack([x.ravel(), y.ravel()]), cells,
                 {"contact": np.column_stack([number[0, :-1], number[0, 1:]])})
     body = ElasticBody(mesh, Material.named("steel"), 0.01)
-    basis = body.modal_basis(20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
+    basis = modal_basis(body, 20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
     return ContactSystem(
         basis, normal=RoughSurface(10e6, 10e-6, 40.0), friction=ConstantFriction(mu, 1e6),
         ground=Ground(speed=0.01), load=Load(14.0),
@@ -140,7 +141,7 @@ def test_map_has_gaps_where_there_is_no_equilibrium():
     def fold(t, x, p, out):
         out[0] = p[0] - x[0] * x[0] + p[1]
 
-    field = VectorField.from_function(fold, {"a": 1.0, "b": 0.0}, 1)
+    field = vector_field(fold, {"a": 1.0, "b": 0.0}, 1)
     found = stability_map(field, {"a": [1.0, 0.5, -0.5], "b": [0.0, 0.25]}, start=[1.0])
     assert found.unstable.tolist() == [[0, 0], [0, 0], [-1, -1]]
     assert np.isnan(found.critical[2]).all()
@@ -153,7 +154,7 @@ def test_map_follows_the_equilibrium_along_both_parameters():
     def waves(t, x, p, out):
         out[0] = -np.sin(x[0] - p[0] - p[1])
 
-    field = VectorField.from_function(waves, {"a": 0.0, "b": 0.0}, 1)
+    field = vector_field(waves, {"a": 0.0, "b": 0.0}, 1)
     a, b = np.linspace(0.0, 12.0, 25), np.linspace(0.0, 9.0, 19)
     found = stability_map(field, {"a": a, "b": b})
     assert found.states[..., 0] == pytest.approx(np.add.outer(a, b), abs=1e-9)
@@ -163,7 +164,7 @@ def test_kind_errors():
     def nothing(t, x, p, out):
         out[0] = 1.0 + p[0] * x[0] * x[0]
 
-    field = VectorField.from_function(nothing, {"a": 1.0}, 1)
+    field = vector_field(nothing, {"a": 1.0}, 1)
     with pytest.raises(AnalysisError, match=r"No equilibrium was found for a = 1 .* give a start"):
         find_equilibrium(field, start=[0.3])
     with pytest.raises(InputError, match="must have 1 values"):

@@ -19,14 +19,14 @@ from fecontact import (
     LinearContact,
     Load,
     LuGreFriction,
-    ModalBasis,
+    basis_from_matrices,
+    vector_field,
 )
 from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.continuation import Settings
 from fecontact.bifurcation.equilibria import find_equilibrium
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import AnalysisError, InputError
 
 
@@ -44,7 +44,7 @@ def predator(t, x, p, out):
 
 
 def reactor_branch(p2):
-    field = VectorField.from_function(reactor, {"p1": 0.0, "p2": p2, "p3": 3.0}, 2)
+    field = vector_field(reactor, {"p1": 0.0, "p2": p2, "p3": 3.0}, 2)
     return equilibrium_branch(field, "p1", bounds=(0.0, 0.5))
 
 
@@ -72,7 +72,7 @@ def test_reactor():
 
 
 def test_predator_and_prey():
-    field = VectorField.from_function(predator, {"p1": 0.0, "p2": 3.0, "p3": 5.0, "p4": 3.0}, 2)
+    field = vector_field(predator, {"p1": 0.0, "p2": 3.0, "p3": 5.0, "p4": 3.0}, 2)
     settings = Settings(bounds=(0.01, 1.0))
     trivial = equilibrium_branch(field, "p1", settings=Settings(bounds=(0.0, 1.0)))
     assert parameters(trivial, "branch point") == pytest.approx([0.6], rel=1e-12)
@@ -118,7 +118,7 @@ def test_first_lyapunov_coefficient():
         out[0] = x[1]
         out[1] = p[0] + p[1] * x[0] + x[0] * x[0] - x[0] * x[1]
 
-    field = VectorField.from_function(quadratic, {"b": -0.5, "c": -1.0}, 2)
+    field = vector_field(quadratic, {"b": -0.5, "c": -1.0}, 2)
     hopf, = equilibrium_branch(field, "b", [-0.4, 0.0], bounds=(-1.0, 0.1)).of_kind("Hopf")
     assert hopf.parameter == pytest.approx(0.0, abs=1e-12)
     assert hopf.details["first_lyapunov"] == pytest.approx(2.0 * -0.125, rel=1e-8)
@@ -132,7 +132,7 @@ def test_first_lyapunov_coefficient():
 
     # z' = (r + 2i) z + c |z|^2 z; along the unit eigenvector |z|^2 = 2 |zeta|^2, so l1 = 2 c / w.
     for c, kind in ((-1.0, "supercritical"), (0.7, "subcritical")):
-        field = VectorField.from_function(landau, {"r": -0.5, "c": c}, 2)
+        field = vector_field(landau, {"r": -0.5, "c": c}, 2)
         hopf, = equilibrium_branch(field, "r", bounds=(-1.0, 1.0)).of_kind("Hopf")
         assert hopf.parameter == pytest.approx(0.0, abs=1e-13)
         assert hopf.details["first_lyapunov"] == pytest.approx(2.0 * c / 2.0, rel=1e-9)
@@ -231,7 +231,7 @@ def test_neutral_saddles_are_not_reported():
         out[2] = (0.1 * p[0] - 0.3) * x[2] - x[3]
         out[3] = (0.1 * p[0] - 0.3) * x[3] + x[2]
 
-    field = VectorField.from_function(saddle, {"a": -0.5}, 4)
+    field = vector_field(saddle, {"a": -0.5}, 4)
     assert equilibrium_branch(field, "a", bounds=(-0.9, 0.9)).special == ()
 
 
@@ -244,7 +244,7 @@ def test_pairs_on_the_axis_do_not_cross_it():
             for j in range(3):
                 out[3 + i] -= p[0] * (0.2 + 0.1 * (i + 1) * (j + 1)) * x[j]
 
-    field = VectorField.from_function(chain, {"a": 0.1}, 6)
+    field = vector_field(chain, {"a": 0.1}, 6)
     branch = equilibrium_branch(field, "a", bounds=(0.0, 2.0), settings=Settings(
         step=0.005, largest_step=0.005))
     assert len(branch) > 150
@@ -256,7 +256,7 @@ def test_pitchfork_passed_on_the_bent_branch_is_no_fold():
     def pitchfork(t, x, p, out):
         out[0] = p[0] * x[0] - x[0] * x[0] * x[0]
 
-    field = VectorField.from_function(pitchfork, {"a": 0.49}, 1)
+    field = vector_field(pitchfork, {"a": 0.49}, 1)
     branch = equilibrium_branch(field, "a", [-0.7], bounds=(-0.5, 0.5), direction=-1.0)
     assert branch.points[-1].u == pytest.approx([np.sqrt(0.5), 0.5], rel=1e-9)
     assert [point.kind for point in branch.special] == ["branch point"]
@@ -265,7 +265,7 @@ def test_pitchfork_passed_on_the_bent_branch_is_no_fold():
 
 def test_restart_at_any_point():
     branch = reactor_branch(17.0)
-    field = VectorField.from_function(reactor, {"p1": 0.0, "p2": 17.0, "p3": 3.0}, 2)
+    field = vector_field(reactor, {"p1": 0.0, "p2": 17.0, "p3": 3.0}, 2)
     point = branch.points[len(branch) // 2]
     start = find_equilibrium(field, {"p1": point.parameter}, start=point.u[:-1])
     again = equilibrium_branch(field, "p1", start, bounds=(0.0, 0.5), both=True)
@@ -279,8 +279,8 @@ def test_body_that_is_lifted_off_has_no_equilibrium():
     """Without load nothing presses the mass down: the branch ends, and none is found beyond."""
     rows = np.zeros((1, 3, 2))
     rows[0, 0, 0] = rows[0, 1, 1] = 1.0
-    basis = ModalBasis.from_matrices(np.eye(2), np.diag([1.0, 0.0]),
-                                     {"contact": rows, "C": rows[0]}, damping=0.1 * np.eye(2))
+    basis = basis_from_matrices(np.eye(2), np.diag([1.0, 0.0]),
+                                {"contact": rows, "C": rows[0]}, damping=0.1 * np.eye(2))
     system = ContactSystem(basis, normal=LinearContact(4.0), ground=Ground(speed=1.0),
                            friction=ConstantFriction(0.3, 1e3), load=Load(1.0))
     field = contact_field(system, ["load.normal"])

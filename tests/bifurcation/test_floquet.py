@@ -5,9 +5,9 @@ import pytest
 
 from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.floquet import Floquet
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.interpolation import node_times
 from fecontact.bifurcation.periodic_schur import eigenvalues_of_product
-from fecontact.bifurcation.vector_field import VectorField
 
 
 def planted(multipliers, factors, seed=1):
@@ -88,8 +88,8 @@ def turning(t, x, p, out):
 
 
 def test_linear_periodic_system_from_1e_30_to_1e10():
-    field = VectorField.from_function(turning, {"decades": np.log(10.0)}, 4,
-                                      period=lambda p: 2.0 * np.pi)
+    field = vector_field(turning, {"decades": np.log(10.0)}, 4,
+                         period=lambda p: 2.0 * np.pi)
     errors = []
     for intervals in (40, 80):
         mesh = np.linspace(0.0, 1.0, intervals + 1)
@@ -113,7 +113,7 @@ def stuart_landau(t, x, p, out):
 
 def test_stuart_landau():
     r, w = 0.7, 3.0
-    field = VectorField.from_function(stuart_landau, {"r": r, "w": w}, 2)
+    field = vector_field(stuart_landau, {"r": r, "w": w}, 2)
     mesh = np.linspace(0.0, 1.0, 41)
     t = 2.0 * np.pi * node_times(mesh, 4)
     orbit = np.sqrt(r) * np.stack([np.cos(t), np.sin(t)], axis=1)

@@ -13,8 +13,8 @@ import pytest
 
 from fecontact.bifurcation.equilibria import find_equilibrium
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.orbits import orbits_from_hopf
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import AnalysisError, InputError
 
 size_of = numba.njit(lambda x: abs(x))
@@ -135,7 +135,7 @@ PLACES = np.array([-2.1, -1.0, -0.5, -1e-3, -3e-6, 1e-6, 2e-4, 0.3, 1.7])
 @pytest.mark.parametrize(("function", "slope"), CATALOGUE)
 def test_derivatives_are_those_of_the_closed_form(function, slope):
     """To state and parameter; and what is found is said: no warning is needed."""
-    field = VectorField.from_function(function, {"p": 1.5}, 1)
+    field = vector_field(function, {"p": 1.5}, 1)
     x = PLACES[:, None].copy()
     f, J, P = field.derivatives(np.zeros(len(x)), x, field.values, (0,))
     exact = 1.5 * slope(PLACES)
@@ -148,7 +148,7 @@ def test_derivatives_are_those_of_the_closed_form(function, slope):
                                       if case[0] is not larger])
 def test_the_complex_step_is_refused_where_it_is_wrong(function):
     with pytest.raises(InputError, match=r"does not get .* right|complex step|complex numbers"):
-        VectorField.from_function(function, {"p": 1.5}, 1, differentiation="complex")
+        vector_field(function, {"p": 1.5}, 1, differentiation="complex")
 
 
 def moved(t, x, p, out):
@@ -157,15 +157,15 @@ def moved(t, x, p, out):
 
 def test_what_goes_wrong_on_the_way_is_said():
     """Right around the scale, but 800 of them away complex numbers overflow."""
-    field = VectorField.from_function(moved, {"p": 0.0}, 1, scales=[10.0])
+    field = vector_field(moved, {"p": 0.0}, 1, scales=[10.0])
     assert field.differentiation == "complex"
     x = np.array([[0.3], [-800.0], [0.7]])
     with pytest.warns(UserWarning, match=r"derivatives of moved to 'x1', 'p'.*differences take"):
         _, J, P = field.derivatives(np.zeros(3), x, field.values, (0,))
     assert J[:, 0, 0] == pytest.approx(1.0 / np.cosh(np.clip(x[:, 0], -300, 300))**2, rel=1e-9)
     assert P[:, 0, 0] == pytest.approx(-J[:, 0, 0], rel=1e-12)
-    strict = VectorField.from_function(moved, {"p": 0.0}, 1, scales=[10.0],
-                                       differentiation="complex")
+    strict = vector_field(moved, {"p": 0.0}, 1, scales=[10.0],
+                          differentiation="complex")
     with pytest.raises(AnalysisError, match="does not get the derivatives of moved to 'x1' right"):
         strict.derivatives(np.zeros(3), x, field.values)
     with warnings.catch_warnings():
@@ -175,7 +175,7 @@ def test_what_goes_wrong_on_the_way_is_said():
 
 def test_rounding_is_no_derivative_of_zero():
     """Over steps shorter than the rounding of 1e5 the function does not change at all."""
-    field = VectorField.from_function(offset, {"p": 1.5}, 1)
+    field = vector_field(offset, {"p": 1.5}, 1)
     _, J, _ = field.derivatives(np.zeros(2), np.array([[0.3], [-1.7]]), field.values)
     assert J[:, 0, 0] == pytest.approx([1.5, -1.5], rel=1e-7)
 
@@ -185,7 +185,7 @@ def falling(t, x, p, out):
 
 
 def test_eigenvalue_of_a_cube():
-    found = find_equilibrium(VectorField.from_function(falling, {"p": 0.125}, 1), start=[-0.6])
+    found = find_equilibrium(vector_field(falling, {"p": 0.125}, 1), start=[-0.6])
     assert found.state[0] == pytest.approx(-0.5, rel=1e-12)
     assert found.eigenvalues[0] == pytest.approx(0.75, rel=1e-10)
 
@@ -202,7 +202,7 @@ def test_normal_form_and_multipliers_with_powers():
     x = r cos t is z q + its conjugate with |z| = r / sqrt 2, and r' = -3/8 r^3), and Liouville the
     product of the multipliers.
     """
-    field = VectorField.from_function(oscillator, {"mu": -0.3, "b": 0.7}, 2)
+    field = vector_field(oscillator, {"mu": -0.3, "b": 0.7}, 2)
     assert field.differentiation == "differences"
     rest = equilibrium_branch(field, "mu", bounds=(-0.3, 0.5))
     point, = rest.of_kind("Hopf")

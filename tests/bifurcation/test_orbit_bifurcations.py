@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from collocation_fields import lorenz_field, settled, two_masses_field
 
-from fecontact.bifurcation.branch import Branch, Status
+from fecontact import write_branch
+from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.orbits import (
     orbits_beyond,
     orbits_from_hopf,
@@ -13,8 +15,8 @@ from fecontact.bifurcation.orbits import (
     restored,
 )
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
+from fecontact.output.branches import read_branch
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +147,7 @@ def test_points_stay_where_they_are_when_the_mesh_doubles(masses, sliding, first
 
 
 def test_branches_go_on_from_their_files(masses, first, tmp_path):
-    loaded = Branch.load(first.save(tmp_path / "orbits.h5"))
+    loaded = read_branch(write_branch(tmp_path / "orbits.h5", first))
     assert [at.kind for at in loaded.points] == [at.kind for at in first.points]
     assert (loaded.column("multipliers") == first.column("multipliers")).all()
     doubled = [orbits_beyond(masses, branch, branch.of_kind("period doubling")[0],
@@ -186,7 +188,7 @@ def torus(t, x, p, out):
 
 
 def circle_branch(function, c):
-    field = VectorField.from_function(function, {"lam": -0.2, "c": c}, 3)
+    field = vector_field(function, {"lam": -0.2, "c": c}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
     return orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.3, 0.3),

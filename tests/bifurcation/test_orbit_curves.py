@@ -5,10 +5,10 @@ import pytest
 from collocation_fields import two_masses_field
 
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.orbit_curves import orbit_curve
 from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import InputError
 
 
@@ -53,7 +53,7 @@ def torus(t, x, p, out):
 
 
 def test_curve_of_tori():
-    field = VectorField.from_function(torus, {"lam": -0.2, "a": 0.3}, 3)
+    field = vector_field(torus, {"lam": -0.2, "a": 0.3}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
     branch = orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.5, 0.5),
@@ -71,7 +71,7 @@ def test_curve_of_tori():
 
 def circle_field(function, **parameters):
     """Orbits of the period pi on the circle of radius one and beside it."""
-    field = VectorField.from_function(function, parameters, 3)
+    field = vector_field(function, parameters, 3)
     t = np.linspace(0.0, np.pi, 400)
     return field, t, np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
 
@@ -87,7 +87,7 @@ def cusp(t, x, p, out):
 
 def test_cusp_of_cycles():
     """Folds at q = 3 s^2, p = -2 s^3."""
-    field = VectorField.from_function(cusp, {"p": 0.2, "q": 0.3}, 2)
+    field = vector_field(cusp, {"p": 0.2, "q": 0.3}, 2)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
     s = np.roots([1.0, 0.0, -0.3, -0.2]).real.max()

@@ -7,18 +7,20 @@ import pytest
 from collocation_fields import settled, two_masses_field
 from test_orbit_bifurcations import moebius, torus
 
+from fecontact import write_branch
 from fecontact.bifurcation import sharpening
 from fecontact.bifurcation.branch import Branch
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
+from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.orbit_normal_forms import verdict
 from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.branch_results import branches_csv, special_table
+from fecontact.output.branches import read_branch
 
 
 def circle_branch(function, c, intervals):
-    field = VectorField.from_function(function, {"lam": -0.2, "c": c}, 3)
+    field = vector_field(function, {"lam": -0.2, "c": c}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
     return orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.3, 0.3),
@@ -109,7 +111,7 @@ def test_points_that_are_not_found_again_say_so(tmp_path, monkeypatch):
         assert not point.details["located"]
         assert abs(point.parameter - exact) < point.details["parameter_error"]
     assert branch.special[1].details["criticality"] == "undecided"
-    loaded = Branch.load(branch.save(tmp_path / "branch.h5"))
+    loaded = read_branch(write_branch(tmp_path / "branch.h5", branch))
     for mine, theirs in zip(branch.special, loaded.special, strict=True):
         assert theirs.details["located"] is False
         assert theirs.details["parameter_error"] == mine.details["parameter_error"]
@@ -133,7 +135,7 @@ def swirl(t, x, p, out):
 
 
 def test_events_on_orbits_are_as_sharp_as_on_equilibria():
-    field = VectorField.from_function(swirl, {"r": -0.1}, 2)
+    field = vector_field(swirl, {"r": -0.1}, 2)
     rest = equilibrium_branch(field, "r", bounds=(-0.1, 1.0))
     events = {"period of 4.5 s": lambda values: values["period"] - 4.5,
               "radius of 0.7": lambda values: values["maximum"][0] - 0.7,

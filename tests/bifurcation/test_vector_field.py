@@ -32,9 +32,9 @@ from fecontact import (
     equilibrium_branch,
     find_equilibrium,
     stability_map,
+    vector_field,
 )
 from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.vector_field import VectorField
 from fecontact.errors import AnalysisError, InputError
 
 PLACES = np.random.default_rng(4).normal(size=(7, 3)) * 5.0
@@ -91,7 +91,7 @@ def rest_inside(t, x, p, out):
 @pytest.mark.parametrize("function", [rest, rest_inside])
 def test_what_is_not_analytic_is_differenced(function):
     """The complex step would lose the derivative of |x|."""
-    field = VectorField.from_function(function, {"b": 2.0, "k": 3.0}, 1)
+    field = vector_field(function, {"b": 2.0, "k": 3.0}, 1)
     assert field.differentiation == "differences"
     x = np.array([[0.4], [-0.7]])
     _, J, _ = field.derivatives(np.zeros(2), x, field.values)
@@ -99,7 +99,7 @@ def test_what_is_not_analytic_is_differenced(function):
                                         + 3.0 / (1.0 + 9.0 * x * x))
     assert J[:, :, 0] == pytest.approx(exact, rel=1e-9)
     with pytest.raises(InputError, match=r"complex step|complex numbers"):
-        VectorField.from_function(function, {"b": 2.0, "k": 3.0}, 1, differentiation="complex")
+        vector_field(function, {"b": 2.0, "k": 3.0}, 1, differentiation="complex")
 
 
 def test_kind_errors_of_functions():
@@ -114,7 +114,7 @@ def test_kind_errors_of_functions():
         out[0] = x.no_such_thing
 
     with pytest.raises(InputError, match=r"not one of the form f\(t, x, p, out\)"):
-        VectorField.from_function(unusable, {}, 1)
+        vector_field(unusable, {}, 1)
 
 
 # Contact systems -----------------------------------------------------------------------------

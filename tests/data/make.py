@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from fecontact.body import ElasticBody, Material
 from fecontact.mesh import Mesh
+from fecontact.reduction import modal_basis
 
 HERE = Path(__file__).parent
 COLUMNS, ROWS, LENGTH, HEIGHT = 4, 2, 0.1, 0.04
@@ -67,7 +68,7 @@ def matlab_73(path, matrices):
 
 def universal(path, body):
     """Data sets 164, 2411 and 55: the largest component of each shape is one."""
-    basis = body.modal_basis(MODES, contact="bottom")
+    basis = modal_basis(body, MODES, contact="bottom")
     shapes = basis.field.shapes
     scale = np.abs(shapes).max(axis=(0, 1))
     nodes = FIRST_NODE + np.arange(len(shapes))
