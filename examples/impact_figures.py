@@ -16,7 +16,7 @@ from matplotlib import rc_context
 
 from fecontact import ContactSystem, Trajectory
 from fecontact.analysis.periods import drive_period
-from fecontact.output.figures import COLOURS, STYLE, new_figure
+from fecontact.output.style import COLOURS, STYLE, new_figure
 
 SHOWN_PERIODS = {64.32: 4, 30.84: 4, 37.41: 4, 23.63: 25, 9.845: 2}
 SECTION_POINTS = 3000

@@ -42,8 +42,7 @@ from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
 from fecontact.bifurcation.problem import Settings
 from fecontact.output.basin_plots import plot_basins
 from fecontact.output.diagrams import plot_branches
-from fecontact.output.figures import COLOURS, new_figure
-from fecontact.output.saving import save_figure
+from fecontact.output.style import COLOURS, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -42,14 +42,7 @@ from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.check import check_law
-from .laws.contract import (
-    FrictionLaw,
-    NormalLaw,
-    PerNode,
-    friction_law,
-    memory_friction_law,
-    normal_law,
-)
+from .laws.contract import FrictionLaw, NormalLaw, PerNode
 from .laws.drive import Drive, Load, PointLoad
 from .laws.fourier_series import FourierSeries
 from .laws.friction import (
@@ -72,6 +65,7 @@ from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
 from .laws.profiles import Flat, Sine
 from .laws.random_roughness import RandomRoughness
 from .laws.signals import Constant, Harmonic, Harmonics, Sweep
+from .laws.signatures import friction_law, memory_friction_law, normal_law
 from .laws.trace import Trace
 from .laws.transients import Pulse, Step, Tabulated
 from .mesh import Mesh

@@ -2,13 +2,17 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError
+from fecontact.errors import InputError, require_positive
+
+_SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
+_LARGEST = 1e12  # factor of displacements; they are drawn in single precision
 
 
 def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> None:
@@ -63,3 +67,17 @@ def as_integers(values: Any, what: str) -> NDArray[np.int64]:
     if not (np.isfinite(found) & (found == np.round(found))).all():
         raise InputError(f"{what} must be whole numbers.")
     return np.asarray(values).astype(np.int64)
+
+
+def require_frame_rate(owner: str, fps: float) -> None:
+    """Raise :class:`InputError` unless movies can have so many frames a second."""
+    if not (isinstance(fps, Real) and not isinstance(fps, bool) and _SLOWEST <= fps <= _FASTEST):
+        raise InputError(f"{owner}: fps = {fps!r} must be a number from {_SLOWEST:g} to "
+                         f"{_FASTEST:g} frames a second.")
+
+
+def require_scale(owner: str, scale: float) -> None:
+    """Raise :class:`InputError` unless displacements can be drawn larger by this factor."""
+    require_positive(owner, scale=scale)
+    if scale > _LARGEST:
+        raise InputError(f"{owner}: scale = {scale!r} must be at most {_LARGEST:g}.")

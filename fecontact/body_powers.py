@@ -1,7 +1,7 @@
 """Compiled powers of the drive, the loads and the dampers of the body."""
 
 from fecontact.compiled import helper
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 
 @helper

@@ -14,7 +14,6 @@ from fecontact.bifurcation.contact_field import ContactField, contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
 from fecontact.bifurcation.observation import motion_of, observe, shot
 from fecontact.bifurcation.problem import Settings
-from fecontact.console import waiting
 from fecontact.errors import FecontactError
 from fecontact.model_limits import limits_exceeded, warn_of_limits
 
@@ -60,7 +59,8 @@ class Branches:
 
 
 def follow_branches(
-    system: "ContactSystem", wanted: "BranchSettings", initial: Any = "rest"
+    system: "ContactSystem", wanted: "BranchSettings", initial: Any = "rest",
+    progress: Callable[[str, float], None] | None = None,
 ) -> Branches:
     """Follow steady sliding or an orbit over a parameter, and what begins at special points.
 
@@ -72,6 +72,8 @@ def follow_branches(
         What to follow.
     initial : any
         Start of the run to the first orbit; see :func:`fecontact.simulate`.
+    progress : callable, optional
+        Told the name of the branch that is being followed, and which part of its points there is.
 
     Raises
     ------
@@ -88,7 +90,7 @@ def follow_branches(
     while tasks:
         task = tasks.popleft()
         try:
-            branch = task.follow()
+            branch = task.follow(_settings(wanted, task.title, progress))
         except KeyboardInterrupt:
             if not result.found:
                 raise
@@ -130,17 +132,27 @@ class _Task(NamedTuple):
 
     title: str
     generation: int
-    follow: Callable[[], Branch]
+    follow: Callable[[Settings], Branch]
+
+
+def _settings(
+    wanted: "BranchSettings", title: str, progress: Callable[[str, float], None] | None
+) -> Settings:
+    settings = wanted.settings()
+    if progress is None:
+        return settings
+    progress(title, 0.0)
+    return replace(settings, progress=lambda points: progress(title, points / settings.points))
 
 
 def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[_Task]:
     low, high = wanted.bounds
     if wanted.kind != "orbits":
-        yield _Task(_EQUILIBRIA, 0, lambda: equilibrium_branch(
-            field, wanted.name, settings=_fine(wanted.settings()),
+        yield _Task(_EQUILIBRIA, 0, lambda settings: equilibrium_branch(
+            field, wanted.name, settings=_fine(settings),
             direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
     if wanted.kind != "equilibria":
-        yield _Task("orbits of the run", 0, lambda: _orbits(field, wanted, initial))
+        yield _Task("orbits of the run", 0, partial(_orbits, field, wanted, initial))
 
 
 def _fine(settings: Settings) -> Settings:
@@ -160,18 +172,19 @@ def _tasks_beyond(
                         partial(_beyond, field, branch, point, wanted))
 
 
-def _orbits(field: ContactField, wanted: "BranchSettings", initial: Any) -> Branch:
+def _orbits(
+    field: ContactField, wanted: "BranchSettings", initial: Any, settings: Settings
+) -> Branch:
     """The orbit on which a run settles, over the parameter."""
     from fecontact.bifurcation.orbits import orbits_from_motion
     from fecontact.bifurcation.settled import settled_motion
     from fecontact.bifurcation.shooting_branch import orbits_by_shooting
 
     low, high = wanted.bounds
-    with waiting("Running to the first orbit"):
-        motion = settled_motion(field.system(), initial=initial, transient=wanted.transient,
-                                longest_period=wanted.longest_period)
+    motion = settled_motion(field.system(), initial=initial, transient=wanted.transient,
+                            longest_period=wanted.longest_period)
     common: dict[str, Any] = {
-        "period": motion.period, "periods": motion.periods, "settings": wanted.settings(),
+        "period": motion.period, "periods": motion.periods, "settings": settings,
         # So that a step is one of the parameter rather than of the orbit, which may grow.
         "scales": _SIZE * _amplitudes(motion.states),
         "direction": 1.0 if wanted.first < high else -1.0, "both": low < wanted.first < high}
@@ -189,13 +202,13 @@ def _amplitudes(states: Array) -> Array:
 
 
 def _beyond(
-    field: ContactField, branch: Branch, point: BranchPoint, wanted: "BranchSettings"
+    field: ContactField, branch: Branch, point: BranchPoint, wanted: "BranchSettings",
+    settings: Settings,
 ) -> Branch:
     """The branch that begins at a special point."""
     from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
     from fecontact.bifurcation.shooting_switch import doubled_by_shooting, hopf_orbits_by_shooting
 
-    settings = wanted.settings()
     if point.kind == "Hopf" and wanted.method == "shooting":
         return hopf_orbits_by_shooting(field, branch, point, settings=settings,
                                        segments=wanted.segments)

@@ -23,8 +23,18 @@ def progress_bar(
 
     It draws a bar on a terminal, from two seconds on.
     """
+    with titled_bar() as show:
+        yield lambda done: show(what, (done - start) / (total - start))
+
+
+@contextmanager
+def titled_bar() -> Iterator[Callable[[str, float], None]]:
+    """A function that is told what is being done, and which part of it is done, 0 to 1.
+
+    It draws a bar on a terminal, from two seconds on.
+    """
     if not sys.stderr.isatty():
-        yield lambda done: None
+        yield lambda what, part: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -32,16 +42,20 @@ def progress_bar(
     bar = Progress(TextColumn("{task.description}"), BarColumn(),
                    TextColumn("{task.percentage:.0f} %"), TimeRemainingColumn(),
                    console=Console(stderr=True), transient=True)
-    task = bar.add_task(what, total=total - start)
+    task = bar.add_task("", total=1.0)
     begin = latest = time.perf_counter()
+    shown = ""
 
-    def show(done: float) -> None:
-        nonlocal latest
+    def show(what: str, part: float) -> None:
+        nonlocal latest, shown
         now = time.perf_counter()
         if now - begin > PATIENCE and now - latest > 0.1:
             latest = now
+            if what != shown:
+                shown = what
+                bar.reset(task, description=what, total=1.0)
             bar.start()
-            bar.update(task, completed=done - start)
+            bar.update(task, completed=part)
 
     try:
         yield show

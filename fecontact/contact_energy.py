@@ -6,7 +6,7 @@ from numba import types
 from fecontact.body_powers import body_powers
 from fecontact.compiled import f8, kernel, vector
 from fecontact.contact_kernels import SYSTEM, contact_state
-from fecontact.laws.contract import normal_at, signal_at
+from fecontact.laws.signatures import normal_at, signal_at
 
 # Columns of `powers`: put in by the drive's springs, the ground's lifting, the belt and the loads;
 # lost in the modes, in the dashpots at B, in the contact's damping, by friction.

@@ -5,7 +5,7 @@ from numba import types
 
 from fecontact.compiled import block, borrowed, f8, kernel, matrix, vector
 from fecontact.contact_kernels import SYSTEM, memory_of, node_gradients, node_motion
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 
 @kernel(types.i8(f8, vector, SYSTEM, block, matrix, matrix))

@@ -18,7 +18,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.compiled import block, borrowed, f8, helper, i8, integers, kernel, matrix, vector
-from fecontact.laws.contract import friction_at, ground_at, memory_at, normal_at, signal_at
+from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -60,7 +60,7 @@ def _show_study(name: str, text: str, folder: Path, log: Log) -> None:
     from fecontact.mesh_io import write_mesh
     from fecontact.output.plots import plot_modes
     from fecontact.output.store import write_case
-    from fecontact.report import count
+    from fecontact.output.units import count
     from fecontact.results import movie, write_plots
     from fecontact.study import Study
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from fecontact.compiled import f8, kernel, vector
 from fecontact.contact_kernels import SYSTEM, SystemArrays, memory_of, node_forces, node_motion
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 Array = NDArray[np.float64]
 

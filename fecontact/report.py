@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecontact.output.units import count
+
 if TYPE_CHECKING:
     from fecontact.integrate.events import Events
     from fecontact.integrate.trajectory import Trajectory
@@ -116,8 +118,3 @@ def file_size(path: Path) -> str:
             return f"{size:.3g} {unit}"
         size /= 1000.0
     return f"{size:.3g} GB"
-
-
-def count(number: int, noun: str) -> str:
-    """A number of things: ``1 node``, ``2 nodes``."""
-    return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -7,8 +7,8 @@ from fecontact import contact_kernels as kernels
 from fecontact.arguments import require_kind
 from fecontact.contact_jacobian import jacobian
 from fecontact.errors import AnalysisError
-from fecontact.laws.contract import friction_law, signal
 from fecontact.laws.signals import Constant
+from fecontact.laws.signatures import friction_law, signal
 from fecontact.memory_states import settled
 from fecontact.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system import ContactSystem

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+from fecontact.arguments import require_frame_rate, require_scale
 from fecontact.basis import ModalBasis
 from fecontact.body import ElasticBody, Material
 from fecontact.damping import Damping, LossFactor, Rayleigh
@@ -18,7 +19,6 @@ from fecontact.errors import (
 from fecontact.integrate.initial import RigidStart
 from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.mesh import Mesh
-from fecontact.output.frames import require_frame_rate, require_scale
 from fecontact.points import Patch
 from fecontact.reduction import modal_basis
 from fecontact.tables import located

@@ -96,7 +96,7 @@ class ContactSystem:
             for _, share, one in part:
                 one.table(share)
                 require_sound(one)
-        require_motion(self)
+        require_motion(self.basis, self.drive, self.load)
         _ = self.arrays
 
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
@@ -200,7 +200,9 @@ class ContactSystem:
     @cached_property
     def arrays(self) -> contact_kernels.SystemArrays:
         """The system as the compiled kernels take it."""
-        return system_arrays(self)
+        return system_arrays(
+            self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
+            self.drive, self.load, np.asarray(self.gap, dtype=float))
 
     def rhs(self, t: float, y: Array) -> Array:
         """Rate y' (2 m + n s,) of the state y = [q, q', z]."""

@@ -1,26 +1,35 @@
 """A contact system as the compiled kernels take it."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.basis import ModalBasis
 from fecontact.compiled import CompiledLaw
 from fecontact.contact_kernels import SystemArrays
 from fecontact.errors import InputError
-
-if TYPE_CHECKING:
-    from fecontact.system import ContactSystem
+from fecontact.laws.drive import Drive, Load
+from fecontact.laws.ground import Ground
 
 Array = NDArray[np.float64]
 
 _DIRECTIONS = ("x", "y", "moment")
 
 
-def system_arrays(system: "ContactSystem") -> SystemArrays:
-    """Matrices, rows, parameters and addresses of the laws of a system."""
-    basis, drive, ground = system.basis, system.drive, system.ground
+LawGroup = tuple[slice, Array, Any]
+
+
+def system_arrays(
+    basis: ModalBasis, normal_groups: Iterable[LawGroup], friction_groups: Iterable[LawGroup],
+    ground: Ground, drive: Drive, load: Load, gap: Array,
+) -> SystemArrays:
+    """Matrices, rows, parameters and addresses of the laws of a system.
+
+    The groups are contact nodes that share a law: their place, each one's part of their face, and
+    the law; see :meth:`fecontact.system.ContactSystem.law_groups`.
+    """
     B, C = basis.T[0], basis.T[1]
     stiffness = np.diag(basis.angular_frequencies**2)
     damping = basis.damping.copy()
@@ -29,11 +38,12 @@ def system_arrays(system: "ContactSystem") -> SystemArrays:
         stiffness += c * np.outer(B[axis], B[axis])
         damping += b * np.outer(B[axis], B[axis])
     n, m = basis.contact_nodes, basis.modes
-    normal, normal_parameters = _law_table(system, "normal")
-    friction, friction_parameters = _law_table(system, "friction")
+    friction_groups = list(friction_groups)
+    normal, normal_parameters = _law_table(normal_groups)
+    friction, friction_parameters = _law_table(friction_groups)
     memory = [np.full(nodes.stop - nodes.start, law.memory, dtype=np.int64)
-              for nodes, _, law in system.law_groups("friction")]
-    loads = system.load.forces
+              for nodes, _, law in friction_groups]
+    loads = load.forces
     load_shapes = [basis.T[basis.point_index(force.point), _DIRECTIONS.index(force.direction)]
                    for force in loads]
     scale = ground.friction_scale_kernel
@@ -41,14 +51,14 @@ def system_arrays(system: "ContactSystem") -> SystemArrays:
         stiffness=stiffness,
         damping=damping,
         modal_damping=basis.damping.copy(),
-        constant_load=-system.load.normal * C[1],
+        constant_load=-load.normal * C[1],
         drive_shapes=np.array([drive.stiffness_x * B[0], drive.stiffness_y * B[1]]),
         drive_stiffness=np.array([drive.stiffness_x, drive.stiffness_y], dtype=float),
         load_shapes=np.array(load_shapes, dtype=float).reshape(-1, m),
         Tx=basis.contact_T[:, 0].copy(),
         Ty=basis.contact_T[:, 1].copy(),
         abscissa=basis.contact_x.copy(),
-        gap=np.array(np.broadcast_to(np.asarray(system.gap, dtype=float), n)),
+        gap=np.array(np.broadcast_to(gap, n)),
         normal_parameters=normal_parameters,
         friction_parameters=friction_parameters,
         profile_parameters=ground.profile_parameters(),
@@ -67,19 +77,18 @@ def system_arrays(system: "ContactSystem") -> SystemArrays:
     )
 
 
-def require_motion(system: "ContactSystem") -> None:
+def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
     """InputError for a drive or load that could do no work, as no mode moves its point that way."""
-    basis, drive = system.basis, system.drive
     acting: list[tuple[str, str | int, str]] = [
         (f"Drive: {name} = {value!r}", "B", axis)
         for axis, name, value in (("x", "stiffness_x", drive.stiffness_x),
                                   ("x", "damping_x", drive.damping_x),
                                   ("y", "stiffness_y", drive.stiffness_y),
                                   ("y", "damping_y", drive.damping_y)) if value]
-    if system.load.normal:
-        acting.append((f"Load: normal = {system.load.normal!r}", "C", "y"))
+    if load.normal:
+        acting.append((f"Load: normal = {load.normal!r}", "C", "y"))
     acting += [(f"Load: a force at {force.point!r} in direction {force.direction!r}", force.point,
-                force.direction) for force in system.load.forces]
+                force.direction) for force in load.forces]
     for what, point, direction in acting:
         if not basis.T[basis.point_index(point), _DIRECTIONS.index(direction)].any():
             turn = "turns" if direction == "moment" else f"moves along {direction}"
@@ -87,11 +96,9 @@ def require_motion(system: "ContactSystem") -> None:
                              f"leave it out, or give the basis rows for that point.")
 
 
-def _law_table(
-    system: "ContactSystem", kind: Literal["normal", "friction"]
-) -> tuple[NDArray[np.int64], Array]:
+def _law_table(law_groups: Iterable[LawGroup]) -> tuple[NDArray[np.int64], Array]:
     """Addresses (n,) and parameters (n, k) of the laws of all nodes."""
-    groups = [(law, law.table(share)) for _, share, law in system.law_groups(kind)]
+    groups = [(law, law.table(share)) for _, share, law in law_groups]
     width = max(table.shape[1] for _, table in groups)
     return (np.concatenate([np.full(len(table), law.kernel.address, dtype=np.int64)
                             for law, table in groups]),

@@ -160,7 +160,7 @@ def test_work_of_a_cycle_of_jenkins_element():
     """mu F times the way, less 2 mu F / k at each turn, where the spring only turns over."""
     law = fc.JenkinsFriction(2e6, 0.4)
     p = law.table(np.ones(1))[0]
-    work, size = cycle_work(law, p, 1.0, 1e-5, 1e-5)
+    work, size = cycle_work(law.kernel.address, law.memory, p, 1.0, 1e-5, 1e-5)
     # Four turning points of the travel -cos x - 0.4 cos(3 x + 1) within a period.
     x = np.linspace(0.0, 2.0 * np.pi, 200_001)
     travel = -(np.cos(x) + 0.4 * np.cos(3.0 * x + 1.0))

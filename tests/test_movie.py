@@ -11,13 +11,13 @@ from synthetic import basis, run
 from fecontact.errors import InputError, MissingLibraryError
 from fecontact.laws.friction import ConstantFriction
 from fecontact.output import movie, probe
-from fecontact.output.contact_states import STATE_COLOURS
 from fecontact.output.force_chart import ForceChart
 from fecontact.output.frames import frame_indices
 from fecontact.output.furniture import Furniture
 from fecontact.output.motion import Motion
 from fecontact.output.movie import picture, render
 from fecontact.output.scene import NODE_COLOURS, Scene, needed_height
+from fecontact.output.style import STATE_COLOURS
 
 SMALL = (480, 270)
 

@@ -11,7 +11,8 @@ from sweep_study import Serial, files_below, is_alive, write_study
 
 from fecontact import Range, Study, read_case, read_table, sweep
 from fecontact.errors import AnalysisError, InputError
-from fecontact.sweeps.batch import Row, UnwritableError, changed
+from fecontact.sweeps.batch import UnwritableError, changed
+from fecontact.sweeps.case import Row
 from fecontact.sweeps.shards import Store
 from fecontact.sweeps.summaries import functions_for, summarise
 from fecontact.whole_files import _MARK

@@ -27,8 +27,8 @@ from fecontact import (
     sensitivity,
     simulate,
 )
-from fecontact.laws.contract import ground_profile
 from fecontact.laws.profile_base import Profile
+from fecontact.laws.signatures import ground_profile
 
 UP = np.array([[0.0], [1.0]])
 ALONG = np.array([[1.0], [0.0]])

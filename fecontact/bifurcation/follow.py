@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.continuation import End, continuation, start_of
 from fecontact.bifurcation.problem import Problem, Settings
-from fecontact.console import progress_bar
 
 Array = NDArray[np.float64]
 
@@ -58,14 +57,14 @@ def _collected(
 ) -> tuple[list[BranchPoint], End]:
     points: list[BranchPoint] = []
     steps = continuation(problem, u, settings, tangent=tangent, direction=direction)
-    with progress_bar("Following the branch", settings.points) as show:
-        try:
-            while True:
-                points.append(next(steps))
-                show(len(points))
-        except StopIteration as stop:
-            return points, stop.value
-        except KeyboardInterrupt:
-            if not points:
-                raise
-            return points, End(Status.INTERRUPTED)
+    try:
+        while True:
+            points.append(next(steps))
+            if settings.progress is not None:
+                settings.progress(len(points))
+    except StopIteration as stop:
+        return points, stop.value
+    except KeyboardInterrupt:
+        if not points:
+            raise
+        return points, End(Status.INTERRUPTED)

@@ -152,6 +152,8 @@ class Settings:
     events : mapping
         Functions of the stored values (and 'parameter') whose zeros are points of the kind by
         which they are called.
+    progress : callable, optional
+        Told the number of points after each.
     """
 
     step: float = 0.01
@@ -165,6 +167,7 @@ class Settings:
     locate: bool = True
     stop_at: Iterable[str] = ()
     events: Mapping[str, Callable[[Mapping[str, Any]], float]] = field(default_factory=dict)
+    progress: Callable[[int], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         require_positive("Settings", step=self.step, smallest_step=self.smallest_step,

@@ -1,6 +1,6 @@
 """Maps of the stability of an equilibrium over two parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,6 @@ from fecontact.bifurcation.equilibria import (
     unstable_count,
 )
 from fecontact.bifurcation.vector_field import VectorField, require_field
-from fecontact.console import progress_bar
 from fecontact.errors import AnalysisError, InputError
 
 Array = NDArray[np.float64]
@@ -60,6 +59,7 @@ class StabilityMap:
 def stability_map(
     field: VectorField, grid: Mapping[str, ArrayLike], *,
     start: Equilibrium | ArrayLike | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> StabilityMap:
     """Stability of an equilibrium over a grid of two parameters, such as speed and friction.
 
@@ -75,6 +75,8 @@ def stability_map(
     start : Equilibrium or (d,) sequence, optional
         An equilibrium near that of the first values; see
         :func:`fecontact.bifurcation.equilibria.find_equilibrium`.
+    progress : callable, optional
+        Told the part of the map that is done, 0 to 1.
 
     Raises
     ------
@@ -101,18 +103,18 @@ def stability_map(
     d = field.dimension
     states, jacobians = np.full((*shape, d), np.nan), np.zeros((*shape, d, d))
     values = field.values
-    with progress_bar("Stability map", shape[0] * shape[1]) as show:
-        for i in range(shape[0]):
-            x = row_start
-            for j in range(shape[1]):
-                values[indices] = axes[0][i], axes[1][j]
-                found = _equilibrium(field, values, x)
-                x = None if found is None else found[0]
-                if found is not None:
-                    states[i, j], jacobians[i, j] = found
-                if j == 0 and x is not None:
-                    row_start = x
-            show((i + 1) * shape[1])
+    for i in range(shape[0]):
+        x = row_start
+        for j in range(shape[1]):
+            values[indices] = axes[0][i], axes[1][j]
+            found = _equilibrium(field, values, x)
+            x = None if found is None else found[0]
+            if found is not None:
+                states[i, j], jacobians[i, j] = found
+            if j == 0 and x is not None:
+                row_start = x
+        if progress is not None:
+            progress((i + 1) / shape[0])
     eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
     order = np.lexsort((-eigenvalues.imag, -eigenvalues.real), axis=-1)
     critical = np.take_along_axis(eigenvalues, order[..., :1], axis=-1)[..., 0]

@@ -33,7 +33,7 @@ def branch(
     (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, frequencies and growth rates of the
     modes in steady sliding. Ctrl-C stops it; what was computed until then is written.
     """
-    from fecontact.console import INTERRUPTED, waiting
+    from fecontact.console import INTERRUPTED, titled_bar, waiting
     from fecontact.core.folders import output_folder
     from fecontact.results import read_study
 
@@ -46,7 +46,8 @@ def branch(
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             system = described.system()
-        result = follow_branches(system, wanted, described.simulation.initial)
+        with titled_bar() as progress:
+            result = follow_branches(system, wanted, described.simulation.initial, progress)
         beneath = None
         if wanted.brute_force and not result.interrupted:
             beneath = runs_beneath(system, wanted, described.simulation.initial)

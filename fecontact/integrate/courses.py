@@ -17,7 +17,7 @@ the sum over the modes.
 
 from fecontact.compiled import helper
 from fecontact.integrate import bernstein, motion, rodas
-from fecontact.laws.contract import ground_at, signal_at
+from fecontact.laws.signatures import ground_at, signal_at
 
 # Entries of Control.ground: what bounds the ground.
 LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)

@@ -2,7 +2,7 @@
 
 from fecontact.compiled import helper
 from fecontact.integrate import motion
-from fecontact.laws.contract import ground_at, signal_at
+from fecontact.laws.signatures import ground_at, signal_at
 
 # Differences are taken over this part of the scales of the laws.
 _PART = 1e-4

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fecontact import contact_kernels as kernels
 from fecontact.compiled import block, helper, matrix
-from fecontact.laws.contract import normal_at, signal_at
+from fecontact.laws.signatures import normal_at, signal_at
 
 Array = NDArray[np.float64]
 

@@ -40,7 +40,7 @@ from fecontact.integrate.set_valued_problem import (
     STICK,
     WORKSPACE,
 )
-from fecontact.laws.contract import friction_at, ground_at, normal_at, signal_at
+from fecontact.laws.signatures import friction_at, ground_at, normal_at, signal_at
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
 DERIVATIVE = types.void(f8, vector, PROBLEM, integers, integers, WORKSPACE, vector)

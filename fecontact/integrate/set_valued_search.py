@@ -35,7 +35,7 @@ from fecontact.integrate.set_valued_problem import (
     WORKSPACE,
 )
 from fecontact.integrate.set_valued_steps import PARTS, interpolate
-from fecontact.laws.contract import ground_at, normal_at, signal_at
+from fecontact.laws.signatures import ground_at, normal_at, signal_at
 
 # Rounding of a sum, and of forces that come from a system of equations, relative to their parts.
 _ROUNDING, _FORCE_ROUNDING = 2e-15, 1e-13

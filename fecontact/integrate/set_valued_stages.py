@@ -26,7 +26,7 @@ from fecontact.integrate.set_valued_nodes import free_acceleration
 from fecontact.integrate.set_valued_problem import (
     CREEP,
 )
-from fecontact.laws.contract import friction_at, ground_at, normal_at, signal_at
+from fecontact.laws.signatures import friction_at, ground_at, normal_at, signal_at
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6

@@ -38,7 +38,7 @@ from fecontact.integrate.set_valued_problem import (
 )
 from fecontact.integrate.set_valued_search import ROUGHLY, UNFELT, first_pressed, pressed
 from fecontact.integrate.set_valued_stages import GRIP, ROUNDING, solve_stage
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 GAMMA = 0.43586652150845899942
 A21 = 0.5 * (1.0 - GAMMA)

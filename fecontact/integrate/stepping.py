@@ -36,7 +36,7 @@ from fecontact.integrate.watching import (
     note_events_at,
 )
 from fecontact.integrate.work import add_up, work_error, work_until
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 

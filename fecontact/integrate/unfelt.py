@@ -20,7 +20,7 @@ from fecontact.integrate.courses import (
     at,
     changes,
 )
-from fecontact.laws.contract import friction_at, normal_at
+from fecontact.laws.signatures import friction_at, normal_at
 
 _UNFELT = f8(f8, f8, f8, i8, SYSTEM, matrix, run_arrays.CONTROL, run_arrays.PROGRESS,
              run_arrays.ROOM)

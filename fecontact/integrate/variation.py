@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from fecontact.compiled import borrowed, f8, helper, kernel, matrix, vector
 from fecontact.contact_kernels import SYSTEM
 from fecontact.integrate import columns, curvature, linear, motion, rodas
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 Array = NDArray[np.float64]
 

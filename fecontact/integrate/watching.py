@@ -29,7 +29,7 @@ from fecontact.compiled import (
 from fecontact.contact_kernels import SYSTEM
 from fecontact.integrate import bernstein, motion, rodas, run_arrays
 from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, changes
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

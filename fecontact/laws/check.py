@@ -68,10 +68,10 @@ def _check_normal(law: NormalLaw, p: Array) -> None:
         np.concatenate([-np.geomspace(1.0, 1e-4, 5), [0.0], np.geomspace(1e-4, 1.0, 5)])))
 
     def forces(points: Array) -> Array:
-        return normal_values(law, p, points[:, 0], points[:, 1])[:, :1]
+        return normal_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
 
-    values = normal_values(law, p, u, v)
-    still = normal_values(law, p, u, np.zeros_like(u))
+    values = normal_values(law.kernel.address, p, u, v)
+    still = normal_values(law.kernel.address, p, u, np.zeros_like(u))
     points, force = np.column_stack([u, v]), values[:, 0]
     _require(law, "(u, v)", points, np.isfinite(values).all(axis=1), values, "must be finite")
     _require(law, "(u, v)", points, (u <= 0.0) | (force >= 0.0), force, "must not pull at u > 0")
@@ -95,7 +95,8 @@ def _check_energy(law: NormalLaw, share: Array) -> None:
     u = (middle[:, None] + half[:, None] * nodes).ravel()
     stored = law.stored_energy(np.tile(edges[:, None], (1, len(share))), share)
     for node, p in enumerate(law.table(share)):
-        force = normal_values(law, p, u, np.zeros_like(u))[:, 0].reshape(-1, len(nodes))
+        force = normal_values(law.kernel.address, p, u, np.zeros_like(u))[:, 0]
+        force = force.reshape(-1, len(nodes))
         work = np.concatenate([[0.0], np.cumsum(half * (force @ weights))])
         work -= np.interp(0.0, edges, work)
         energy = stored[:, node]
@@ -113,14 +114,14 @@ def _check_friction(law: FrictionLaw, p: Array) -> None:
     v, F = (grid.ravel() for grid in np.meshgrid(scale * _SIGNED, _FORCES))
 
     def forces(points: Array) -> Array:
-        return friction_values(law, p, points[:, 0], points[:, 1])[:, :1]
+        return friction_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
 
-    values = friction_values(law, p, v, F)
+    values = friction_values(law.kernel.address, p, v, F)
     points, force = np.column_stack([v, F]), values[:, 0]
     _require(law, "(v, F)", points, np.isfinite(values).all(axis=1), values, "must be finite")
     _require(law, "(v, F)", points, force * v >= 0.0, force,
              "must have the sign of v, or zero: friction would give energy off")
-    open_ = friction_values(law, p, v, np.zeros_like(F))[:, 0]
+    open_ = friction_values(law.kernel.address, p, v, np.zeros_like(F))[:, 0]
     _require(law, "(v, F)", points * [1.0, 0.0], open_ == 0.0, open_,
              "must be zero without normal force")
     sizes = np.column_stack([np.maximum(np.abs(v), scale), F])
@@ -141,12 +142,13 @@ def _check_memory(law: FrictionLaw, p: Array, share: float) -> None:
     where = f"({', '.join(('v', 'F', *names))})"
 
     def outputs(points: Array) -> Array:
-        return memory_values(law, p, points[:, 0], points[:, 1], points[:, 2:])[:, :, 0]
+        found = memory_values(law.kernel.address, p, points[:, 0], points[:, 1], points[:, 2:])
+        return found[:, :, 0]
 
-    values, points = memory_values(law, p, v, F, z), np.column_stack([v, F, z])
+    values, points = memory_values(law.kernel.address, p, v, F, z), np.column_stack([v, F, z])
     _require(law, where, points, np.isfinite(values).all(axis=(1, 2)), values[:, :, 0],
              "must be finite")
-    open_ = memory_values(law, p, v, np.zeros(count), z)[:, 0, 0]
+    open_ = memory_values(law.kernel.address, p, v, np.zeros(count), z)[:, 0, 0]
     _require(law, where, points * np.where(np.arange(2 + s) == 1, 0.0, 1.0), open_ == 0.0, open_,
              "must be zero without normal force")
     sizes = np.column_stack([np.maximum(np.abs(v), law.velocity_scale), F, np.abs(z)])
@@ -154,7 +156,7 @@ def _check_memory(law: FrictionLaw, p: Array, share: float) -> None:
                        ("R", *(f"{name}'" for name in names)), ("v", "F", *names))
     for speed, reach in product(law.velocity_scale * np.array([0.1, 1.0, 10.0]),
                                 law.velocity_scale * np.array([0.03, 0.3, 3.0])):
-        work, size = cycle_work(law, p, share, speed, reach)
+        work, size = cycle_work(law.kernel.address, law.memory, p, share, speed, reach)
         if (given := -np.cumsum(work).min()) > _LOSS * size.sum():
             raise InputError(f"{type(law).__name__}: cycles of slip by {reach:.3g} m to and fro, "
                              f"at most {speed:.3g} m/s fast, give off {given:.3g} J at F = "

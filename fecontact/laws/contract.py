@@ -1,37 +1,6 @@
-"""What a law is: signatures, signs and units, and the base classes of all of them.
+"""Base classes of the laws of contact nodes, and the ranges of their parameters.
 
-A law is a frozen dataclass of its parameters together with a scalar function, written once in
-plain Python and compiled. The functions allocate nothing and raise nothing.
-
-===========  ==========================  =========================================================
-kind         function                    returns
-===========  ==========================  =========================================================
-normal       ``f(u, v, p)``              F, dF/du, dF/dv: normal force on the body [N] from
-                                         penetration u [m] and its rate v [m/s]; zero or above,
-                                         except that a stop above the body pushes it down, F < 0
-friction     ``f(v, F, p)``              R, dR/dv, dR/dF: friction force [N] that acts on the body
-                                         against +x, with the sign of the slip velocity v of the
-                                         body relative to the ground [m/s], from the normal
-                                         force F >= 0 [N]
-friction     ``f(v, F, z, p, force,      nothing; fills ``force`` (3 + s,) with R, dR/dv, dR/dF and
-with memory  rates)``                    the s derivatives dR/dz, and ``rates`` (s, 3 + s) with a
-                                         row z', dz'/dv, dz'/dF, dz'/dz per internal variable z
-ground       ``f(xi, p)``                y, y', y'': height [m], or factor of the friction force,
-                                         at the abscissa xi of the ground's own frame [m] and its
-                                         derivatives
-signal       ``f(t, p)``                 value and rate of what is given in time: travel of the
-                                         ground [m], displacement of the drive [m], load [N]
-===========  ==========================  =========================================================
-
-``p`` holds the parameters in the order of the dataclass's fields; for normal and friction laws
-it is that of the contact node. A parameter given as one number holds for every node; an extensive
-one (stiffness, damping) is then the total of the contact face and is shared by tributary length.
-A parameter given as a sequence has one value per node and is not shared. A parameter that is a
-name out of a few holds for every node; ``p`` has its index among :attr:`NodeLaw.choices`.
-
-Internal variables of friction with memory are states of the system, integrated with it. Their
-rates must be continuous where R depends on them; at F = 0, where it does not, they fall back to
-zero.
+:mod:`fecontact.laws.signatures` says what the functions of laws take and give.
 """
 
 from collections.abc import Callable, Mapping
@@ -40,27 +9,12 @@ from functools import cache
 from typing import Annotated, Any, ClassVar, get_type_hints
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
+from fecontact.compiled import CompiledLaw
 from fecontact.errors import InputError, choices, nearest
-
-NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
-FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)
-MEMORY = types.void(f8, f8, vector, vector, vector, matrix)
-GROUND = types.UniTuple(f8, 3)(f8, vector)
-SIGNAL = types.UniTuple(f8, 2)(f8, vector)
-
-normal_at = function_at(NORMAL)
-friction_at = function_at(FRICTION)
-memory_at = function_at(MEMORY)
-ground_at = function_at(GROUND)
-signal_at = function_at(SIGNAL)
-
-NORMAL_FORM = "f(u, v, p) -> F, dF/du, dF/dv"
-FRICTION_FORM = "f(v, F, p) -> R, dR/dv, dR/dF"
-MEMORY_FORM = "f(v, F, z, p, force, rates)"
+from fecontact.laws.friction_curve import stick_velocity
+from fecontact.laws.potential import stored_energy
 
 PerNode = float | tuple[float, ...]
 
@@ -98,42 +52,6 @@ def _ranges(law: Any) -> Mapping[str, tuple[Range, ...]]:
     return {name: tuple(item for item in getattr(hint, "__metadata__", ())
                         if isinstance(item, Range))
             for name, hint in hints.items()}
-
-
-def normal_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Decorator of a function ``f(u, v, p) -> F, dF/du, dF/dv``, compiled at its first use.
-
-    Arguments, results, units and signs stand at the top of the module. InputError at that use for
-    another form, or a statement that cannot be compiled.
-    """
-    return compile_law(NORMAL, NORMAL_FORM, function)
-
-
-def friction_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Decorator of a function ``f(v, F, p) -> R, dR/dv, dR/dF``, compiled at its first use.
-
-    Arguments, results, units and signs stand at the top of the module. InputError at that use for
-    another form, or a statement that cannot be compiled.
-    """
-    return compile_law(FRICTION, FRICTION_FORM, function)
-
-
-def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(xi, p) -> y, y', y''``."""
-    return compile_law(GROUND, "f(xi, p) -> y, y', y''", function)
-
-
-def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
-    """Decorator of a function ``f(v, F, z, p, force, rates)`` that fills force and rates.
-
-    As :func:`friction_law`.
-    """
-    return compile_law(MEMORY, MEMORY_FORM, function)
-
-
-def signal(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``f(t, p) -> value, rate``."""
-    return compile_law(SIGNAL, "f(t, p) -> value, rate", function)
 
 
 @dataclass(frozen=True)
@@ -241,9 +159,8 @@ class NormalLaw(NodeLaw):
         self, penetration: NDArray[np.float64], share: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
-        from fecontact.laws.potential import stored_energy
-
-        return stored_energy(self, penetration, share)
+        return stored_energy(self.kernel.address, penetration, self.table(share),
+                             self.penetration_scale)
 
 
 @dataclass(frozen=True)
@@ -271,8 +188,6 @@ class FrictionLaw(NodeLaw):
         It is where the friction force is largest for a given normal force; where it has no
         maximum, and for laws with memory, ten times :attr:`velocity_scale`.
         """
-        from fecontact.laws.friction_curve import stick_velocity
-
         if self.memory:
             return np.full(nodes, 10.0 * self.velocity_scale)
         return stick_velocity(self, nodes)

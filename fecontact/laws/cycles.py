@@ -5,7 +5,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.compiled import f8, i8, kernel, vector
-from fecontact.laws.contract import FrictionLaw, memory_at
+from fecontact.laws.signatures import memory_at
 
 _CYCLES, _STEPS = 6, 1000
 
@@ -42,7 +42,8 @@ def _cycles(address, p, F, travel, z, step, work):  # type: ignore[no-untyped-de
 
 
 def cycle_work(
-    law: FrictionLaw, p: NDArray[np.float64], normal_force: float, speed: float, reach: float
+    address: int, memory: int, p: NDArray[np.float64], normal_force: float, speed: float,
+    reach: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Work (6,) of friction in each of six cycles of slip from z = 0 [J], and that of its size.
 
@@ -54,7 +55,7 @@ def cycle_work(
     rate = np.max(np.abs(np.diff(travel))) * _STEPS
     period = reach * rate / speed
     work = np.empty(len(t) - 1)
-    _cycles(law.kernel.address, p, normal_force, travel * reach,
-            np.zeros(law.memory), period / _STEPS, work)
+    _cycles(address, p, normal_force, travel * reach,
+            np.zeros(memory), period / _STEPS, work)
     cycles = work.reshape(_CYCLES, _STEPS)
     return cycles.sum(axis=1), np.abs(cycles).sum(axis=1)

@@ -5,13 +5,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.compiled import block, i8, kernel, matrix, vector
-from fecontact.laws.contract import (
-    FrictionLaw,
-    NormalLaw,
-    friction_at,
-    memory_at,
-    normal_at,
-)
+from fecontact.laws.signatures import friction_at, memory_at, normal_at
 
 Array = NDArray[np.float64]
 
@@ -34,27 +28,27 @@ def _memory(address, v, F, z, p, out):  # type: ignore[no-untyped-def]
         memory_at(address)(v[k], F[k], z[k], p, out[k, 0], out[k, 1:])
 
 
-def normal_values(law: NormalLaw, p: Array, u: Array, v: Array) -> Array:
+def normal_values(address: int, p: Array, u: Array, v: Array) -> Array:
     """F, dF/du, dF/dv (k, 3) at penetrations and rates (k,), for one row of parameters."""
     out = np.full((len(u), 3), np.nan)
-    _normal(law.kernel.address, _floats(u), _floats(v), p, out)
+    _normal(address, _floats(u), _floats(v), p, out)
     return out
 
 
-def friction_values(law: FrictionLaw, p: Array, v: Array, F: Array) -> Array:
+def friction_values(address: int, p: Array, v: Array, F: Array) -> Array:
     """R, dR/dv, dR/dF (k, 3) at slip velocities and normal forces (k,), without memory."""
     out = np.full((len(v), 3), np.nan)
-    _friction(law.kernel.address, _floats(v), _floats(F), p, out)
+    _friction(address, _floats(v), _floats(F), p, out)
     return out
 
 
-def memory_values(law: FrictionLaw, p: Array, v: Array, F: Array, z: Array) -> Array:
+def memory_values(address: int, p: Array, v: Array, F: Array, z: Array) -> Array:
     """R and its derivatives, then z' and theirs, (k, 1 + s, 3 + s), at z (k, s); with memory.
 
     The columns are the value and its derivatives to v, F and z.
     """
-    out = np.full((len(v), 1 + law.memory, 3 + law.memory), np.nan)
-    _memory(law.kernel.address, _floats(v), _floats(F), _floats(z), p, out)
+    out = np.full((len(v), 1 + z.shape[1], 3 + z.shape[1]), np.nan)
+    _memory(address, _floats(v), _floats(F), _floats(z), p, out)
     return out
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, require_positive
-from fecontact.laws.contract import ground_profile
 from fecontact.laws.profile_base import Profile
 from fecontact.laws.records import numbers
+from fecontact.laws.signatures import ground_profile
 
 Array = NDArray[np.float64]
 

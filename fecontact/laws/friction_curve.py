@@ -6,17 +6,36 @@ They are answered by sampling the compiled law, so they hold for every law, also
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import lru_cache
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from fecontact.compiled import f8, i8, kernel, matrix, vector
+from fecontact.compiled import CompiledLaw, f8, i8, kernel, matrix, vector
 from fecontact.errors import InputError
-from fecontact.laws.contract import FrictionLaw, friction_at
+from fecontact.laws.signatures import friction_at
 
 Array = NDArray[np.float64]
+
+
+class Curve(Protocol):
+    """What is asked of a friction law here: its compiled function, parameters and scale."""
+
+    kernel: ClassVar[CompiledLaw]
+
+    @property
+    def memory(self) -> int:
+        """Number of internal variables; laws with any have no curve."""
+
+    @property
+    def velocity_scale(self) -> float:
+        """Slip velocity over which the force rises [m/s]."""
+
+    def table(self, share: Array) -> Array:
+        """Parameters (n, k) of n nodes."""
+
 
 # Speeds searched for extremes, in units of the law's velocity scale.
 _SEARCHED = np.geomspace(1e-6, 1e12, 4001)
@@ -30,7 +49,7 @@ def _sample(address, v, F, p, out):  # type: ignore[no-untyped-def]
         out[i, 0], out[i, 1] = R / F, slope / F
 
 
-def coefficient(law: FrictionLaw, velocity: Array | float, normal_force: float = 1.0) -> Array:
+def coefficient(law: Curve, velocity: Array | float, normal_force: float = 1.0) -> Array:
     """R/F at slip velocities [m/s]; it has the sign of the velocity.
 
     Parameters
@@ -49,12 +68,12 @@ def coefficient(law: FrictionLaw, velocity: Array | float, normal_force: float =
     return _curve(law, velocity, normal_force, 0)
 
 
-def slope(law: FrictionLaw, velocity: Array | float, normal_force: float = 1.0) -> Array:
+def slope(law: Curve, velocity: Array | float, normal_force: float = 1.0) -> Array:
     """d(R/F)/dv [s/m] at slip velocities [m/s]; arguments as for :func:`coefficient`."""
     return _curve(law, velocity, normal_force, 1)
 
 
-def largest_coefficient(law: FrictionLaw, normal_force: float = 1.0) -> tuple[Array, Array]:
+def largest_coefficient(law: Curve, normal_force: float = 1.0) -> tuple[Array, Array]:
     """Largest maximum of R/F over slip velocity, and the velocity where it lies [m/s].
 
     Where R/F has no maximum the velocity is infinite, and the coefficient is the value that R/F
@@ -68,29 +87,29 @@ def largest_coefficient(law: FrictionLaw, normal_force: float = 1.0) -> tuple[Ar
     return _largest(law, _nodes(law), normal_force)
 
 
-def velocity_of_minimum(law: FrictionLaw, normal_force: float = 1.0) -> Array:
+def velocity_of_minimum(law: Curve, normal_force: float = 1.0) -> Array:
     """Smallest slip velocity (n,) at which R/F has a minimum [m/s], infinite without one.
 
     Between the maximum and it friction falls with slip velocity, and steady sliding may be
     unstable.
     """
-    def smallest(single: FrictionLaw, row: Array) -> list[float]:
+    def smallest(single: Curve, row: Array) -> list[float]:
         minima = _turning_points(single, row, normal_force, falling_before=True)
         return [min(minima, default=np.inf)]
 
     return _per_node(law, _nodes(law), smallest)[:, 0]
 
 
-def stick_velocity(law: FrictionLaw, nodes: int) -> Array:
+def stick_velocity(law: Curve, nodes: int) -> Array:
     """Slip velocity (n,) of the largest maximum of R/F, else ten times the velocity scale."""
     try:
         hash(law)
     except TypeError:
         return _stick_velocity(law, nodes)
-    return _kept_stick_velocity(law, nodes)
+    return _kept_stick_velocity(cast(Any, law), nodes)
 
 
-def _stick_velocity(law: FrictionLaw, nodes: int) -> Array:
+def _stick_velocity(law: Curve, nodes: int) -> Array:
     velocity = _largest(law, nodes, 1.0)[1]
     width = _per_node(law, nodes, lambda single, _: [10.0 * single.velocity_scale])[:, 0]
     found = np.where(np.isfinite(velocity), velocity, width)
@@ -102,8 +121,8 @@ def _stick_velocity(law: FrictionLaw, nodes: int) -> Array:
 _kept_stick_velocity = lru_cache(maxsize=64)(_stick_velocity)
 
 
-def _largest(law: FrictionLaw, nodes: int, F: float) -> tuple[Array, Array]:
-    def largest(single: FrictionLaw, row: Array) -> list[float]:
+def _largest(law: Curve, nodes: int, F: float) -> tuple[Array, Array]:
+    def largest(single: Curve, row: Array) -> list[float]:
         maxima = _turning_points(single, row, F, falling_before=False)
         if maxima:
             values = _sampled(single, np.array(maxima), F, row)[:, 0]
@@ -118,7 +137,7 @@ def _largest(law: FrictionLaw, nodes: int, F: float) -> tuple[Array, Array]:
 
 
 def _turning_points(
-    law: FrictionLaw, row: Array, F: float, *, falling_before: bool
+    law: Curve, row: Array, F: float, *, falling_before: bool
 ) -> list[float]:
     """Speeds at which the slope of the curve changes its sign."""
     speeds = law.velocity_scale * _SEARCHED
@@ -133,7 +152,7 @@ def _turning_points(
     ]
 
 
-def _curve(law: FrictionLaw, velocity: Array | float, F: float, column: int) -> Array:
+def _curve(law: Curve, velocity: Array | float, F: float, column: int) -> Array:
     nodes = _nodes(law)
     v = np.asarray(velocity, dtype=float)
     if nodes == 1:
@@ -146,7 +165,7 @@ def _curve(law: FrictionLaw, velocity: Array | float, F: float, column: int) -> 
     return values
 
 
-def _sampled(law: FrictionLaw, v: Array, F: float, row: Array) -> Array:
+def _sampled(law: Curve, v: Array, F: float, row: Array) -> Array:
     if law.memory:
         raise InputError(f"{type(law).__name__} has memory: its force is not a curve over slip "
                          f"velocity.")
@@ -155,25 +174,25 @@ def _sampled(law: FrictionLaw, v: Array, F: float, row: Array) -> Array:
     return out
 
 
-def _nodes(law: FrictionLaw) -> int:
+def _nodes(law: Curve) -> int:
     """Number of nodes for which parameters are given one by one, else 1."""
-    given = (getattr(law, entry.name) for entry in fields(law))
+    given = (getattr(law, entry.name) for entry in fields(cast(Any, law)))
     return max((len(value) for value in given if isinstance(value, tuple)), default=1)
 
 
-def _table(law: FrictionLaw, nodes: int) -> Array:
+def _table(law: Curve, nodes: int) -> Array:
     return law.table(np.full(nodes, 1.0 / nodes))
 
 
 def _per_node(
-    law: FrictionLaw, nodes: int, answer: Callable[[FrictionLaw, Array], list[float]]
+    law: Curve, nodes: int, answer: Callable[[Curve, Array], list[float]]
 ) -> Array:
     """Answers (n, ...) from the law of one node and its parameters, once for equal nodes."""
     rows, first, inverse = np.unique(_table(law, nodes), axis=0, return_index=True,
                                      return_inverse=True)
     answers = []
     for row, node in zip(rows, first, strict=True):
-        own = {entry.name: value[node] for entry in fields(law)
+        own = {entry.name: value[node] for entry in fields(cast(Any, law))
                if isinstance(value := getattr(law, entry.name), tuple)}
-        answers.append(answer(replace(law, **own), np.ascontiguousarray(row)))
+        answers.append(answer(replace(cast(Any, law), **own), np.ascontiguousarray(row)))
     return np.array(answers)[inverse.reshape(-1)]

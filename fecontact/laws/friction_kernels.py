@@ -6,7 +6,7 @@ Each has the parameters of the class in :mod:`fecontact.laws.friction` that bear
 import math
 
 from fecontact.compiled import helper
-from fecontact.laws.contract import friction_law
+from fecontact.laws.signatures import friction_law
 
 
 @helper

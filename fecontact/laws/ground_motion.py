@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fecontact.compiled import CompiledLaw
 from fecontact.errors import require_finite, require_positive
-from fecontact.laws.contract import signal
 from fecontact.laws.signal_base import between
+from fecontact.laws.signatures import signal
 
 Array = NDArray[np.float64]
 

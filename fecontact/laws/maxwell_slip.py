@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
-from fecontact.laws.contract import NotNegative, Positive, memory_friction_law
+from fecontact.laws.contract import NotNegative, Positive
 from fecontact.laws.friction_base import MemoryFriction
+from fecontact.laws.signatures import memory_friction_law
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ Each has the parameters of the class in :mod:`fecontact.laws.memory` that bears 
 import math
 
 from fecontact.compiled import helper
-from fecontact.laws.contract import memory_friction_law
+from fecontact.laws.signatures import memory_friction_law
 
 # Time constant [s] with which internal variables vanish without normal force.
 _FADING = 1e-7

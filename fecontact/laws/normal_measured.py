@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, require_positive
-from fecontact.laws.contract import PerNode, normal_law
+from fecontact.laws.contract import PerNode
 from fecontact.laws.normal import RoughSurface
 from fecontact.laws.records import read_columns
+from fecontact.laws.signatures import normal_law
 from fecontact.laws.surface_kernels import bed_of_asperities
 
 _INTERVALS, _HEAD, _KNOT = 64, 3, 3

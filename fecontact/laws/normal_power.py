@@ -6,15 +6,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import (
-    NormalLaw,
-    NotNegative,
-    OneOrAbove,
-    PerNode,
-    Positive,
-    UpToOne,
-    normal_law,
-)
+from fecontact.laws.contract import NormalLaw, NotNegative, OneOrAbove, PerNode, Positive, UpToOne
+from fecontact.laws.signatures import normal_law
 
 
 @normal_law

@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NormalLaw, NotNegative, PerNode, Positive, normal_law
+from fecontact.laws.contract import NormalLaw, NotNegative, PerNode, Positive
+from fecontact.laws.signatures import normal_law
 
 _FARTHEST, _DEEPEST = -50.0, 60.0
 

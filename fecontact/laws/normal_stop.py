@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.laws.contract import NormalLaw, NotNegative, OneOrAbove, Positive, normal_law
+from fecontact.laws.contract import NormalLaw, NotNegative, OneOrAbove, Positive
+from fecontact.laws.signatures import normal_law
 
 
 @normal_law

@@ -5,32 +5,34 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.compiled import f8, i8, kernel, matrix
-from fecontact.laws.contract import NormalLaw, normal_at
+from fecontact.laws.signatures import normal_at
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 def stored_energy(
-    law: NormalLaw, penetration: NDArray[np.float64], share: NDArray[np.float64]
+    address: int, penetration: NDArray[np.float64], parameters: NDArray[np.float64], scale: float
 ) -> NDArray[np.float64]:
     """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u.
 
     Gauss-Legendre quadrature with 16 points in each interval between 0 and 1, 3, 9, 27, ... times
-    the law's ``penetration_scale``; laws with joints elsewhere give a closed form instead.
+    the scale; laws with joints elsewhere give a closed form instead.
 
     Parameters
     ----------
-    law : NormalLaw
-        One law for all nodes.
+    address : int
+        Address of the compiled function of the law.
     penetration : (..., n) array
         u of the contact nodes [m]. Below zero the energy is that of the way from 0 down to u.
-    share : (n,) array
-        Part of the contact face that belongs to each node.
+    parameters : (n, k) array
+        Parameters of the law at each node.
+    scale : float
+        Penetration over which the law changes its character [m].
     """
     given = np.asarray(penetration, dtype=float)
-    rows = np.ascontiguousarray(given.reshape(-1, len(share)))
+    rows = np.ascontiguousarray(given.reshape(-1, len(parameters)))
     energy = np.empty_like(rows)
-    _energy(law.kernel.address, rows, law.table(share), law.penetration_scale, energy)
+    _energy(address, rows, parameters, scale, energy)
     return energy.reshape(given.shape)
 
 

@@ -8,7 +8,7 @@ from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.compiled import CompiledLaw, i8, kernel, matrix, vector
-from fecontact.laws.contract import ground_at
+from fecontact.laws.signatures import ground_at
 
 Array = NDArray[np.float64]
 

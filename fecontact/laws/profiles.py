@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from fecontact.errors import require_finite, require_not_negative, require_positive
-from fecontact.laws.contract import ground_profile
 from fecontact.laws.profile_base import Profile
+from fecontact.laws.signatures import ground_profile
 
 
 @ground_profile

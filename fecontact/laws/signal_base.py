@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.compiled import CompiledLaw, i8, kernel, matrix, vector
 from fecontact.errors import InputError, choices, nearest
-from fecontact.laws.contract import signal_at
+from fecontact.laws.signatures import signal_at
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ def _history(address, t, p, out):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Signal:
-    """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.contract.signal`.
+    """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.signatures.signal`.
 
     A signal of one's own sets ``kernel``, and overrides what else is not as here.
     """

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.errors import InputError, require_finite, require_not_negative, require_positive
-from fecontact.laws.contract import signal
 from fecontact.laws.records import numbers
 from fecontact.laws.signal_base import Signal, between, require_one_of
+from fecontact.laws.signatures import signal
 from fecontact.laws.transients import Pulse, Step, Tabulated
 
 Array = NDArray[np.float64]

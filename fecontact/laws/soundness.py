@@ -6,14 +6,9 @@ import numpy as np
 
 from fecontact.compiled import CompiledLaw
 from fecontact.errors import InputError
-from fecontact.laws.contract import (
-    FRICTION_FORM,
-    MEMORY_FORM,
-    NORMAL_FORM,
-    FrictionLaw,
-    NormalLaw,
-)
+from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.evaluation import friction_values, memory_values, normal_values
+from fecontact.laws.signatures import FRICTION_FORM, MEMORY_FORM, NORMAL_FORM
 
 _NORMAL_PLACES = np.array([(u, v) for u in (-1e-3, 0.0, 1e-9, 1e-6, 1e-4)
                            for v in (-1.0, -1e-3, 0.0, 1e-6, 1e-3, 1.0)]).T
@@ -54,12 +49,12 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
     row = law.table(np.full(nodes, 1.0 / nodes))[0]
     if isinstance(law, NormalLaw):
         names, (first, second) = "u, v", _NORMAL_PLACES
-        out = normal_values(law, row, first, second)
+        out = normal_values(law.kernel.address, row, first, second)
     else:
         names, (first, second) = "v, F", _FRICTION_PLACES
-        z = np.zeros((len(first), law.memory))
-        out = (memory_values(law, row, first, second, z).reshape(len(first), -1) if law.memory
-               else friction_values(law, row, first, second))
+        address, z = law.kernel.address, np.zeros((len(first), law.memory))
+        out = (memory_values(address, row, first, second, z).reshape(len(first), -1)
+               if law.memory else friction_values(address, row, first, second))
     wrong = np.flatnonzero(~np.isfinite(out).all(axis=1))
     if len(wrong):
         place = f"{first[wrong[0]]:g}, {second[wrong[0]]:g}"

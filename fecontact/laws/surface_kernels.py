@@ -6,7 +6,7 @@ Each has the parameters of the class in :mod:`fecontact.laws.normal` that bears 
 import math
 
 from fecontact.compiled import helper
-from fecontact.laws.contract import normal_law
+from fecontact.laws.signatures import normal_law
 
 _TAU = 2.0 * math.pi
 _ROOT_HALF = math.sqrt(0.5)

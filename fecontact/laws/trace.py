@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, require_finite, require_positive
-from fecontact.laws.contract import ground_profile
 from fecontact.laws.piecewise import (
     curve_range,
     equivalent_period,
@@ -17,6 +16,7 @@ from fecontact.laws.piecewise import (
 )
 from fecontact.laws.profile_base import Profile
 from fecontact.laws.records import read_or_given, require_closed, require_resolved
+from fecontact.laws.signatures import ground_profile
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError, require_finite, require_positive
-from fecontact.laws.contract import signal
 from fecontact.laws.piecewise import (
     curve_range,
     linear_curve,
@@ -19,6 +18,7 @@ from fecontact.laws.piecewise import (
 )
 from fecontact.laws.records import read_or_given, require_closed, require_resolved
 from fecontact.laws.signal_base import Signal, between, require_one_of
+from fecontact.laws.signatures import signal
 
 Array = NDArray[np.float64]
 

@@ -13,16 +13,9 @@ from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.figures import (
-    COLOURS,
-    DASHES,
-    add_note,
-    distinct_colours,
-    new_figure,
-    thinned,
-)
-from fecontact.output.units import suitable_unit
-from fecontact.report import count
+from fecontact.output.figures import thinned
+from fecontact.output.style import COLOURS, DASHES, add_note, distinct_colours, new_figure
+from fecontact.output.units import count, suitable_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from fecontact.analysis.quantities import Point
 from fecontact.analysis.receptance import FrequencyResponse
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output import analysis_figures as figures
-from fecontact.output.saving import save_figure
+from fecontact.output.style import save_figure
 
 
 def plot_spectrum(

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.output.figures import distinct_colours, new_figure
-from fecontact.output.saving import save_figure
+from fecontact.output.style import distinct_colours, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

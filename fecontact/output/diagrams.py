@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.output.diagram_extras import DOTS, draw_beneath, draw_insets, main_axis
-from fecontact.output.figures import DASHES, distinct_colours, new_figure
-from fecontact.output.saving import save_figure
+from fecontact.output.style import DASHES, distinct_colours, new_figure, save_figure
 from fecontact.parameter_units import parameter_label
 
 if TYPE_CHECKING:

@@ -1,18 +1,25 @@
 """Figures of a run: histories, phase plane, contact map and energies."""
 
 from collections.abc import Sequence
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.quantities import Point, point_name
-from fecontact.analysis.resolved import Resolved, resolved
+from fecontact.analysis.resolved import resolved
 from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.contact_states import STATE_COLOURS, state_names
+from fecontact.output.style import (
+    COLOURS,
+    ENERGY_COLOURS,
+    STATE_COLOURS,
+    add_note,
+    distinct_colours,
+    new_figure,
+    state_names,
+)
 from fecontact.output.units import suitable_unit
 
 if TYPE_CHECKING:
@@ -21,72 +28,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Colours that people with colour-blindness tell apart (Okabe and Ito).
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
-# Further ones, for the many branches of a diagram; no two of all are nearer to each other.
-_MORE_COLOURS = ("#882200", "#99dd88", "#7766ff", "#000044", "#0000ff")
-DASHES: Any = (0, (4, 2.5))
-# Of energies and powers, by the place where they are stored, come in or are lost.
-ENERGY_COLOURS = {
-    "kinetic": "#0072b2", "elastic": "#56b4e9", "modal_damping": "#56b4e9",
-    "drive_spring": "#d55e00", "drive_work": "#d55e00", "dashpots": "#d55e00",
-    "contact": "#009e73", "ground_work": "#009e73", "contact_damping": "#009e73",
-    "belt_work": "#e69f00", "friction": "#e69f00", "load_work": "#cc79a7",
-}
 _MAP_COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
 _AXES = ("x", "y")
 
 _LINE_BINS = 2000  # each drawn by its lowest and highest value
 _MAP_COLUMNS = 1500
-
-STYLE: Any = {
-    "font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0,
-    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#4d4d4d",
-    "axes.grid": True, "grid.color": "#e4e2de", "grid.linewidth": 0.7, "axes.axisbelow": True,
-    "lines.linewidth": 1.2, "legend.frameon": False, "axes.titleweight": "normal",
-    "xtick.color": "#303030", "ytick.color": "#303030", "axes.formatter.useoffset": False,
-    "agg.path.chunksize": 20000, "savefig.dpi": 150, "svg.fonttype": "none", "pdf.fonttype": 42,
-}
-
-
-def new_figure(width: float, height: float) -> "Figure":
-    """An empty figure [inches] that no plotting session knows of."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def distinct_colours(count: int) -> list[str]:
-    """So many colours, no two alike; up to twelve are told apart by colour-blind people too."""
-    if count <= len(COLOURS) + len(_MORE_COLOURS):
-        return [*COLOURS, *_MORE_COLOURS][:count]
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    # Neighbours, which follow one another, are as far apart in lightness as they can be.
-    shades = [to_hex(colour) for colour in colormaps["cividis"](np.linspace(0.0, 0.95, count))]
-    half = (count + 1) // 2
-    mixed = [""] * count
-    mixed[::2], mixed[1::2] = shades[:half], shades[half:]
-    return mixed
-
-
-def add_note(figure: "Figure", drawn: Resolved) -> None:
-    """Say below a figure where its curves are coarser than the motion."""
-    if not drawn.note:
-        return
-    width, height = figure.get_size_inches()
-    lines = wrap(drawn.note, int(15.0 * width))
-    figure.text(0.995, 0.05 / height, "\n".join(lines), ha="right", va="bottom", fontsize=8.0,
-                color="#a03000")
-    below = (0.05 + 0.16 * len(lines)) / height
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.set(rect=(0.0, below, 1.0, 1.0 - below))  # type: ignore[call-arg]
-
 
 def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Figure":
     """Displacements and velocities of points, and the sums of the contact forces, over time."""

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.window import window
-from fecontact.output.contact_states import STATE_COLOURS
 from fecontact.output.figures import thinned
 from fecontact.output.motion import Motion
+from fecontact.output.style import STATE_COLOURS
 from fecontact.output.units import suitable_unit
 
 Image = NDArray[np.uint8]

@@ -7,14 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.arguments import require_kind
-from fecontact.errors import InputError, require_positive
+from fecontact.errors import InputError
 from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-_SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
-_LARGEST = 1e12  # factor of displacements; they are drawn in single precision
 
 
 def frame_indices(
@@ -56,27 +54,13 @@ def frame_indices(
     return chosen[np.unique(nearest)]
 
 
-def require_frame_rate(owner: str, fps: float) -> None:
-    """Raise :class:`InputError` unless movies can have so many frames a second."""
-    if not (isinstance(fps, Real) and not isinstance(fps, bool) and _SLOWEST <= fps <= _FASTEST):
-        raise InputError(f"{owner}: fps = {fps!r} must be a number from {_SLOWEST:g} to "
-                         f"{_FASTEST:g} frames a second.")
-
-
-def require_scale(owner: str, scale: float) -> None:
-    """Raise :class:`InputError` unless displacements can be drawn larger by this factor."""
-    require_positive(owner, scale=scale)
-    if scale > _LARGEST:
-        raise InputError(f"{owner}: scale = {scale!r} must be at most {_LARGEST:g}.")
-
-
 def require_field(trajectory: Trajectory) -> Field:
     """The modes over the body; InputError if the modal basis holds none."""
     require_kind("A picture", Trajectory, trajectory=trajectory)
     field = trajectory.system.basis.field
     if field is None:
         raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "
-                         "body; make the basis with ElasticBody.modal_basis.")
+                         "body; make the basis with modal_basis(body, ...).")
     return field
 
 

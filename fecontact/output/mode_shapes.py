@@ -9,7 +9,7 @@ from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
 from fecontact.field import Field
 from fecontact.mode_convergence import ModeConvergence
-from fecontact.output.figures import new_figure
+from fecontact.output.style import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,18 +7,12 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_scale
 from fecontact.errors import InputError, choices, nearest
 from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.contact_states import state_names
-from fecontact.output.frames import (
-    blocks,
-    contact_forces,
-    displacement,
-    require_field,
-    require_scale,
-    von_mises,
-)
+from fecontact.output.frames import blocks, contact_forces, displacement, require_field, von_mises
+from fecontact.output.style import state_names
 from fecontact.output.units import round_125
 
 Array = NDArray[np.float64]

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.arguments import as_path
+from fecontact.arguments import as_path, require_frame_rate
 from fecontact.core.interrupts import held_back_interrupt
 from fecontact.errors import InputError, MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.frames import frame_indices, require_field, require_frame_rate
+from fecontact.output.frames import frame_indices, require_field
 from fecontact.output.furniture import Furniture
 from fecontact.output.motion import Colour, Motion
 from fecontact.output.probe import require_rendering

@@ -10,7 +10,7 @@ from fecontact.mode_convergence import ModeConvergence
 from fecontact.output import figures
 from fecontact.output.figures import Point
 from fecontact.output.mode_shapes import convergence_figure, modes_figure
-from fecontact.output.saving import save_figure as _save
+from fecontact.output.style import save_figure as _save
 
 
 def plot_history(trajectory: Trajectory, path: str | Path, points: Sequence[Point] = ()) -> Path:

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.output.contact_states import STATE_COLOURS
 from fecontact.output.motion import Motion
 from fecontact.output.probe import known_window
+from fecontact.output.style import STATE_COLOURS
 
 Array = NDArray[np.float64]
 

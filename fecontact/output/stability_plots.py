@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.output.figures import DASHES, distinct_colours, new_figure
-from fecontact.output.saving import save_figure
+from fecontact.output.style import DASHES, distinct_colours, new_figure, save_figure
 from fecontact.parameter_units import parameter_label
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
-from fecontact.output.figures import COLOURS, distinct_colours, new_figure
+from fecontact.output.style import COLOURS, distinct_colours, new_figure
 from fecontact.output.units import suitable_unit
 from fecontact.parameter_units import parameter_label
 from fecontact.study import Study

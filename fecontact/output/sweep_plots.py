@@ -6,7 +6,7 @@ from pathlib import Path
 from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.output import sweep_figures
-from fecontact.output.saving import save_figure
+from fecontact.output.style import save_figure
 from fecontact.sweeps.statistics import SobolIndices
 from fecontact.sweeps.table import SweepTable
 

@@ -49,3 +49,8 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     """A value with a suitable unit: ``quantity(0.0123, "m") == "12.3 mm"``."""
     factor, symbol = suitable_unit(value, unit)
     return f"{value / factor:.{digits}g} {symbol}"
+
+
+def count(number: int, noun: str) -> str:
+    """A number of things: ``1 node``, ``2 nodes``."""
+    return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -10,7 +10,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NotRequired, TypedDict, cast
+from typing import Any, cast
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import AnalysisError, FecontactError, ModelWarning
@@ -19,40 +19,15 @@ from fecontact.laws.names import PART_CLASSES
 from fecontact.output.hdf5 import read_basis
 from fecontact.parameters import with_parameters
 from fecontact.study import Study
+from fecontact.sweeps.case import Case, Row
 from fecontact.sweeps.settings import Strobing
+from fecontact.sweeps.strobed import strobed_rows
 from fecontact.sweeps.summaries import functions_for, summarise
 from fecontact.whole_files import unwritable
-
-BASIS_SECTIONS = ("geometry", "body", "basis")
 
 Functions = dict[str, Callable[[Trajectory], float]]
 
 _BASES_KEPT = 4  # in a worker
-
-
-class Row(TypedDict):
-    """What is kept of a case: its summaries, or the reason why there are none."""
-
-    case: str
-    values: dict[str, float]
-    reason: str
-    points: NotRequired[list[float]]  # displacements once per period
-    warning: NotRequired[str]  # where the run leaves the limits of the model
-
-
-@dataclass(frozen=True)
-class Case:
-    """A case of a sweep: its key, that of its modal basis, what it changes in the study."""
-
-    key: str
-    basis: str
-    changes: Mapping[str, Any]
-
-    @property
-    def basis_changes(self) -> dict[str, Any]:
-        """What of the changes the modal basis depends on."""
-        return {name: value for name, value in self.changes.items()
-                if name.partition(".")[0] in BASIS_SECTIONS}
 
 
 @dataclass(frozen=True)
@@ -111,8 +86,6 @@ def run_batch(batch: Batch) -> list[Row]:
     path = None if batch.path is None else Path(batch.path)
     study = Study.from_tables(batch.study, path)
     if batch.strobe is not None:
-        from fecontact.sweeps.strobed import strobed_rows
-
         return strobed_rows(batch.cases, batch.strobe, lambda case: prepared(batch, study, case))
     summaries: dict[float, Functions] = {}
     return [_row(batch, study, case, summaries) for case in batch.cases]

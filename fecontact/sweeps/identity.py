@@ -9,7 +9,7 @@ from typing import Any
 from fecontact import __version__
 from fecontact.errors import InputError
 from fecontact.study import Study
-from fecontact.sweeps.batch import BASIS_SECTIONS
+from fecontact.sweeps.case import BASIS_SECTIONS
 from fecontact.tables import shown
 
 _DIGITS = 24  # of a hash that are kept: 96 bits

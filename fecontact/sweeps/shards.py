@@ -17,7 +17,8 @@ from fecontact.basis import ModalBasis
 from fecontact.locks import locked
 from fecontact.output.hdf5 import write_basis
 from fecontact.stored import DamagedError, from_json, reading
-from fecontact.sweeps.batch import Row, case_file
+from fecontact.sweeps.batch import case_file
+from fecontact.sweeps.case import Row
 from fecontact.whole_files import clear_leftovers, replaced
 
 _SUFFIXES = {"shards": ".json", "cases": ".vtkhdf", "bases": ".h5"}

@@ -12,7 +12,7 @@ from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.initial import initial_state
 from fecontact.integrate.trajectory import Status
 from fecontact.study import Study
-from fecontact.sweeps.batch import Case, Row
+from fecontact.sweeps.case import Case, Row
 from fecontact.sweeps.settings import Strobing
 from fecontact.system import ContactSystem
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from fecontact.errors import FecontactError, InputError
 from fecontact.study import Study
 from fecontact.sweeps.bases import Bases
-from fecontact.sweeps.batch import Batch, Case, Row, make_basis
+from fecontact.sweeps.batch import Batch, make_basis
+from fecontact.sweeps.case import Case, Row
 from fecontact.sweeps.dispatch import LostError, results
 from fecontact.sweeps.executors import opened, worker_count
 from fecontact.sweeps.identity import case_keys

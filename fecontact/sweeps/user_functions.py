@@ -4,12 +4,12 @@ import importlib.util
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from fecontact.errors import InputError, nearest
-from fecontact.integrate.trajectory import Trajectory
 
 
-def user_function(file: Path, name: str) -> Callable[[Trajectory], float]:
+def user_function(file: Path, name: str) -> Callable[[Any], float]:
     """A function of a Python file, as it is now.
 
     Raises
@@ -26,7 +26,7 @@ def user_function(file: Path, name: str) -> Callable[[Trajectory], float]:
 
 
 @cache
-def _function(file: Path, name: str, written: int) -> Callable[[Trajectory], float]:
+def _function(file: Path, name: str, written: int) -> Callable[[Any], float]:
     """The function as it was written then: processes may outlive a change of the file."""
     try:
         spec = importlib.util.spec_from_file_location(f"fecontact_summary_{file.stem}", file)

@@ -4,7 +4,7 @@ import numpy as np
 from numba import types
 
 from fecontact.compiled import f8, i8, kernel, matrix, vector
-from fecontact.laws.contract import friction_at, memory_at
+from fecontact.laws.signatures import friction_at, memory_at
 
 SPEEDS = np.geomspace(1e-4, 1e5, 55)
 

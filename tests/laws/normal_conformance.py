@@ -10,7 +10,7 @@ from numba import types
 from scipy.integrate import quad
 
 from fecontact.compiled import i8, kernel, matrix, vector
-from fecontact.laws.contract import normal_at
+from fecontact.laws.signatures import normal_at
 
 
 @kernel(types.void(i8, vector, vector, vector, matrix))

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from fecontact.errors import InputError
-from fecontact.laws.contract import ground_profile
 from fecontact.laws.fourier_series import FourierSeries
 from fecontact.laws.ground import Ground
 from fecontact.laws.profile_base import Profile
 from fecontact.laws.profiles import Flat, Sine
 from fecontact.laws.random_roughness import RandomRoughness
+from fecontact.laws.signatures import ground_profile
 from fecontact.laws.trace import Trace
 
 RNG = np.random.default_rng(3)

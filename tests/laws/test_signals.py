@@ -11,7 +11,6 @@ import pytest
 from scipy.integrate import quad
 
 from fecontact.errors import InputError
-from fecontact.laws.contract import signal
 from fecontact.laws.signals import (
     Constant,
     Harmonic,
@@ -22,6 +21,7 @@ from fecontact.laws.signals import (
     Sweep,
     Tabulated,
 )
+from fecontact.laws.signatures import signal
 
 RNG = np.random.default_rng(4)
 TIMES = np.cumsum(RNG.uniform(0.01, 0.1, 30)) - 0.3

@@ -1,0 +1,94 @@
+"""Functions of laws: their signatures, signs and units, and how they are compiled.
+
+A law is a frozen dataclass of its parameters together with a scalar function, written once in
+plain Python and compiled. The functions allocate nothing and raise nothing.
+
+===========  ==========================  =========================================================
+kind         function                    returns
+===========  ==========================  =========================================================
+normal       ``f(u, v, p)``              F, dF/du, dF/dv: normal force on the body [N] from
+                                         penetration u [m] and its rate v [m/s]; zero or above,
+                                         except that a stop above the body pushes it down, F < 0
+friction     ``f(v, F, p)``              R, dR/dv, dR/dF: friction force [N] that acts on the body
+                                         against +x, with the sign of the slip velocity v of the
+                                         body relative to the ground [m/s], from the normal
+                                         force F >= 0 [N]
+friction     ``f(v, F, z, p, force,      nothing; fills ``force`` (3 + s,) with R, dR/dv, dR/dF and
+with memory  rates)``                    the s derivatives dR/dz, and ``rates`` (s, 3 + s) with a
+                                         row z', dz'/dv, dz'/dF, dz'/dz per internal variable z
+ground       ``f(xi, p)``                y, y', y'': height [m], or factor of the friction force,
+                                         at the abscissa xi of the ground's own frame [m] and its
+                                         derivatives
+signal       ``f(t, p)``                 value and rate of what is given in time: travel of the
+                                         ground [m], displacement of the drive [m], load [N]
+===========  ==========================  =========================================================
+
+``p`` holds the parameters in the order of the dataclass's fields; for normal and friction laws
+it is that of the contact node. A parameter given as one number holds for every node; an extensive
+one (stiffness, damping) is then the total of the contact face and is shared by tributary length.
+A parameter given as a sequence has one value per node and is not shared. A parameter that is a
+name out of a few holds for every node; ``p`` has its index among :attr:`NodeLaw.choices`.
+
+Internal variables of friction with memory are states of the system, integrated with it. Their
+rates must be continuous where R depends on them; at F = 0, where it does not, they fall back to
+zero.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+
+from fecontact.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
+
+NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
+FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)
+MEMORY = types.void(f8, f8, vector, vector, vector, matrix)
+GROUND = types.UniTuple(f8, 3)(f8, vector)
+SIGNAL = types.UniTuple(f8, 2)(f8, vector)
+
+normal_at = function_at(NORMAL)
+friction_at = function_at(FRICTION)
+memory_at = function_at(MEMORY)
+ground_at = function_at(GROUND)
+signal_at = function_at(SIGNAL)
+
+NORMAL_FORM = "f(u, v, p) -> F, dF/du, dF/dv"
+FRICTION_FORM = "f(v, F, p) -> R, dR/dv, dR/dF"
+MEMORY_FORM = "f(v, F, z, p, force, rates)"
+
+
+def normal_law(function: Callable[..., Any]) -> CompiledLaw:
+    """Decorator of a function ``f(u, v, p) -> F, dF/du, dF/dv``, compiled at its first use.
+
+    Arguments, results, units and signs stand at the top of the module. InputError at that use for
+    another form, or a statement that cannot be compiled.
+    """
+    return compile_law(NORMAL, NORMAL_FORM, function)
+
+
+def friction_law(function: Callable[..., Any]) -> CompiledLaw:
+    """Decorator of a function ``f(v, F, p) -> R, dR/dv, dR/dF``, compiled at its first use.
+
+    Arguments, results, units and signs stand at the top of the module. InputError at that use for
+    another form, or a statement that cannot be compiled.
+    """
+    return compile_law(FRICTION, FRICTION_FORM, function)
+
+
+def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
+    """Compile ``f(xi, p) -> y, y', y''``."""
+    return compile_law(GROUND, "f(xi, p) -> y, y', y''", function)
+
+
+def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
+    """Decorator of a function ``f(v, F, z, p, force, rates)`` that fills force and rates.
+
+    As :func:`friction_law`.
+    """
+    return compile_law(MEMORY, MEMORY_FORM, function)
+
+
+def signal(function: Callable[..., Any]) -> CompiledLaw:
+    """Compile ``f(t, p) -> value, rate``."""
+    return compile_law(SIGNAL, "f(t, p) -> value, rate", function)
