@@ -16,7 +16,6 @@ from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.names import PART_CLASSES, with_folder
 from fecontact.mesh import Mesh
@@ -101,7 +100,7 @@ class Study:
     body_settings: BodySettings = field(default_factory=BodySettings)
     basis_settings: BasisSettings = field(default_factory=BasisSettings)
     normal: NormalLaw | None = None
-    friction: FrictionLaw = field(default_factory=ExponentialFriction)
+    friction: FrictionLaw | None = None
     contact: Mapping[str, ContactLaws] = field(default_factory=dict)
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)

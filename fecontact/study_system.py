@@ -8,9 +8,10 @@ import numpy as np
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Crown, gap_values
+from fecontact.laws.friction import ConstantFriction
 from fecontact.laws.names import PART_CLASSES
 from fecontact.laws.soundness import require_sound
-from fecontact.system import NO_NORMAL_LAW, ContactSystem
+from fecontact.system import NO_FRICTION_LAW, NO_NORMAL_LAW, ContactSystem, needs_friction
 from fecontact.tables import located
 
 if TYPE_CHECKING:
@@ -34,6 +35,9 @@ def contact_system(study: "Study", basis: ModalBasis, title: str) -> ContactSyst
                              f"{nearest(name, groups)}; its groups are: {choices(groups)}.")
     if study.normal is None and len(_own(study, "normal")) < len(groups):
         raise InputError(NO_NORMAL_LAW.format(f"{title} lacks the section [normal]"))
+    if study.friction is None and len(_own(study, "friction")) < len(groups) and (
+            needs_friction(basis)):
+        raise InputError(NO_FRICTION_LAW.format(f"{title} lacks the section [friction]"))
     for section, law, count in _laws(study, groups):
         with located(f"{title}: [{section}]:", type(law).__name__):
             law.table(np.full(count, 1.0 / count))
@@ -47,7 +51,8 @@ def contact_system(study: "Study", basis: ModalBasis, title: str) -> ContactSyst
     for part in LAWS:
         own = _own(study, part)
         if own:
-            parts[part] = dict.fromkeys(groups, parts[part]) | own
+            usual = parts[part] or ConstantFriction(0.0)
+            parts[part] = dict.fromkeys(groups, usual) | own
     with located(f"{title}:", "ContactSystem"):
         return ContactSystem(basis, gap=gap, **parts)
 
@@ -66,4 +71,5 @@ def _laws(study: "Study", groups: Mapping[str, int]) -> Iterator[tuple[str, Any,
             yield f"contact.{group}.{part}", law, groups[group]
         for count in [sum(groups.values())] if not own else [
                 count for group, count in groups.items() if group not in own]:
-            yield part, getattr(study, part), count
+            if getattr(study, part) is not None:
+                yield part, getattr(study, part), count

@@ -15,7 +15,7 @@ from fecontact.errors import InputError, choices, nearest
 from fecontact.gap import Gap, gap_values
 from fecontact.laws.contract import FrictionLaw, NormalLaw
 from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction
+from fecontact.laws.friction import ConstantFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.soundness import require_sound
 from fecontact.parameters import parameters_of, with_parameters
@@ -27,9 +27,18 @@ NO_NORMAL_LAW = ("{}, the law of the normal force, which no default can replace;
                  "surface with its stiffness and roughness_height, or another law: `fecontact "
                  "laws` lists them, `fecontact laws rough-surface` says how to choose.")
 
+NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a friction law with "
+                   "its coefficients, such as the exponential or the constant one (0 for no "
+                   "friction); `fecontact laws` lists them.")
+
 PARTS = ("normal", "friction", "ground", "drive", "load")
 
 _KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
+
+
+def needs_friction(basis: ModalBasis) -> bool:
+    """Whether a contact node can move along the ground, so that friction matters."""
+    return bool(basis.contact_T[:, 0].any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +55,8 @@ class ContactSystem:
     normal : normal law, or mapping of contact group to normal law
         Normal force F (on the body, upwards) from penetration and its rate.
     friction : friction law, or mapping of contact group to friction law
-        Friction force R (on the body, against the slip velocity).
+        Friction force R (on the body, against the slip velocity). Without one there is no
+        friction, which is refused where a contact node can move along the ground.
     ground : Ground
         Profile and motion of the ground.
     drive : Drive
@@ -60,16 +70,16 @@ class ContactSystem:
     Raises
     ------
     InputError
-        Without a normal law; for a part of another kind, laws for groups that the basis lacks,
-        parameters or gaps of another number than there are contact nodes, laws that
-        :func:`require_sound` refuses, and drives and loads at places that no mode moves in their
-        direction.
+        Without a normal law, or a friction law where it matters; for a part of another kind, laws
+        for groups that the basis lacks, parameters or gaps of another number than there are contact
+        nodes, laws that :func:`require_sound` refuses, and drives and loads at places that no mode
+        moves in their direction.
     """
 
     basis: ModalBasis
     # Required, with a sentence that says more than Python's own.
     normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
-    friction: FrictionLaw | Mapping[str, FrictionLaw] = field(default_factory=ExponentialFriction)
+    friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
@@ -78,6 +88,10 @@ class ContactSystem:
     def __post_init__(self) -> None:
         if self.normal is None:
             raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
+        if self.friction is None:
+            if needs_friction(self.basis):
+                raise InputError(NO_FRICTION_LAW.format("ContactSystem lacks friction"))
+            object.__setattr__(self, "friction", ConstantFriction(0.0))
         for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} cannot serve as "
