@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 
 Array = NDArray[np.float64]
@@ -182,6 +183,12 @@ class Branch:
                           for name, item in _members(group, "attributes").items()}
             return cls(text(group, "parameter"), points, Status[text(group, "status")],
                        text(group, "message"), attributes)
+
+
+def require_on_branch(owner: str, branch: object, point: object) -> None:
+    """Raise :class:`InputError` unless these are a branch, and a point of one."""
+    require_kind(owner, Branch, branch=branch)
+    require_kind(owner, BranchPoint, point=point)
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:

@@ -10,6 +10,7 @@ from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.continuation import End, continuation, start_of
 from fecontact.bifurcation.problem import Problem, Settings
 from fecontact.console import progress_bar
+from fecontact.errors import require_finite
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,7 @@ def follow(
     FecontactError
         If there is no solution near the start.
     """
+    require_finite("A branch", direction=direction)
     points, end = _collected(problem, u, settings, tangent, direction)
     if both and end.status not in (Status.CLOSED, Status.INTERRUPTED):
         start = start_of(problem, u, settings, tangent, direction)

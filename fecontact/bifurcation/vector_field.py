@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices, nearest
 
 Array = NDArray[np.float64]
@@ -68,6 +69,7 @@ class VectorField(ABC):
         InputError
             If there is none of this name; it lists those that exist.
         """
+        require_kind("A vector field", str, parameter=name)
         names = tuple(self.parameters)
         if name not in names:
             raise InputError(f"The vector field has no parameter {name!r}{nearest(name, names)}; "

@@ -120,7 +120,7 @@ FOLD = 0.890686833041  # of the two masses over B, by collocation with fine mesh
 
 
 def island():
-    """Orbits between their fold and B = 0.99 twice over: p = -1 to 1 and back is a closed branch."""
+    """Orbits from their fold to B = 0.99, twice over: p = -1 to 1 and back is a closed branch."""
     return contact_field(two_mass_system(), {"p": (0.0, lambda system, p: with_force(
         system, FOLD + 0.1 * (1.0 - p * p)))})
 
