@@ -64,7 +64,7 @@ def orbits_from_hopf(
           :func:`fecontact.bifurcation.sharpening.sharpened`,
         - 'branch point': where two branches of orbits cross, with parameter_error as well,
         - 'unresolved': where 'unstable' changes though nothing of the kind was found; or what
-          instead_of says on this mesh, a fold or branch point that finer meshes do not have.
+          instead_of says on this mesh alone, though finer ones do not have it.
 
     Raises
     ------

@@ -5,8 +5,8 @@ the mesh that suits its own orbit. The coefficient of a normal form holds third 
 the orbit and may need a far finer mesh than the orbit: intervals are doubled until it settles.
 
 Where a mesh is too coarse, its error alone makes the parameter turn, or a test function change its
-sign. So folds and branch points must be there with twice the intervals too, and their test
-functions be the same on both sides. Those that are not are 'unresolved'.
+sign. So each special point must be there on a finer mesh too, and the test functions of folds
+and branch points be the same on both sides of it. Those that are not are 'unresolved'.
 """
 
 from dataclasses import replace
@@ -63,12 +63,11 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     Returns
     -------
     BranchPoint
-        'parameter_error' in the details of a doubling or Neimark-Sacker point is the change of the
-        parameter on finer meshes. A point that is not found again stays where it was, and 'located'
-        in its details is False; 'parameter_error' is there for all kinds, what the parameter
-        changes by over the stretch that was searched if nothing better is known. A fold or branch
-        point that finer meshes do not have becomes 'unresolved', and 'instead_of' in its details
-        says what it looked like.
+        'parameter_error' in the details is the change of the parameter on finer meshes. A point
+        that is not found again stays where it was, and 'located' in its details is False;
+        'parameter_error' is what the parameter changes by over the stretch that was searched if
+        nothing better is known. A point that finer meshes do not have becomes 'unresolved', and
+        'instead_of' in its details says what it looked like.
     """
     kind = str(point.kind)
     problem, u, _ = own
@@ -80,14 +79,15 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     found = _found(place, kind) or _found_from(place, start, kind)
     details = {**point.details, "located": False} if found is None else {**found.details}
     if kind in _JUDGED:
-        details |= _on_finer_meshes(point, found, place)
+        judged = _on_finer_meshes(point, found, place)
     else:
         away = abs(float(problem.weights() * place[2] @ (u - start)))
-        change = _change_on_finer_meshes(point, found, place, max(away, _NEAR[0]))
-        if change is None:
-            kind, details["instead_of"] = UNRESOLVED, kind
-        else:
-            details["parameter_error"] = change
+        judged = _change_on_finer_meshes(point, found, place, max(away, _NEAR[0]))
+    if judged is None:
+        known = {name: details[name] for name in ("located", "parameter_error") if name in details}
+        kind, details = UNRESOLVED, {**known, "instead_of": kind}
+    else:
+        details |= judged
     if found is None:
         details.setdefault("parameter_error", _reach(place))
     return replace(found or point, kind=kind, details=details)
@@ -141,8 +141,10 @@ def _reach(place: Place) -> float:
 
 def _on_finer_meshes(
     rough: BranchPoint, found: BranchPoint | None, place: Place
-) -> dict[str, Any]:
+) -> dict[str, Any] | None:
     """Coefficient and criticality of a special point, and by how much its parameter changes.
+
+    None if no finer mesh has the point.
 
     The error of the coefficient is its change from the last mesh but one, or half of that before:
     two meshes may agree by accident.
@@ -151,6 +153,7 @@ def _on_finer_meshes(
     kind, parameter, most = str(rough.kind), (found or rough).parameter, _FINEST * problem.intervals
     coefficients = [] if found is None else [float(found.details["coefficient"])]
     u, error, before = u if found is None else found.u, float("nan"), float("inf")
+    confirmed = False
     while 2 * problem.intervals <= most:
         place = _with_twice_the_intervals(problem, u, tangent)
         problem, u, tangent = place
@@ -158,7 +161,7 @@ def _on_finer_meshes(
         if finer is None:
             error = float("nan")
             continue
-        found, u = finer, finer.u
+        found, u, confirmed = finer, finer.u, True
         coefficients.append(float(found.details["coefficient"]))
         if len(coefficients) == 1:
             continue
@@ -169,11 +172,10 @@ def _on_finer_meshes(
         before = change
         if verdict(coefficients[-1], error)["criticality"] != "undecided":
             break
-    if not coefficients or found is None:
-        return verdict(float("nan"), float("nan"))
-    known = len(coefficients) > 1 or parameter != found.parameter
+    if found is None or not confirmed:
+        return None
     return {**verdict(coefficients[-1], error),
-            "parameter_error": abs(found.parameter - parameter) if known else _reach(place)}
+            "parameter_error": abs(found.parameter - parameter)}
 
 
 def _with_twice_the_intervals(problem: Collocation, u: Array, tangent: Array) -> Place:
@@ -183,7 +185,7 @@ def _with_twice_the_intervals(problem: Collocation, u: Array, tangent: Array) ->
 
 def _change_on_finer_meshes(
     rough: BranchPoint, found: BranchPoint | None, place: Place, reach: float
-) -> float | None:
+) -> dict[str, Any] | None:
     """By how much the parameter of a fold or branch point changes; None if two meshes in a row do
     not agree on it.
 
@@ -202,7 +204,7 @@ def _change_on_finer_meshes(
         u = finer.u
         here = problem, u, tangent
         if before is not None and _alike(before, here, kind, reach):
-            return abs(finer.parameter - parameter)
+            return {"parameter_error": abs(finer.parameter - parameter)}
         before = here
     return None
 

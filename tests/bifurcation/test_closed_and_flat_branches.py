@@ -133,7 +133,7 @@ def assert_none_unmarked(orbits, folder):
     assert marked
     assert {point.details["instead_of"] for point in marked} <= {"fold", "branch point"}
     remarks = list(special_table(orbits).columns[-1].cells)
-    assert sum("none on finer ones" in remark for remark in remarks) == len(marked)
+    assert sum("not on finer ones" in remark for remark in remarks) == len(marked)
 
 
 @pytest.mark.parametrize(("bounds", "largest", "points"), [
