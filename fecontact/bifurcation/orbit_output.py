@@ -1,7 +1,6 @@
 """What people plot of a branch of orbits: extremes and histories of displacements."""
 
 from collections.abc import Callable
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -47,7 +46,7 @@ def orbit_history(point: BranchPoint, states: int, samples: int = 400) -> tuple[
 
 def _require_counts(**values: Any) -> None:
     for name, value in values.items():
-        if not (isinstance(value, Integral) and value >= 1):
+        if not (isinstance(value, int | np.integer) and value >= 1):
             raise InputError(f"orbit_history: {name} = {value!r} must be a whole number from 1 on.")
 
 

@@ -84,8 +84,9 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
         away = abs(float(problem.weights() * place[2] @ (u - start)))
         judged = _change_on_finer_meshes(point, found, place, max(away, _NEAR[0]))
     if judged is None:
-        known = {name: details[name] for name in ("located", "parameter_error") if name in details}
-        kind, details = UNRESOLVED, {**known, "instead_of": kind}
+        details = {name: value for name, value in details.items()
+                   if name in ("located", "parameter_error")}
+        kind, details["instead_of"] = UNRESOLVED, kind
     else:
         details |= judged
     if found is None:
