@@ -117,6 +117,8 @@ def _remark(point: BranchPoint) -> str:
 def _what_changes(point: BranchPoint) -> str:
     """What begins at a special point, or by how many the unstable directions change."""
     details = point.details
+    if "instead_of" in details:
+        return f"{details['instead_of']} on this mesh, not on finer ones: take more intervals"
     if "unstable_before" in details:
         return f"{details['unstable_before']} to {details['unstable_after']} unstable directions"
     criticality = str(details.get("criticality", ""))

@@ -13,6 +13,7 @@ from oscillators import friction_oscillator
 
 import fecontact
 from fecontact import memory, modal_basis
+from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.body import ElasticBody
 from fecontact.errors import FecontactError, InputError
 
@@ -263,10 +264,66 @@ find_equilibrium(None,None)
 equilibrium_branch(None,"a")
 equilibrium_branch(contact_field(osc,["ground.speed"]),"x",bounds=(0,1))
 equilibrium_branch(contact_field(osc,["ground.speed"]),"ground.speed",bounds=None)
+equilibrium_branch(field,None)
+equilibrium_branch(field,3)
+equilibrium_branch(field,"ground.speed","x")
+equilibrium_branch(field,"ground.speed",settings=3)
+equilibrium_branch(field,"ground.speed",scales="a")
+equilibrium_branch(field,"ground.speed",scales=[1,2,3])
+equilibrium_branch(field,"ground.speed",width="a")
+equilibrium_branch(field,"ground.speed",direction=None)
+switched_branch(None,"ground.speed",point)
+switched_branch(field,"ground.speed",None)
+switched_branch(field,None,point)
+find_equilibrium(field,"x")
+find_equilibrium(field,start="x")
+fold_curve(field,None,point)
+fold_curve(field,"ab",point)
+fold_curve(field,("ground.speed","x"),None)
+hopf_curve(None,("ground.speed","x"),point)
+hopf_curve(field,("ground.speed",),point)
+orbits_from_hopf(None,branch,point)
+orbits_from_hopf(field,None,point)
+orbits_from_hopf(field,branch,None)
+orbits_from_motion(field,None,[0],[0])
+orbits_from_motion(field,"ground.speed",[0,1],None)
+orbits_by_shooting(None,"ground.speed",[0],[0])
+orbits_by_shooting(field,None,[0],[0])
+orbits_by_shooting(field,"ground.speed",None,None)
+orbits_by_shooting(field,"ground.speed","a","b")
+hopf_orbits_by_shooting(None,branch,point)
+hopf_orbits_by_shooting(field,branch,None)
+doubled_by_shooting(field,None,point)
+doubled_by_shooting(field,branch,None)
+orbits_beyond(None,branch,point)
+orbits_beyond(field,None,point)
+orbits_beyond(field,branch,None)
+orbits_beyond(field,branch,point,direction=None)
+orbit_curve(field,None,point,"ground.speed")
+orbit_curve(field,branch,None,"ground.speed")
+orbit_history(None,4)
+orbit_history(branch,4)
+orbit_history(point,None)
+orbit_history(point,4,None)
+orbit_history(point,4,-1)
+quantity_range(None,[1])
+quantity_range(point,None)
+observe(None,branch,1)
+observe(field,None,1)
+motion_of(field,None,point)
+motion_of(field,branch,None)
+basins(None,None,None,transient=1)
+basins(osc,None,None,transient=1)
+plot_basins(None,"x.png")
+plot_stability_map(None,"x.png")
+brute_force(osc,None,[1])
 brute_force(None,"ground.speed",[1])
 brute_force(osc,"ground.speed",[])
 brute_force(osc,"ground.speed",[nan])
 lyapunov_exponents(None,1)
+lyapunov_exponents(osc,None)
+lyapunov_exponents(osc,1,rtol=None)
+lyapunov_exponents(osc,1,interval="a")
 settled_motion(None)
 settled_motion(osc,transient=nan)
 smoothing_cost(None,1)
@@ -386,10 +443,13 @@ def names():
                                      ground=fecontact.Ground(speed=0.1),
                                      load=fecontact.Load(normal=10.0))
     oscillator = friction_oscillator(2)
+    point = BranchPoint(np.zeros(5), np.ones(5))
     known = {name: getattr(fecontact, name) for name in fecontact.__all__}
     return known | {
         "np": np, "nan": float("nan"), "mesh": mesh, "body": body, "basis": basis,
         "system": system, "osc": oscillator,
+        "field": fecontact.contact_field(oscillator, ["ground.speed"]), "point": point,
+        "branch": Branch("ground.speed", (point,)),
         "run": fecontact.simulate(oscillator, 0.1, outputs=51)}
 
 

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing
@@ -132,6 +133,7 @@ def basins(
         For values out of range, for two quantities that no state has independently, and as
         :func:`fecontact.ensemble`.
     """
+    require_kind("basins", ContactSystem, system=system)
     if keep < 4:
         raise InputError(f"keep = {keep!r} must be at least 4.")
     if not 0.0 < tolerance < 1.0:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices
 
 Array = NDArray[np.float64]
@@ -117,3 +118,9 @@ class Branch:
         """The branch in the other direction."""
         turned = tuple(replace(point, tangent=-point.tangent) for point in self.points[::-1])
         return replace(self, points=turned)
+
+
+def require_on_branch(owner: str, branch: object, point: object) -> None:
+    """Raise :class:`InputError` unless these are a branch, and a point of one."""
+    require_kind(owner, Branch, branch=branch)
+    require_kind(owner, BranchPoint, point=point)

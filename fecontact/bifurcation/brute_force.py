@@ -117,6 +117,9 @@ def brute_force(
     if isinstance(parameter, str):
         name, made = parameter, [system.with_(**{parameter: float(p)}) for p in points]
     else:
+        if not callable(parameter):
+            raise InputError(f"brute_force: parameter must be a text or a function, not "
+                             f"{type(parameter).__name__}.")
         name = getattr(parameter, "__name__", "parameter")
         made = [parameter(system, float(p)) for p in points]
     for one in made:

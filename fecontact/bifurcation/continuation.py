@@ -34,6 +34,8 @@ _ON_BOUND = 1e-13
 
 # Distance in the diagram at which the start of a branch, found on another mesh, is met again.
 _AGAIN = 1e-5
+# Solutions whose distance is this many times what Newton's method leaves are the same.
+_ALIKE = 10.0
 
 __all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
 
@@ -109,7 +111,7 @@ def continuation(
                     return End(Status.STOPPED)
                 if located.kind is None:
                     return End(Status.BOUND)
-            if count > 2 and _passes(problem, here, there, origin, start):
+            if count > 2 and _passes(problem, here, there, origin, start, settings):
                 yield BranchPoint(start.u, start.tangent, start.values)
                 return End(Status.CLOSED)
             yield BranchPoint(there.u, there.tangent, there.values)
@@ -207,7 +209,8 @@ def _next_step(
 
 
 def _passes(
-    problem: Problem, here: Solution, there: Solution, origin: Problem, start: Solution
+    problem: Problem, here: Solution, there: Solution, origin: Problem, start: Solution,
+    settings: Settings,
 ) -> bool:
     """Whether the start of the branch lies on the step from here to there."""
     weights = problem.weights()
@@ -219,4 +222,24 @@ def _passes(
     again = problem.met_again(origin, start.u, start.tangent, here.u, here.tangent)
     if again is None or not 0.0 < (along := float(row @ (again - here.u))) <= length:
         return False
-    return norm(problem, again - between(here, there, along, row)) < 1e-2 * length + _AGAIN
+    near = between(here, there, along, row)
+    return (norm(problem, again - near) < 1e-2 * length + _AGAIN
+            and _lead_to_one(problem, again, near, row, settings))
+
+
+def _lead_to_one(
+    problem: Problem, one: Array, other: Array, row: Array, settings: Settings
+) -> bool:
+    """Whether Newton's method goes from two guesses to the same solution.
+
+    A branch may pass itself closer than the cubic between two of its points is accurate.
+    """
+    try:
+        found = [corrected(problem, guess, row, settings.tolerance, 2 * settings.iterations)
+                 for guess in (one, other)]
+    except FecontactError:
+        return False
+    if found[0] is None or found[1] is None:
+        return False
+    near = _ALIKE * max(settings.tolerance, problem.rounding) * (1.0 + norm(problem, one))
+    return norm(problem, found[0][0] - found[1][0]) < near

@@ -1,12 +1,13 @@
 """Curves of folds and of Hopf points of equilibria in two parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.curve_problems import (
     FoldCurve,
@@ -111,6 +112,10 @@ def _beginning(
 ) -> tuple[Equilibrium, tuple[int, int], Array, Array, list[float]]:
     """Start, indices of the parameters, sizes of the states, their limits, widths."""
     require_field(field)
+    require_kind("A curve", Sequence, parameters=parameters)
+    require_kind("A curve", (BranchPoint, Equilibrium), point=point)
+    if isinstance(parameters, str) or len(parameters) != 2:
+        raise InputError(f"A curve needs the names of two parameters, not {parameters!r}.")
     active = (field.index(parameters[0]), field.index(parameters[1]))
     if active[0] == active[1]:
         raise InputError(f"A curve needs two different parameters, not {parameters[0]!r} twice.")

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats, require_kind
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.linear import solution
 from fecontact.bifurcation.vector_field import Array, VectorField, require_field
@@ -155,12 +156,13 @@ def find_equilibrium(
         If a parameter is unknown or out of range.
     """
     require_field(field)
+    require_kind("find_equilibrium", (Mapping, type(None)), parameters=parameters)
     values = field.values_with(**dict(parameters or {}))
     require_autonomous(field, values)
     if start is None:
         start = steady_sliding(field, values) if isinstance(field, ContactField) else np.zeros(
             field.dimension)
-    x = np.array(start, dtype=float)
+    x = np.array(as_floats(start, "The start of an equilibrium"))
     if x.shape != (field.dimension,):
         raise InputError(f"The start of an equilibrium must have {field.dimension} values, not "
                          f"shape {x.shape}.")

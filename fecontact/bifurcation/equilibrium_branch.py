@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.equilibria import Equilibrium, find_equilibrium, require_autonomous
 from fecontact.bifurcation.equilibrium_problem import EquilibriumProblem
 from fecontact.bifurcation.follow import follow
+from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.vector_field import VectorField, require_field
 from fecontact.errors import InputError
@@ -110,6 +112,8 @@ def switched_branch(
     InputError
         If the point is no branch point, or no second branch crosses there.
     """
+    require_field(field)
+    require_kind("switched_branch", BranchPoint, point=point)
     index = field.index(parameter)
     if "other_tangent" not in point.details:
         raise InputError(f"The point at {parameter} = {point.parameter:.6g} "
@@ -154,9 +158,7 @@ def _problem(
     field: VectorField, begin: Equilibrium, index: int, settings: Settings | None,
     bounds: tuple[float, float] | None, scales: ArrayLike | None, width: float | None,
 ) -> tuple[EquilibriumProblem, Settings]:
-    chosen = settings or Settings()
-    if bounds is not None:
-        chosen = replace(chosen, bounds=bounds)
+    chosen = settings_of(settings, bounds)
     for bound in map(float, chosen.bounds):
         # A parameter may be what drives the system, as an amplitude that begins at zero.
         there = begin.values.copy()
@@ -164,10 +166,8 @@ def _problem(
         with suppress(InputError):
             if np.isfinite(bound):
                 require_autonomous(field, there)
-    if width is None:
-        span = chosen.bounds[1] - chosen.bounds[0]
-        width = span if np.isfinite(span) else abs(float(begin.values[index])) or 1.0
-    sizes = default_scales(begin) if scales is None else np.array(scales, dtype=float)
+    width = width_of(width, chosen, begin.values[index])
+    sizes = default_scales(begin) if scales is None else sizes_of(scales, begin.state)[0]
     limits = _GROWTH * sizes if scales is None else None
     return EquilibriumProblem(field, begin.values, index, sizes, width, limits), chosen
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.continuation import End, continuation, start_of
 from fecontact.bifurcation.problem import Problem, Settings
+from fecontact.errors import require_finite
 
 Array = NDArray[np.float64]
 
@@ -43,6 +44,7 @@ def follow(
     FecontactError
         If there is no solution near the start.
     """
+    require_finite("A branch", direction=direction)
     points, end = _collected(problem, u, settings, tangent, direction)
     if both and end.status not in (Status.CLOSED, Status.INTERRUPTED):
         start = start_of(problem, u, settings, tangent, direction)

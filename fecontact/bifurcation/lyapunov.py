@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.arguments import require_kind
-from fecontact.errors import AnalysisError, FecontactError, InputError
+from fecontact.errors import AnalysisError, FecontactError, InputError, require_positive
 from fecontact.forcing import forcing_period
 from fecontact.integrate import stepping
 from fecontact.integrate.control import ENDS, finish, start
@@ -96,9 +96,8 @@ def lyapunov_exponents(
     G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9.
     """
     require_kind("lyapunov_exponents", ContactSystem, system=system)
-    for name, value, least in (("duration", duration, 0.0), ("interval", interval, 0.0)):
-        if value is not None and not (isinstance(value, Real) and least < value < np.inf):
-            raise InputError(f"{name} = {value!r} must be above zero [s].")
+    require_positive("lyapunov_exponents", duration=duration, rtol=rtol,
+                     **({} if interval is None else {"interval": interval}))
     if not (isinstance(transient, Real) and 0.0 <= transient < np.inf):
         raise InputError(f"transient = {transient!r} must be zero or above [s].")
     if not (isinstance(count, Integral) and 1 <= count <= system.size):

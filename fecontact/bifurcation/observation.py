@@ -6,10 +6,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.branch import Branch, BranchPoint
+from fecontact.arguments import require_kind
+from fecontact.bifurcation.branch import Branch, BranchPoint, require_on_branch
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.orbit_output import orbit_history, orbit_nodes, quantity_range
+from fecontact.bifurcation.vector_field import require_field
 from fecontact.errors import InputError
 from fecontact.integrate.simulate import simulate
 
@@ -42,6 +44,8 @@ def observe(
     InputError
         If there is no such point.
     """
+    require_kind("observe", ContactField, field=field)
+    require_kind("observe", Branch, branch=branch)
     row = field.displacement_row(point, axis)
     points = []
     for one in branch.points:
@@ -88,6 +92,8 @@ def motion_of(
     InputError
         If the point is no orbit.
     """
+    require_field(field)
+    require_on_branch("motion_of", branch, point)
     if "period" not in point.values:
         raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is no periodic "
                          f"orbit.")

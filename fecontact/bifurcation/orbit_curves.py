@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.branch import Branch, BranchPoint
+from fecontact.bifurcation.branch import Branch, BranchPoint, require_on_branch
 from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.follow import follow
 from fecontact.bifurcation.linearised import Linearised
@@ -15,8 +15,8 @@ from fecontact.bifurcation.orbit_normal_forms import Expansion
 from fecontact.bifurcation.orbit_options import settings_of
 from fecontact.bifurcation.orbits import restored
 from fecontact.bifurcation.problem import Problem, Settings
-from fecontact.bifurcation.vector_field import VectorField
-from fecontact.errors import InputError, require_positive
+from fecontact.bifurcation.vector_field import VectorField, require_field
+from fecontact.errors import InputError, require_finite, require_positive
 
 Array = NDArray[np.float64]
 
@@ -200,6 +200,9 @@ def orbit_curve(
     InputError
         If the point is of another kind, or a parameter is unknown.
     """
+    require_field(field)
+    require_on_branch("orbit_curve", branch, point)
+    require_finite("orbit_curve", direction=direction)
     if point.kind not in _KINDS:
         raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is "
                          f"{point.kind or 'a regular point'!r}; curves start at "

@@ -1,10 +1,12 @@
 """What people plot of a branch of orbits: extremes and histories of displacements."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats, require_kind
 from fecontact.bifurcation.branch import Branch, BranchPoint
 from fecontact.bifurcation.interpolation import extremes, interpolate
 from fecontact.errors import InputError
@@ -20,6 +22,7 @@ def orbit_nodes(point: BranchPoint, states: int) -> tuple[Array, Array, int]:
     InputError
         If the orbit was not found by collocation.
     """
+    require_kind("A periodic orbit", BranchPoint, point=point)
     if "mesh" not in point.values:
         raise InputError("The point is no periodic orbit.")
     mesh = np.asarray(point.values["mesh"], dtype=float)
@@ -35,9 +38,16 @@ def orbit_nodes(point: BranchPoint, states: int) -> tuple[Array, Array, int]:
 
 def orbit_history(point: BranchPoint, states: int, samples: int = 400) -> tuple[Array, Array]:
     """Times (k,) [s] and states (k, d) of an orbit over one period, both ends included."""
+    _require_counts(states=states, samples=samples)
     mesh, nodes, _ = orbit_nodes(point, states)
     phases = np.linspace(0.0, 1.0, samples)
     return phases * float(point.values["period"]), interpolate(mesh, nodes, phases)
+
+
+def _require_counts(**values: Any) -> None:
+    for name, value in values.items():
+        if not (isinstance(value, int | np.integer) and value >= 1):
+            raise InputError(f"orbit_history: {name} = {value!r} must be a whole number from 1 on.")
 
 
 def quantity_range(point: BranchPoint, row: ArrayLike) -> tuple[float, float]:
@@ -46,7 +56,10 @@ def quantity_range(point: BranchPoint, row: ArrayLike) -> tuple[float, float]:
     ``row`` (d,) is a row of the states, such as that of a displacement
     (:meth:`fecontact.bifurcation.contact_field.ContactField.displacement_row`).
     """
-    weights = np.asarray(row, dtype=float)
+    require_kind("quantity_range", BranchPoint, point=point)
+    weights = as_floats(row, "row")
+    if weights.ndim != 1:
+        raise InputError(f"row must hold one number for each state, not shape {weights.shape}.")
     if "mesh" not in point.values:
         value = float(weights @ np.asarray(point.values["state"]))
         return value, value

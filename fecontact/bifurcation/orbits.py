@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation import orbit_starts
-from fecontact.bifurcation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.branch import Branch, BranchPoint, Status, require_on_branch
 from fecontact.bifurcation.collocation import Collocation
 from fecontact.bifurcation.continuation import Settings
 from fecontact.bifurcation.equilibria import Equilibrium
@@ -17,7 +17,7 @@ from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.same_orbit import HALVING
 from fecontact.bifurcation.sharpening import ROUGHLY, SHARPENED, sharpened
 from fecontact.bifurcation.vector_field import VectorField, require_field
-from fecontact.errors import FecontactError, InputError
+from fecontact.errors import FecontactError, InputError, require_finite
 
 Array = NDArray[np.float64]
 
@@ -57,19 +57,22 @@ def orbits_from_hopf(
         outside the unit circle), 'trivial_error' (distance from one of the multiplier that is
         one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
 
-        - 'fold',
+        - 'fold': with parameter_error, by which its parameter changes on a finer mesh,
         - 'period doubling' and 'Neimark-Sacker': with coefficient, coefficient_error,
           criticality ('supercritical', 'subcritical' or 'undecided') and parameter_error, see
           :mod:`fecontact.bifurcation.orbit_normal_forms` and
           :func:`fecontact.bifurcation.sharpening.sharpened`,
-        - 'branch point': where two branches of orbits cross,
-        - 'unresolved': where 'unstable' changes though nothing of the kind was found.
+        - 'branch point': where two branches of orbits cross, with parameter_error as well,
+        - 'unresolved': where 'unstable' changes though nothing of the kind was found; or what
+          instead_of says on this mesh alone, though finer ones do not have it.
 
     Raises
     ------
     InputError
         If the point is no Hopf point, or there are no orbits near it.
     """
+    require_field(field)
+    require_on_branch("orbits_from_hopf", branch, point)
     if point.kind != "Hopf":
         raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is "
                          f"{point.kind or 'a regular point'!r}, but orbits are born at points of "
@@ -155,6 +158,9 @@ def orbits_beyond(
     InputError
         If no other orbits begin at a point of this kind.
     """
+    require_field(field)
+    require_on_branch("orbits_beyond", branch, point)
+    require_finite("orbits_beyond", direction=direction)
     problem, u, tangent = restored(field, branch, point)
     chosen = settings_of(settings, bounds)
     if point.kind == "period doubling":

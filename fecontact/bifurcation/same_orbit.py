@@ -15,6 +15,7 @@ from fecontact.bifurcation.interpolation import interpolate, node_times
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.collocation import Collocation
+    from fecontact.bifurcation.shooting import Shooting
 
 Array = NDArray[np.float64]
 
@@ -68,6 +69,46 @@ def _shift(
     if off(low) * off(high) >= 0.0:
         return rough
     return float(brentq(off, low, high, xtol=1e-12))
+
+
+def started_in_phase(problem: "Shooting", u: Array, like: Array) -> Array:
+    """An orbit by shooting, started where it is next to another one.
+
+    Where the phase is free it starts on the plane of the phase condition, else a whole number of
+    periods of the forcing later.
+
+    Raises
+    ------
+    AnalysisError
+        If a run of it fails.
+    """
+    from scipy.optimize import brentq
+
+    d = problem.field.dimension
+    paths = problem.linearise(u).paths
+    samples = paths.shape[1] - 1
+    grid = np.append(np.linspace(problem.mesh[:-1], problem.mesh[1:], samples, endpoint=False,
+                                 axis=1).reshape(-1), 1.0)
+    path = np.concatenate([paths[:, :-1].reshape(-1, d), paths[:1, 0]])
+    starts, wanted = problem.mesh[:-1], problem.starts(like)
+
+    def apart(shift: float) -> float:
+        phases = np.mod(starts + shift, 1.0)
+        near = np.stack([np.interp(phases, grid, column) for column in path.T], axis=1)
+        return float((((near - wanted) / problem.scales[:d]) ** 2).sum())
+
+    def off(shift: float) -> float:
+        return float(problem.phase_row @ (problem.at_phases(u, np.array([shift]))[0]
+                                          - problem.reference))
+
+    if problem.autonomous:
+        index = int(np.argmin([apart(phase) for phase in grid[:-1]]))
+        low, high, shift = grid[index - 1] - (index == 0), grid[index + 1], grid[index]
+        if off(low) * off(high) < 0.0:
+            shift = float(brentq(off, low, high, xtol=1e-12))
+    else:
+        shift = min((k / problem.periods for k in range(problem.periods)), key=apart)
+    return np.concatenate([problem.at_phases(u, starts + shift).reshape(-1), u[-problem.common:]])
 
 
 def halves_meet(problem: "Collocation", u: Array, tangent: Array) -> bool:

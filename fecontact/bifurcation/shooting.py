@@ -17,6 +17,7 @@ from fecontact.bifurcation.floquet import Floquet, floquet_of
 from fecontact.bifurcation.interpolation import interpolate
 from fecontact.bifurcation.multiplier_tests import unresolved
 from fecontact.bifurcation.problem import Problem
+from fecontact.bifurcation.same_orbit import same_heading, started_in_phase
 from fecontact.errors import AnalysisError, InputError
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 _SAMPLES = 33
 # A guess is not bent by more than this part of its step.
 _MOST_BENT = 0.2
+# Phase since the start of a segment that needs no run.
+_AT_START = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +189,38 @@ class Shooting(Problem):
         """The kind of a torus bifurcation; None for a neutral saddle."""
         return linearisation.floquet.confirmed(kind)
 
+    def met_again(
+        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array
+    ) -> Array | None:
+        """See :meth:`Problem.met_again`: started in the phase of ``like``."""
+        if len(u) != len(like) or not same_heading(self.weights(), tangent, heading, self.common):
+            return None
+        try:
+            return started_in_phase(self, u, like)
+        except AnalysisError:
+            return None
+
+    def at_phases(self, u: Array, phases: Array) -> Array:
+        """States (k, d) of an orbit at phases (k,) in periods, each run from its segment's start.
+
+        Raises
+        ------
+        AnalysisError
+            If a run fails.
+        """
+        inside = np.mod(phases, 1.0)
+        segments = np.searchsorted(self.mesh, inside + _AT_START, side="right") - 1
+        since = inside - self.mesh[segments]
+        segments %= len(self.mesh) - 1
+        found = self.starts(u)[segments]
+        runs = np.flatnonzero(since > _AT_START)
+        if len(runs):
+            begin = self.mesh[segments[runs]]
+            times = self.period(u) * np.stack([begin, begin + since[runs]], axis=1)
+            found[runs] = run_from(self.field.system(self.parameters(u)), times, found[runs],
+                                   self.rtol)[:, -1]
+        return found
+
 
 def shooting_from(
     problem: Collocation, u: Array, segments: int = 4, rtol: float = 1e-9,
@@ -209,6 +244,17 @@ def shooting_from(
     result = Shooting(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
                       problem.scales, problem.periods, rtol, derivative_rtol)
     return result, np.concatenate([starts.reshape(-1), u[problem.size :]])
+
+
+def run_from(system: ContactSystem, times: Array, starts: Array, rtol: float) -> Array:
+    """States (K, k, d) at times (K, k) of runs from starts (K, d); AnalysisError if one fails."""
+    found = ensemble(system, times, initial=starts, rtol=rtol)
+    if not found.finished.all():
+        status = found.status[int(np.argmin(found.finished))]
+        if status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        raise AnalysisError(f"The run of a segment did not reach its end: {status.value}")
+    return found.states
 
 
 class Shot:
@@ -253,14 +299,7 @@ class Shot:
     def paths(self) -> Array:
         """States (K, samples, d) of the segments, from start to end."""
         times = np.linspace(self._times[:-1], self._times[1:], _SAMPLES, axis=1)
-        found = ensemble(self._system, times, initial=self.problem.starts(self.u),
-                         rtol=self.problem.rtol)
-        if not found.finished.all():
-            status = found.status[int(np.argmin(found.finished))]
-            if status is Status.INTERRUPTED:
-                raise KeyboardInterrupt
-            raise AnalysisError(f"The run of a segment did not reach its end: {status.value}")
-        return found.states
+        return run_from(self._system, times, self.problem.starts(self.u), self.problem.rtol)
 
     @cached_property
     def _ends(self) -> Array:

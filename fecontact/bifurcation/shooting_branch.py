@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fecontact.arguments import as_floats
 from fecontact.bifurcation.branch import Branch
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.continuation import require_inside
@@ -11,6 +12,7 @@ from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.orbit_starts import from_samples
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.shooting import shooting_from
+from fecontact.bifurcation.vector_field import require_field
 from fecontact.errors import AnalysisError, InputError
 
 Array = NDArray[np.float64]
@@ -59,13 +61,17 @@ def orbits_by_shooting(
     AnalysisError
         If Newton's method finds no orbit near them.
     """
+    require_field(field)
     free = field.index(parameter)
     given = field.values if values is None else np.array(values, dtype=float)
     chosen = settings_of(settings, bounds)
     require_inside(float(given[free]), chosen)
-    amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
+    motion = as_floats(times, "times"), as_floats(states, "states")
+    if motion[1].ndim != 2 or motion[1].size == 0:
+        raise InputError(f"states must be those of a motion (k, d), not of shape "
+                         f"{motion[1].shape}.")
+    amplitudes = np.ptp(motion[1], axis=0) / 2.0
     sizes, _ = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
-    motion = np.asarray(times, dtype=float), np.asarray(states, dtype=float)
     if (period is not None and isinstance(field, ContactField)
             and motion[1].shape == (motion[0].size, field.dimension)
             and field.forcing_period(given) is None):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation import orbit_starts
-from fecontact.bifurcation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.branch import Branch, BranchPoint, Status, require_on_branch
 from fecontact.bifurcation.contact_field import ContactField
 from fecontact.bifurcation.equilibria import Equilibrium
 from fecontact.bifurcation.equilibrium_branch import default_scales
@@ -17,6 +17,7 @@ from fecontact.bifurcation.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.problem import Settings
 from fecontact.bifurcation.same_orbit import HALVING
 from fecontact.bifurcation.shooting import Shooting, Shot, shooting_from
+from fecontact.bifurcation.vector_field import require_field
 from fecontact.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
@@ -65,6 +66,8 @@ def hopf_orbits_by_shooting(
     InputError
         If the point is no Hopf point, or there are no orbits near it.
     """
+    require_field(field)
+    require_on_branch("hopf_orbits_by_shooting", branch, point)
     if point.kind != "Hopf":
         raise InputError(f"The point at {branch.name} = {point.parameter:.6g}, "
                          f"{point.kind or 'a regular point'!r}, is no Hopf point.")
@@ -112,6 +115,8 @@ def doubled_by_shooting(
     InputError
         If the point is no period doubling of such a branch.
     """
+    require_field(field)
+    require_on_branch("doubled_by_shooting", branch, point)
     if point.kind != "period doubling":
         raise InputError(f"The point at {branch.name} = {point.parameter:.6g}, "
                          f"{point.kind or 'a regular point'!r}, is no period doubling.")

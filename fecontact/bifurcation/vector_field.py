@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.errors import InputError, choices, nearest
 
 Array = NDArray[np.float64]
@@ -67,6 +68,7 @@ class VectorField(ABC):
         InputError
             If there is none of this name; it lists those that exist.
         """
+        require_kind("A vector field", str, parameter=name)
         names = tuple(self.parameters)
         if name not in names:
             raise InputError(f"The vector field has no parameter {name!r}{nearest(name, names)}; "

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fecontact.arguments import require_kind
 from fecontact.output.style import distinct_colours, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -40,6 +41,9 @@ def plot_basins(
     InputError
         For another suffix, or a file that cannot be written.
     """
+    from fecontact.bifurcation.basins import Basins
+
+    require_kind("plot_basins", Basins, found=found)
     return save_figure(path, lambda: basins_figure(found, x_label, y_label, rows))
 
 

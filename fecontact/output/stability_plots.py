@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.arguments import require_kind
 from fecontact.output.style import DASHES, distinct_colours, new_figure, save_figure
 from fecontact.parameter_units import parameter_label
 
@@ -67,6 +68,9 @@ def plot_stability_map(
     InputError
         For another suffix, or a file that cannot be written.
     """
+    from fecontact.bifurcation.stability_map import StabilityMap
+
+    require_kind("plot_stability_map", StabilityMap, found=found)
     return save_figure(path, lambda: stability_map_figure(found, borders, x_label, y_label))
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from systems_for_bifurcations import two_mass_field, two_mass_jacobian
 
+from fecontact import read_branch, write_branch
 from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.curves import hopf_curve
 from fecontact.bifurcation.equilibria import find_equilibrium
@@ -11,6 +12,7 @@ from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
 from fecontact.bifurcation.function_field import vector_field
 from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.problem import Settings
+from fecontact.branch_results import special_table
 
 
 def island(t, x, p, out):
@@ -122,6 +124,38 @@ def test_no_folds_on_a_canard():
 def pendulum(t, x, p, out):
     out[0] = x[1]
     out[1] = -x[0] - 0.5 * np.sin(x[0]) + p[0] * x[1]
+
+
+def assert_none_unmarked(orbits, folder):
+    """Special points of the mesh alone are marked, in the table and in files too."""
+    assert {point.kind for point in orbits.special} == {"unresolved"}
+    marked = [point for point in read_branch(write_branch(folder / "branch.h5", orbits)).special
+              if "instead_of" in point.details]
+    assert marked
+    assert {point.details["instead_of"] for point in marked} <= {"fold", "branch point"}
+    remarks = list(special_table(orbits).columns[-1].cells)
+    assert sum("not on finer ones" in remark for remark in remarks) == len(marked)
+
+
+@pytest.mark.parametrize(("bounds", "largest", "points"), [
+    ((0.98, 1.02), 0.05, 80), ((0.0, 1.3), 0.2, 40), ((0.9, 1.1), 0.2, 40)])
+def test_folds_of_a_mesh_too_coarse_for_a_canard_are_marked(bounds, largest, points, tmp_path):
+    field = vector_field(canard, {"a": 1.2}, 2)
+    rest = equilibrium_branch(field, "a", [1.2, 1.2**3 / 3.0 - 1.2], bounds=(0.8, 1.3),
+                              direction=-1.0)
+    orbits = orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=bounds, intervals=50,
+                              settings=Settings(points=points, largest_step=largest))
+    assert_none_unmarked(orbits, tmp_path)
+
+
+@pytest.mark.parametrize("intervals", [15, 20, 30])
+def test_special_points_of_a_mesh_too_coarse_for_a_pendulum_are_marked(intervals, tmp_path):
+    field = vector_field(pendulum, {"a": 0.1}, 2)
+    rest = equilibrium_branch(field, "a", bounds=(-0.5, 0.5), direction=-1.0)
+    orbits = orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=(-0.5, 0.5),
+                              intervals=intervals,
+                              settings=Settings(points=90, largest_step=0.1))
+    assert_none_unmarked(orbits, tmp_path)
 
 
 def test_a_conservative_family_has_no_special_points():

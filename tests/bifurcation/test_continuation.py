@@ -63,6 +63,29 @@ def test_closed_curve_ends_at_its_start():
     assert (np.diff(angle) > 0.0).all()
 
 
+class Helix(Problem):
+    """x = cos w, p = sin w, with w a third unknown: turn by turn 2 pi / 100,000 farther on."""
+
+    def linearise(self, u):
+        x, w, p = u
+        return Linear(np.array([x - np.cos(w), p - np.sin(w)]),
+                      np.array([[1.0, np.sin(w), 0.0], [0.0, -np.cos(w), 1.0]]))
+
+    def weights(self):
+        return np.array([1.0, 1e-10, 1.0])
+
+    def point(self, u, linearisation, tangent):
+        return {"w": u[1]}
+
+
+def test_a_branch_that_passes_by_its_start_goes_on():
+    """Much closer than the cubic between two of its points is accurate."""
+    branch = follow(Helix(), np.array([1.0, 0.0, 0.0]), Settings(largest_step=0.1, points=200))
+    assert branch.status is Status.POINTS
+    assert branch.points[-1].values["w"] > 4.0 * np.pi
+    assert len(branch.of_kind("fold")) == round(branch.points[-1].values["w"] / np.pi)
+
+
 @pytest.mark.parametrize("turn", [0.3, 0.6])
 def test_turns_between_points_are_limited(turn):
     branch = follow(CIRCLE, np.array([1.0, 0.0]),

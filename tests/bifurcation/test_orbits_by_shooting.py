@@ -1,14 +1,22 @@
 """What begins on branches by shooting, driven systems, and settled motions as starts."""
 
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from systems_for_bifurcations import belt, lorenz_field, two_mass_field
+from systems_for_bifurcations import (
+    belt,
+    lorenz_field,
+    two_mass_field,
+    two_mass_system,
+    with_force,
+)
 
 from fecontact import simulate, strobe
+from fecontact.bifurcation.branch import Status
 from fecontact.bifurcation.contact_field import contact_field
 from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
 from fecontact.bifurcation.observation import motion_of, observe
@@ -106,6 +114,74 @@ def test_the_drives_frequency_moves_the_ends_of_the_segments():
     row = field.displacement_row("B", "y")
     assert end.values["observed_section"] == pytest.approx(run.states[0, -1:] @ row, rel=1e-5)
     assert np.abs(end.values["multipliers"])[:2] == pytest.approx([0.545, 0.545], abs=0.01)
+
+
+FOLD = 0.890686833041  # of the two masses over B, by collocation with fine meshes
+
+
+def island():
+    """Orbits from their fold to B = 0.99, twice over: p = -1 to 1 and back is a closed branch."""
+    return contact_field(two_mass_system(), {"p": (0.0, lambda system, p: with_force(
+        system, FOLD + 0.1 * (1.0 - p * p)))})
+
+
+def on_island(two_masses, **options):
+    _, _, orbits = two_masses
+    near = min((at for at in orbits.points if at.values["stable"]),
+               key=lambda at: abs(at.parameter - 0.95))
+    return orbits_by_shooting(
+        island(), "p", *orbit_history(near, 4, 2000), period=near.values["period"],
+        values=[np.sqrt(1.0 - (near.parameter - FOLD) / 0.1)], bounds=(-1.5, 1.5), **options)
+
+
+@pytest.mark.parametrize("segments", [1, 4])
+def test_an_island_of_orbits_is_gone_round_once(two_masses, segments):
+    """The branch comes back in another phase; the folds are those over B, at p = -1 and 1."""
+    branch = on_island(two_masses, segments=segments,
+                       settings=Settings(largest_step=0.1, points=150))
+    assert branch.status is Status.CLOSED
+    assert [point.kind for point in branch.special] == ["fold", "fold"]
+    assert [point.parameter for point in branch.special] == pytest.approx([1.0, -1.0], abs=1e-8)
+    assert (branch.points[-1].u == branch.points[0].u).all()
+    # It had come back: what it closes with is the next step from the point before.
+    before, start = branch.points[-2], branch.points[0]
+    assert abs(start.values["period"] - before.values["period"]) < 0.1
+    assert len(branch) < 70
+
+
+def test_orbits_in_another_phase_are_met_again(two_masses):
+    """A quarter of a period later, off the ends of the segments, it is the same orbit; beside it
+    it is not."""
+    branch = on_island(two_masses, settings=Settings(points=2))
+    problem, u = restored_shooting(island(), branch, branch.points[0])
+    tangent = branch.points[0].tangent
+    later = np.concatenate([problem.at_phases(u, problem.mesh[:-1] + 0.217).reshape(-1), u[-2:]])
+    assert np.abs(later - u)[:-2].max() > 0.1
+    moved = replace(problem, reference=problem.starts(later)[0].copy())
+    again = moved.met_again(problem, u, tangent, later, tangent)
+    assert np.abs(again - later).max() < 1e-6 * np.abs(later).max()
+    assert moved.met_again(problem, u, tangent, later, -tangent) is None
+    other, v = restored_shooting(island(), branch, branch.points[1])
+    beside = other.met_again(problem, u, tangent, v, tangent)
+    assert np.sqrt(other.weights() @ (beside - v) ** 2) == pytest.approx(
+        np.sqrt(other.weights() @ (u - v) ** 2), rel=1e-3)
+
+
+def test_driven_orbits_a_period_of_the_drive_later_are_the_same():
+    motion = settled_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
+                            longest_period=8 * 2.0 * np.pi / 30.9)
+    assert motion.periods == 2
+    field = impact_orbits.field_at(30.9)
+    name = next(iter(field.parameters))
+    branch = orbits_by_shooting(field, name, motion.times, motion.states, periods=2, segments=3,
+                                bounds=(30.0, 32.0), settings=Settings(points=1))
+    problem, u = restored_shooting(field, branch, branch.points[0])
+    tangent = branch.points[0].tangent
+    later = np.append(problem.at_phases(u, problem.mesh[:-1] + 0.5).reshape(-1), u[-1])
+    sizes = np.ptp(motion.states, axis=0)
+    assert (np.abs(later - u)[:-1].reshape(3, 4) / sizes).max() > 1e-3
+    again = problem.met_again(problem, u, tangent, later, tangent)
+    assert (np.abs(again - later)[:-1].reshape(3, 4) / sizes).max() < 1e-9
 
 
 def test_settled_motions():
