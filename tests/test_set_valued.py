@@ -1,10 +1,13 @@
 """Set-valued friction and rigid stops against closed forms and published values."""
 
+import time as clock
+
 import numpy as np
 import pytest
 
 from fecontact.basis import ModalBasis
 from fecontact.errors import InputError
+from fecontact.integrate.control import integrate
 from fecontact.integrate.set_valued import integrate_set_valued
 from fecontact.integrate.set_valued_cost import smoothing_cost
 from fecontact.integrate.trajectory import Status, Trajectory
@@ -89,6 +92,36 @@ def test_belt_with_falling_friction(scheme, rtol, tolerance):
         12.0010312948, rel=1e-9 if scheme == "events" else 1e-4)
     assert along(system, run)[0].max() == pytest.approx(1.1339446764, rel=1e-5)
     assert imbalance(system, run) < 1e-5
+
+
+def test_steps_from_event_to_event_cost_little():
+    """Twice what those of the smoothed integrator cost."""
+    system = block(friction=HyperbolicFriction(1.0, 0.0, 1.0 / 3.0), load=Load(1.0),
+                   ground=Ground(speed=0.2))
+    state, times = start(system, 0.5, 0.2), np.linspace(0.0, 100.0, 3)
+
+    def set_valued():
+        return integrate_set_valued(system, state, times, rtol=1e-10).statistics
+
+    def smoothed():
+        return integrate(system, state, times, rtol=1e-7)[4]
+
+    cost = []
+    for run in (set_valued, smoothed):
+        parts = []
+        for _ in range(5):
+            begin = clock.process_time()
+            statistics = run()
+            parts.append((clock.process_time() - begin) / statistics["steps"])
+        cost.append(min(parts))
+    assert cost[0] < 5.0 * cost[1]
+
+
+def test_output_times_of_any_layout():
+    system = block(spring=1e4, friction=ConstantFriction(0.5), load=Load(2.0))
+    state, times = start(system, 0.85e-3), np.linspace(0.0, 0.1, 11)
+    run = integrate_set_valued(system, state, times[::2])
+    assert (run.states == integrate_set_valued(system, state, times[::2].copy()).states).all()
 
 
 def test_belt_with_a_jump_from_static_to_kinetic_friction():
