@@ -1,5 +1,6 @@
 """Set-valued friction and rigid stops against closed forms and published values."""
 
+
 import numpy as np
 import pytest
 
@@ -8,13 +9,14 @@ from fecontact.errors import InputError
 from fecontact.integrate.set_valued import integrate_set_valued
 from fecontact.integrate.set_valued_cost import smoothing_cost
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.laws.drive import Drive, Load
+from fecontact.laws.drive import Drive, Load, PointLoad
 from fecontact.laws.friction import ConstantFriction, ExponentialFriction, HyperbolicFriction
 from fecontact.laws.ground import Ground
 from fecontact.laws.ground_motion import SpeedRamp
 from fecontact.laws.memory import LuGreFriction
 from fecontact.laws.normal import RoughSurface
-from fecontact.laws.normal_stop import PrescribedForce
+from fecontact.laws.normal_stop import LinearContact, PrescribedForce
+from fecontact.laws.signals import Constant
 from fecontact.statics import static_equilibrium
 from fecontact.system import ContactSystem
 
@@ -89,6 +91,13 @@ def test_belt_with_falling_friction(scheme, rtol, tolerance):
         12.0010312948, rel=1e-9 if scheme == "events" else 1e-4)
     assert along(system, run)[0].max() == pytest.approx(1.1339446764, rel=1e-5)
     assert imbalance(system, run) < 1e-5
+
+
+def test_output_times_of_any_layout():
+    system = block(spring=1e4, friction=ConstantFriction(0.5), load=Load(2.0))
+    state, times = start(system, 0.85e-3), np.linspace(0.0, 0.1, 11)
+    run = integrate_set_valued(system, state, times[::2])
+    assert (run.states == integrate_set_valued(system, state, times[::2].copy()).states).all()
 
 
 def test_belt_with_a_jump_from_static_to_kinetic_friction():
@@ -298,3 +307,32 @@ def test_steps_end_where_the_speed_of_the_ground_has_a_kink(scheme):
     assert x == pytest.approx(0.1 * times + 0.75 * since**2 + 0.3 * after, abs=1e-9)
     assert rate == pytest.approx(0.1 + 1.5 * since, abs=1e-9)
     assert imbalance(system, run) < 1e-5
+
+
+def test_from_rest_under_point_loads():
+    """Ringing of a stiff contact after its onset, once it has faded, shortens no steps."""
+    row = np.zeros((3, 2))
+    row[0, 0] = row[1, 1] = 1.0
+    basis = ModalBasis.from_matrices(
+        np.eye(2), np.diag([100.0, 1e4]), {"contact": row[None], "B": row, "C": row},
+        damping=np.diag([1.0, 200.0]))
+    parts = {"normal": LinearContact(1e8), "friction": ConstantFriction(0.3)}
+    system = ContactSystem(basis, load=Load(0.0, (
+        PointLoad("C", "y", signal=Constant(-14.0)), PointLoad("B", "x", signal=Constant(20.0)))),
+        **parts)
+    # The same forces through springs so soft that they stay as they are.
+    springs = ContactSystem(basis, drive=Drive(
+        stiffness_x=1e-6, motion_x=Constant(2e7), stiffness_y=1e-6, motion_y=Constant(-1.4e7)),
+        **parts)
+    times = np.linspace(0.0, 10.0, 101)
+    run, other = (integrate_set_valued(each, np.zeros(4), times, scheme="stepping")
+                  for each in (system, springs))
+    assert run.status is Status.FINISHED
+    assert run.statistics["steps"] < 1.5 * other.statistics["steps"]
+    # Amplitudes from the onset down to a millionth, fading at 100 /s, at 200 steps a cycle.
+    w = np.sqrt(1e8 + 1e4)
+    cycles = np.log(1e6) / 100.0 * w / (2.0 * np.pi)
+    assert run.statistics["steps"] < 200 * cycles
+    sharp = integrate_set_valued(system, np.zeros(4), times, rtol=1e-10, scheme="events")
+    assert run.states[-1, :2] == pytest.approx(sharp.states[-1, :2], rel=1e-5)
+    assert run.states[-1, 1] == pytest.approx(-14.0 / w**2, rel=1e-6)

@@ -12,7 +12,7 @@ over parts of the step that are halved until the sign is decided, or they are as
 
 Most steps need none of that: on the interpolant a mode departs from the straight line between its
 ends by no more than the differences of its coefficients from that line, and a node by no more than
-the sum over the modes.
+the sum over the modes. Of few nodes on flat ground the coefficients themselves cost less.
 """
 
 from fecontact.compiled import helper
@@ -27,6 +27,8 @@ COEFFICIENTS, DOUBT = 5, 5
 SLIP, GAP = range(2)
 
 _FINEST = 2.0**-6
+# So many nodes count as few.
+_FEW = 4
 # Changes of sign of one quantity in a step that are told apart.
 MOST = 8
 
@@ -115,12 +117,65 @@ def keep_ends(n, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def restless(speed, h, s, control, room):  # type: ignore[no-untyped-def]
-    """Whether :func:`doubtful` may find something, by the modes alone.
+def restless(speed, h, s, shapes, control, room):  # type: ignore[no-untyped-def]
+    """Whether :func:`doubtful` may find something that matters.
 
     ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
     end; ``speed`` is that of the ground at the start.
     """
+    if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
+        return _restless_nodes(speed, h, s, shapes, control, room)
+    return _restless_modes(speed, h, s, control, room)
+
+
+@helper
+def _range(first, last, k1, k2, k3):  # type: ignore[no-untyped-def]
+    """Smallest and largest coefficient of an interpolant, and whether they rise or fall only."""
+    a, c = 0.75 * first + 0.25 * (last + k1), 0.25 * (first + k1 + k2 + k3) + 0.75 * last
+    b = 0.5 * (first + last) + k1 / 3.0 + k2 / 6.0
+    low, high = min(min(first, a), min(b, c)), max(max(first, a), max(b, c))
+    monotone = first <= a <= b <= c <= last or first >= a >= b >= c >= last
+    return min(low, last), max(high, last), monotone
+
+
+@helper
+def _restless_nodes(speed, h, s, shapes, control, room):  # type: ignore[no-untyped-def]
+    """The answer of :func:`doubtful`, but for slip velocities of nodes clear of the ground."""
+    levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
+    n, m = len(s.gap), len(control.largest)
+    spread = control.ground[QUICKEST] * h
+    some = False
+    for j in range(n):
+        k1, k2, k3, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(m):
+            along, away = shapes[i, j], shapes[i, n + j]
+            k1 += away * dense[0, i]
+            k2 += away * dense[1, i]
+            k3 += away * dense[2, i]
+            r1 += along * dense[0, m + i]
+            r2 += along * dense[1, m + i]
+            r3 += along * dense[2, m + i]
+        first, last = ends[0, n + j], nodes[0, n + j]
+        low, high, monotone = _range(first, last, k1, k2, k3)
+        touching = nodes[2, n + j] != 0.0
+        for level in range(levels.shape[0]):
+            shift = s.gap[j] + levels[level, j] - control.ground[HIGHEST]
+            felt = 2.0 * min(min(first, last) + shift, 0.0)
+            mixed = low + shift < 0.0 and high + shift > 0.0
+            some |= (mixed or low + shift < felt) and not monotone
+            touching |= low + shift < 0.0 or level > 0
+        first, last = ends[1, j] - speed, nodes[1, j] - speed
+        low, high, monotone = _range(first, last, r1, r2, r3)
+        largest = max(-low, high) + spread
+        mixed = low < spread and high > -spread and largest > control.slip_scale[j]
+        felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j]) + spread
+        some |= touching and (mixed or largest > felt) and not (monotone and spread == 0.0)
+    return some
+
+
+@helper
+def _restless_modes(speed, h, s, control, room):  # type: ignore[no-untyped-def]
+    """The same for many nodes, by the modes alone."""
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
     n, m = len(s.gap), len(control.largest)

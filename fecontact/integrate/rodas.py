@@ -82,11 +82,12 @@ def combined(row, factor, base, stages, out):  # type: ignore[no-untyped-def]
 def dense_coefficients(stages, out):  # type: ignore[no-untyped-def]
     """Fill out (3, size) with the coefficients k_1, k_2, k_3 of the interpolant."""
     for row in range(3):
+        a0, a1, a2, a3 = DENSE[row, 0], DENSE[row, 1], DENSE[row, 2], DENSE[row, 3]
+        a4, a5, a6, a7 = DENSE[row, 4], DENSE[row, 5], DENSE[row, 6], DENSE[row, 7]
         for i in range(out.shape[1]):
-            total = 0.0
-            for j in range(STAGES):
-                total += DENSE[row, j] * stages[j, i]
-            out[row, i] = total
+            out[row, i] = (a0 * stages[0, i] + a1 * stages[1, i] + a2 * stages[2, i]
+                           + a3 * stages[3, i] + a4 * stages[4, i] + a5 * stages[5, i]
+                           + a6 * stages[6, i] + a7 * stages[7, i])
 
 
 @helper

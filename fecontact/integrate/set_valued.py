@@ -128,17 +128,21 @@ def integrate_set_valued(
     Constraints, Springer 2008. V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical
     Systems, Springer 2008.
     """
+    times = np.ascontiguousarray(times, dtype=float)
     longest = longest_step(system, times) if longest is None else longest
     problem = _problem(system, restitution, static_coefficient, longest)
     scheme = _chosen(problem, scheme)
     begin = clock.perf_counter()
-    if scheme == "events":
-        from fecontact.integrate.set_valued_events import run_events as run
-    else:
-        from fecontact.integrate.set_valued_stepping import run_steps as run
     n, m = system.basis.contact_nodes, system.basis.modes
     efforts = len(POWERS)
     Y = np.concatenate([state, np.zeros(efforts + n)])
+    room: tuple[Any, ...] = (kinds.workspace_for(problem),)
+    if scheme == "events":
+        from fecontact.integrate.set_valued_events import run_events as run
+        from fecontact.integrate.set_valued_search import room_for
+        room = *room, room_for(problem, len(Y))
+    else:
+        from fecontact.integrate.set_valued_stepping import run_steps as run
     states = np.empty((len(times), len(Y)))
     friction, normal = np.empty((len(times), n)), np.empty((len(times), n))
     status = np.where(np.any(problem.rows != 0.0, axis=1), kinds.OPEN, kinds.FIXED)
@@ -151,7 +155,7 @@ def integrate_set_valued(
     try:
         while outcome == 0:
             outcome = run(reached, times, stops, problem, rtol, longest, floor, Y, status, closed,
-                          counts, carried, _STEPS_PER_CALL, states, friction, normal)
+                          counts, carried, _STEPS_PER_CALL, states, friction, normal, *room)
             if progress is not None:
                 progress(float(reached[0]))
     except KeyboardInterrupt:

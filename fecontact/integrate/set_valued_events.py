@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from fecontact.body_powers import drive_jump
-from fecontact.compiled import f8, i8, integers, kernel, matrix, vector
+from fecontact.compiled import borrowed, f8, i8, integers, kernel, matrix, vector
 from fecontact.integrate.set_valued_decisions import decide_clusters, decide_stops, hold_velocity
 from fecontact.integrate.set_valued_nodes import derivative
 from fecontact.integrate.set_valued_problem import (
@@ -30,12 +30,10 @@ from fecontact.integrate.set_valued_problem import (
     STEPS,
     STICK,
     STUCK,
-    workspace,
+    WORKSPACE,
 )
-from fecontact.integrate.set_valued_search import first_changes
+from fecontact.integrate.set_valued_search import ROOM, first_changes
 from fecontact.integrate.set_valued_steps import (
-    PARTS,
-    SLOPES,
     STAGES,
     error,
     interpolate,
@@ -48,23 +46,27 @@ EARLY = 0.25
 
 
 @kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
-                 integers, vector, i8, matrix, matrix, matrix))
+                 integers, vector, i8, matrix, matrix, matrix, WORKSPACE, ROOM))
 def run_events(  # type: ignore[no-untyped-def]
-        clock, times, stops, p, rtol, longest, floor, Y, status, closed, counts, largest,
-        limit, states, friction, normal):
+    clock, held_times, stops, held_p, rtol, longest, held_floor, held_Y, held_status, held_closed,
+    counts, largest, limit, held_states, held_friction, held_normal, held_w, held_room,
+):
     """Go on for at most ``limit`` steps, up to the last of ``times``.
 
     ``clock`` is the time reached and the length of the next step; ``stops`` ascending times at
     which a step ends; ``largest`` the largest slip velocity, penetration rate and penetration so
     far. ``states`` (N, size), ``friction`` and ``normal`` (N, n) are filled as ``counts`` says.
     """
+    times, p, floor, Y = borrowed(held_times), borrowed(held_p), borrowed(held_floor), borrowed(
+        held_Y)
+    status, closed, w = borrowed(held_status), borrowed(held_closed), borrowed(held_w)
+    states, friction, normal = (borrowed(held_states), borrowed(held_friction),
+                                borrowed(held_normal))
+    room = borrowed(held_room)
+    slopes, parts, new, rate, place = room.slopes, room.parts, room.new, room.rate, room.place
     n = len(p.cluster)
     clusters, m, size = len(p.rows), p.rows.shape[1], len(Y)
     rigid = p.restitution >= 0.0
-    w = workspace(p)
-    slopes, parts = np.empty((SLOPES, size)), np.empty((PARTS, size))
-    new, room, rate = np.empty(size), np.empty(size), np.empty(size)
-    place = np.empty(clusters + n)
     past = np.zeros(clusters + n, np.bool_)
     fresh = np.zeros(clusters + n, np.bool_)
     released, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
@@ -133,10 +135,9 @@ def run_events(  # type: ignore[no-untyped-def]
             quick = max(quick, abs(w.slip[c]))
         for j in range(n):
             fast, deep = max(fast, abs(w.nodes[j, RATE])), max(deep, abs(w.nodes[j, PENETRATION]))
-        prepare_dense(t, length, Y, new, p, status, closed, w, slopes, room, parts)
+        prepare_dense(t, length, Y, new, p, status, closed, w, slopes, room.state, parts)
 
-        shorter = first_changes(t, latest, length, Y, parts, p, status, closed, w, floor, rtol,
-                                place)
+        shorter = first_changes(t, latest, length, Y, p, status, closed, w, floor, rtol, room)
         high, found, again = 1.0, False, False
         for k in range(clusters + n):
             found = found or place[k] <= 1.0

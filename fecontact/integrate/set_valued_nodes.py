@@ -14,6 +14,7 @@ from numba import types
 
 from fecontact.body_powers import body_powers
 from fecontact.compiled import (
+    borrowed,
     compile_law,
     f8,
     function_at,
@@ -222,8 +223,12 @@ def hold_clusters(t, p, status, w, acceleration):  # type: ignore[no-untyped-def
             acceleration[i] -= p.rows[c, i] * w.right[a]
 
 
-def _derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
+def _derivative(  # type: ignore[no-untyped-def]
+    t, held_Y, held_p, held_status, held_closed, held_w, held_out,
+):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
+    Y, p, w, out = borrowed(held_Y), borrowed(held_p), borrowed(held_w), borrowed(held_out)
+    status, closed = borrowed(held_status), borrowed(held_closed)
     s = p.system
     n, m = s.Tx.shape
     for i in range(m):

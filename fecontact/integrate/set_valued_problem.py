@@ -6,7 +6,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import f8, helper, i8, integers, matrix, vector
+from fecontact.compiled import f8, i8, integers, matrix, vector
 from fecontact.contact_kernels import SYSTEM
 
 Array = NDArray[np.float64]
@@ -76,10 +76,9 @@ WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, ma
                               integers], Workspace)
 
 
-@helper
-def workspace(p):  # type: ignore[no-untyped-def]
+def workspace_for(problem: Problem) -> Workspace:
     """Room for a problem."""
-    n, k = len(p.cluster), len(p.rows)
+    n, k = len(problem.cluster), len(problem.rows)
     size = max(n, k)
     return Workspace(np.zeros((n, NODE_COLUMNS)), np.zeros(n), np.zeros(k), np.zeros(k),
                      np.zeros(k), np.zeros(k), np.zeros((size, size)), np.zeros(size),

@@ -10,10 +10,13 @@ through these, less its last part, which tells how far it can be trusted, bounds
 way. A part of the step that this leaves open is halved and looked at again.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
-from fecontact.compiled import f8, helper, integers, kernel, matrix, vector
+from fecontact.compiled import borrowed, f8, helper, integers, kernel, matrix, vector
 from fecontact.integrate.bernstein import (
     DEPTH,
     FINEST,
@@ -33,9 +36,12 @@ from fecontact.integrate.set_valued_problem import (
     PROBLEM,
     STICK,
     WORKSPACE,
+    Problem,
 )
-from fecontact.integrate.set_valued_steps import PARTS, interpolate
+from fecontact.integrate.set_valued_steps import PARTS, SLOPES, interpolate
 from fecontact.laws.signatures import ground_at, normal_at, signal_at
+
+Array = NDArray[np.float64]
 
 # Rounding of a sum, and of forces that come from a system of equations, relative to their parts.
 _ROUNDING, _FORCE_ROUNDING = 2e-15, 1e-13
@@ -53,6 +59,56 @@ _SHORTEST = 2.0**-8
 # A contact whose force grows so much between the ends of a step was not felt by its stages.
 UNFELT = 10.0
 ROUGHLY = 2.0**-12
+
+
+class Room(NamedTuple):
+    """Room to work in for steps from event to event, and for the search in them.
+
+    Attributes
+    ----------
+    slopes, parts : (SLOPES, size), (PARTS, size) arrays
+        Slopes of a step, and the coefficients of its interpolation.
+    new, state, rate : (size,) arrays
+        The end of a step; a state within it and its slope.
+    place : (k + n,) array
+        Where each cluster and stop first changes.
+    nested, bound, along, values : (PARTS + 1,) arrays
+        Polynomials of one node over the step.
+    halves : (DEPTH, PARTS + 2) array
+        Parts of the step that are left to look at.
+    left, scale : (_QUARTERS + 1, 2 k + n), (2 k + n,) arrays
+        What forces have left at some places, and their sizes.
+    waiting : (DEPTH, 2) array
+        Begins and widths of parts whose forces are left to look at.
+    """
+
+    slopes: Array
+    parts: Array
+    new: Array
+    state: Array
+    rate: Array
+    place: Array
+    nested: Array
+    bound: Array
+    along: Array
+    values: Array
+    halves: Array
+    left: Array
+    scale: Array
+    waiting: Array
+
+
+ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix], Room)
+
+
+def room_for(problem: Problem, size: int) -> Room:
+    """Room for a problem whose state is of this size."""
+    n, k = len(problem.cluster), len(problem.rows)
+    new, state, rate = np.zeros((3, size))
+    nested, bound, along, values = np.zeros((4, PARTS + 1))
+    return Room(np.zeros((SLOPES, size)), np.zeros((PARTS, size)), new, state, rate,
+                np.zeros(k + n), nested, bound, along, values, np.zeros((DEPTH, PARTS + 2)),
+                np.zeros((_QUARTERS + 1, 2 * k + n)), np.zeros(2 * k + n), np.zeros((DEPTH, 2)))
 
 
 @helper
@@ -180,15 +236,14 @@ def _past(out, size):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _first_let_go(t, latest, h, end, Y, parts, p, status, closed, w, place):  # type: ignore[no-untyped-def]
-    """Put into ``place`` where sticking clusters and closed stops first let go, up to ``end``."""
+def _first_let_go(t, latest, h, end, Y, p, status, closed, w, room):  # type: ignore[no-untyped-def]
+    """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
     clusters, count = len(p.rows), 2 * len(p.rows) + len(closed)
-    state, rate = np.empty(len(Y)), np.empty(len(Y))
-    left, size = np.empty((_QUARTERS + 1, count)), np.zeros(count)
-    begins, widths = np.empty(64), np.empty(64)
-    begins[0], widths[0], waiting = 0.0, end, 1
+    parts, state, rate, left, size = room.parts, room.state, room.rate, room.left, room.scale
+    size[:] = 0.0
+    room.waiting[0, 0], room.waiting[0, 1], waiting = 0.0, end, 1
     while waiting > 0:
-        begin, width = begins[waiting - 1], widths[waiting - 1]
+        begin, width = room.waiting[waiting - 1, 0], room.waiting[waiting - 1, 1]
         low, high = 0.0, NOWHERE
         for i in range(_QUARTERS + 1):
             here = begin + width * i / _QUARTERS
@@ -212,7 +267,7 @@ def _first_let_go(t, latest, h, end, Y, parts, p, status, closed, w, place):  # 
             _forces(t, latest, h, high, Y, parts, p, status, closed, w, state, rate, left[0])
             for r in range(count):
                 if left[0, r] < -_FORCE_ROUNDING * size[r]:
-                    place[r if r < clusters else r - clusters] = high
+                    room.place[r if r < clusters else r - clusters] = high
             return
         clear = True
         for r in range(count):
@@ -224,28 +279,30 @@ def _first_let_go(t, latest, h, end, Y, parts, p, status, closed, w, place):  # 
                     bound += _FIT_QUARTERS[k, i] * left[i, r]
                 clear = clear and bound >= -_FORCE_ROUNDING * size[r]
         if not clear and width > _SHORTEST * end:
-            begins[waiting], widths[waiting] = begin, 0.5 * width
-            begins[waiting - 1], widths[waiting - 1] = begin + 0.5 * width, 0.5 * width
+            room.waiting[waiting, 0], room.waiting[waiting - 1, 0] = begin, begin + 0.5 * width
+            room.waiting[waiting, 1] = room.waiting[waiting - 1, 1] = 0.5 * width
             waiting += 1
         else:
             waiting -= 1
 
 
-@kernel(types.f8(f8, f8, f8, vector, matrix, PROBLEM, integers, integers, WORKSPACE, vector, f8,
-                 vector))
+@kernel(types.f8(f8, f8, f8, vector, PROBLEM, integers, integers, WORKSPACE, vector, f8, ROOM))
 def first_changes(  # type: ignore[no-untyped-def]
-        t, latest, h, Y, parts, p, status, closed, w, floor, rtol, place):
-    """Fill place (k + n,) with the part of a step at which each cluster and stop first changes.
+    t, latest, h, held_Y, held_p, held_status, held_closed, held_w, held_floor, rtol, held_room,
+):
+    """Fill ``room.place`` with the part of a step at which each cluster and stop first changes.
 
-    NOWHERE for those that do not. Of what comes after the first change nothing is promised.
+    ``room.parts`` is the interpolation of the step. NOWHERE for those that do not change. Of what
+    comes after the first change nothing is promised.
     Returns the part to which the step has to be shortened because it passes a contact that its
     stages have not felt, or waves too short for it; 1 if it has not.
     """
-    s = p.system
+    Y, p, w, floor = borrowed(held_Y), borrowed(held_p), borrowed(held_w), borrowed(held_floor)
+    status, closed, room = borrowed(held_status), borrowed(held_closed), borrowed(held_room)
+    s, parts, place, halves = p.system, room.parts, room.place, room.halves
+    c, b, x, values = room.nested, room.bound, room.along, room.values
     n, m = s.Tx.shape
     clusters = len(p.rows)
-    c, b, x = np.empty(PARTS + 1), np.empty(PARTS + 1), np.empty(PARTS + 1)
-    values, room = np.empty(PARTS + 1), np.empty((DEPTH, PARTS + 2))
     place[:] = NOWHERE
     first, shorter, forces = 1.0, 1.0, False
     if p.restitution >= 0.0:
@@ -262,7 +319,7 @@ def first_changes(  # type: ignore[no-untyped-def]
             shorter = min(shorter, _add_ground(j, t, h, Y, parts, p, c, b, x, values))
             for i in range(len(b)):
                 b[i] = _ROUNDING * size - b[i]
-            place[clusters + j] = first_below(b, room)
+            place[clusters + j] = first_below(b, halves)
             first = min(first, place[clusters + j])
     else:
         for k in range(clusters):
@@ -270,7 +327,7 @@ def first_changes(  # type: ignore[no-untyped-def]
                 forces = True
             elif status[k] == 1 or status[k] == -1:
                 _slip(k, float(status[k]), t, h, Y, parts, p, c, b, values)
-                place[k] = first_below(b, room)
+                place[k] = first_below(b, halves)
                 first = min(first, place[k])
         for j in range(n):
             _along(s.Ty, j, 0, Y, parts, c, b)
@@ -287,7 +344,7 @@ def first_changes(  # type: ignore[no-untyped-def]
             if status[p.cluster[j]] == OPEN:
                 if before == 0.0:
                     shorter = min(shorter, part)
-                    touch = first_pressed(b, 0.0, FINEST, j, s, room)
+                    touch = first_pressed(b, 0.0, FINEST, j, s, halves)
                     place[p.cluster[j]] = min(place[p.cluster[j]], touch)
                     first = min(first, touch)
                 else:
@@ -296,7 +353,7 @@ def first_changes(  # type: ignore[no-untyped-def]
             above = UNFELT * max(before, pressed(b[PARTS], j, s)) + pressed(
                 0.01 * rtol * depth, j, s)
             if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:
-                shorter = min(shorter, part, first_pressed(b, above, ROUGHLY, j, s, room))
+                shorter = min(shorter, part, first_pressed(b, above, ROUGHLY, j, s, halves))
     if forces:
-        _first_let_go(t, latest, h, first, Y, parts, p, status, closed, w, place)
+        _first_let_go(t, latest, h, first, Y, p, status, closed, w, room)
     return shorter

@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 
 from fecontact.body_powers import drive_jump
-from fecontact.compiled import f8, helper, i8, integers, kernel, matrix, vector
+from fecontact.compiled import borrowed, f8, helper, i8, integers, kernel, matrix, vector
 from fecontact.integrate.bernstein import DEPTH, NOWHERE, first_below, fit
 from fecontact.integrate.set_valued_nodes import body_powers, contact_powers, observe
 from fecontact.integrate.set_valued_problem import (
@@ -34,7 +34,7 @@ from fecontact.integrate.set_valued_problem import (
     STARTED,
     STEPS,
     STUCK,
-    workspace,
+    WORKSPACE,
 )
 from fecontact.integrate.set_valued_search import ROUGHLY, UNFELT, first_pressed, pressed
 from fecontact.integrate.set_valued_stages import GRIP, ROUNDING, solve_stage
@@ -119,19 +119,23 @@ def _output(  # type: ignore[no-untyped-def]
 
 
 @kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
-                 integers, vector, i8, matrix, matrix, matrix))
+                 integers, vector, i8, matrix, matrix, matrix, WORKSPACE))
 def run_steps(  # type: ignore[no-untyped-def]
-        clock, times, stops, p, rtol, longest, floor, Y, status, closed, counts, carried,
-        limit, states, friction, normal):
+    clock, held_times, stops, held_p, rtol, longest, held_floor, held_Y, status, closed, counts,
+    held_carried, limit, held_states, held_friction, held_normal, held_w,
+):
     """Go on for at most ``limit`` steps, up to the last of ``times``.
 
     Arguments as for :func:`fecontact.integrate.set_valued_events.run_events`; ``carried`` is the
     largest slip velocity so far, two unused numbers and the friction force (n,) of each node.
     """
+    times, p, floor, Y = borrowed(held_times), borrowed(held_p), borrowed(held_floor), borrowed(
+        held_Y)
+    carried, states, w = borrowed(held_carried), borrowed(held_states), borrowed(held_w)
+    friction, normal = borrowed(held_friction), borrowed(held_normal)
     s = p.system
     n, m = s.Tx.shape
     size = len(Y)
-    w = workspace(p)
     room = np.empty((4, n, m))
     linear, system_matrix = np.empty((m, m)), np.empty((m, m))
     stage_states, accelerations = np.empty((3, 2 * m)), np.empty((3, m))

@@ -213,7 +213,7 @@ def advance(  # type: ignore[no-untyped-def]
             error = slip_error(error, s, shapes, control, progress, room)
         if error <= 1.0:
             rodas.dense_coefficients(room.stages, room.dense)
-            if restless(speed, h, s, control, room) and again < _MOST_AGAIN:
+            if restless(speed, h, s, shapes, control, room) and again < _MOST_AGAIN:
                 set_courses(s, shapes, control.ground, progress.state, room.after, room)
                 if doubtful(speed, h, control.ground, control.levels, control.slip_scale, room):
                     part = first_unfelt_at(control.unfelt)(
