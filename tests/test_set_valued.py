@@ -313,7 +313,7 @@ def test_from_rest_under_point_loads():
     """Ringing of a stiff contact after its onset, once it has faded, shortens no steps."""
     row = np.zeros((3, 2))
     row[0, 0] = row[1, 1] = 1.0
-    basis = ModalBasis.from_matrices(
+    basis = basis_from_matrices(
         np.eye(2), np.diag([100.0, 1e4]), {"contact": row[None], "B": row, "C": row},
         damping=np.diag([1.0, 200.0]))
     parts = {"normal": LinearContact(1e8), "friction": ConstantFriction(0.3)}
