@@ -313,7 +313,7 @@ def test_ctrl_c_writes_what_was_computed(cli, study, tmp_path):
 
 
 def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
-    from fecontact.integrate.control import Run
+    from fecontact.integrate.run import Run
 
     longer = ("--set", "simulation.t_end=0.05", "--set", "simulation.outputs=101")
     assert cli("run", study, "--resume")[0] == 1

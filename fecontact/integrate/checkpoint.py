@@ -4,18 +4,16 @@ import hashlib
 import time as clock
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.errors import InputError
+from fecontact.integrate.run import Run
 from fecontact.integrate.run_arrays import OUTPUTS
 from fecontact.stored import DamagedError, npz_arrays, reading
 from fecontact.whole_files import replaced
-
-if TYPE_CHECKING:
-    from fecontact.integrate.control import Run
 
 Array = NDArray[np.float64]
 
@@ -27,13 +25,13 @@ class Checkpoint:
     """The file of a run that is going on; ``mark`` tells runs of other systems apart."""
 
     path: Path
-    run: "Run"
+    run: Run
     mark: str
     period: float = 60.0
     _written: float = field(default_factory=clock.monotonic)
 
     @classmethod
-    def of(cls, path: Path, run: "Run", state: Array) -> "Checkpoint":
+    def of(cls, path: Path, run: Run, state: Array) -> "Checkpoint":
         """The checkpoint of a run that has not begun, from a state."""
         mark = hashlib.sha256()
         for item in (*_leaves(run.arrays), *_leaves(run.control), run.times, state,

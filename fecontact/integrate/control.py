@@ -2,9 +2,8 @@
 
 import time as clock
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +13,13 @@ from fecontact.errors import InputError
 from fecontact.integrate import run_arrays, stepping
 from fecontact.integrate.checkpoint import Checkpoint
 from fecontact.integrate.events import Events, Watched
-from fecontact.integrate.run_arrays import Control, Progress, Room, progress_for, room_for
+from fecontact.integrate.run import Run, Vary
+from fecontact.integrate.run_arrays import Control, progress_for, room_for
 from fecontact.integrate.scipy_solvers import energy_scale
 from fecontact.integrate.trajectory import Status
 from fecontact.integrate.unfelt import first_unfelt
-from fecontact.integrate.variation import Variation, variation_for
+from fecontact.integrate.variation import variation_for
 from fecontact.integrate.watch_arrays import watch_for
-from fecontact.integrate.watching import FOUND, Watch
 from fecontact.system import ContactSystem
 
 Array = NDArray[np.float64]
@@ -35,99 +34,6 @@ _SLOW = 20.0
 _LOOSER, _FADED = 10.0, 1e-3
 # Steps of a piece of a run: at first, at least and at most.
 _FEWEST, _MOST_STEPS = 200, 10_000_000
-
-
-class Vary(NamedTuple):
-    """Derivatives that go with a run, see :mod:`fecontact.integrate.variation`.
-
-    ``transitions`` (N, k, size) holds, for each output time, the columns since the one before.
-    """
-
-    above: Any
-    below: Any
-    width: float
-    variation: Variation
-    transitions: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """A run of the compiled integrator that can be left and taken up again.
-
-    Attributes
-    ----------
-    status : int
-        ``stepping.RUNNING`` while output times are left, ``FINISHED``, ``MINIMUM_STEP``,
-        ``NOT_FINITE``, or ``STOPPED`` at an event.
-    variation : Vary
-        Derivatives that go with the run.
-    states, work : arrays (N, 2 m + n s), (N, 8 + n)
-        At the output times; rows from ``outputs`` on are not filled yet. Work of the powers
-        :data:`fecontact.contact_energy.POWERS`, then friction work of each node [J].
-    progress : Progress
-        All that is needed to go on.
-    watch : Watch
-        What is watched for; what was found is in ``events``.
-    """
-
-    arrays: Any
-    shapes: Array
-    times: Array
-    control: Control
-    progress: Progress
-    room: Room
-    states: Array
-    work: Array
-    variation: Vary
-    watch: Watch
-    found: list[tuple[Array, Array]] = field(default_factory=list)
-
-    @property
-    def events(self) -> Events:
-        """Events so far."""
-        rows = [np.zeros((0, 3)), *(rows for rows, _ in self.found)]
-        states = [np.zeros((0, self.states.shape[1])), *(states for _, states in self.found)]
-        return Events.of_rows(np.vstack(rows), np.vstack(states))
-
-    @property
-    def outputs(self) -> int:
-        """Number of output times passed."""
-        return int(self.progress.counts[run_arrays.OUTPUTS])
-
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
-        return float(self.progress.numbers[run_arrays.TIME])
-
-    @property
-    def attempts(self) -> int:
-        """Steps so far, those that failed included."""
-        counts = self.progress.counts
-        return int(counts[run_arrays.STEPS] + counts[run_arrays.REJECTIONS])
-
-    @property
-    def statistics(self) -> dict[str, int]:
-        """Counts of steps, rejected steps, right-hand sides and Jacobians."""
-        counts = self.progress.counts
-        return {"steps": int(counts[run_arrays.STEPS]),
-                "rejected": int(counts[run_arrays.REJECTIONS]),
-                "right_hand_sides": int(counts[run_arrays.RATES]),
-                "jacobians": int(counts[run_arrays.STEPS]) + 1}
-
-    def advance(self, steps: int) -> int:
-        """So many steps more, those that fail included; returns the status."""
-        status = stepping.advance(self.arrays, self.shapes, self.times, self.control,
-                                  self.progress, self.room, steps, self.states, self.work,
-                                  *self.variation, self.watch)
-        found = int(self.watch.counts[FOUND])
-        if found:
-            self.found.append((self.watch.found[:found].copy(), self.watch.states[:found].copy()))
-            self.watch.counts[FOUND] = 0
-        if not np.isfinite(self.watch.own_values).all():
-            number = int(np.argmin(np.isfinite(self.watch.own_values)))
-            raise InputError(f"'event {number}' is not a finite number before t = {self.time:.6g} "
-                             f"s; its function g(t, y, p) must be finite for every state.")
-        return int(status)
 
 
 def start(
