@@ -104,12 +104,22 @@ class SystemFamily:
         self._latest = (key, found)
         return found
 
-    def beside(self, values: Array, index: int, step: float) -> SystemArrays:
-        """Arrays for one value changed by a small step, which may leave the allowed range."""
-        moved = values.copy()
-        moved[index] += step
+    def slopes(self, values: Array, index: int, step: float) -> SystemArrays:
+        """Derivatives of the arrays to one value; all else, as the addresses of laws, as it is.
+
+        Where arrays are not affine they are differences of fourth order over a step, which may
+        leave the allowed range.
+        """
         corners = None if self._fixed is not None else self._corners_of(values)
-        return self.system(moved).arrays if corners is None else corners.at(moved)
+        if corners is not None:
+            return corners.slopes(values, index)
+        sides = []
+        for place in (1.0, -1.0, 2.0, -2.0):
+            moved = values.copy()
+            moved[index] += place * step
+            sides.append(self.system(moved).arrays)
+        here = self.system(values).arrays
+        return SystemArrays(*(_slope(*each, step=step) for each in zip(here, *sides, strict=True)))
 
     def _corners_of(self, values: Array) -> "_Corners | None":
         """The box for these values; None where they are not interpolated."""
@@ -176,6 +186,7 @@ class _Corners:
         self.low, self.high = low, high
         first = corners[0]
         self._plain = first
+        self._slopes: tuple[tuple[int, bytes], SystemArrays] | None = None
         stacked: dict[str, Array] = {}
         for name in first._fields:
             values = [np.asarray(getattr(arrays, name)) for arrays in corners]
@@ -209,11 +220,29 @@ class _Corners:
         for (low, high), value in zip(self._limits, values.tolist(), strict=True):
             x = (value - low) / (high - low)
             weights = [w * (1.0 - x) for w in weights] + [w * x for w in weights]
-        flat = np.array(weights) @ self._flat
-        arrays: list[Any] = list(self._plain)
+        return self._with(np.array(weights) @ self._flat, list(self._plain))
+
+    def _with(self, flat: Array, arrays: list[Any]) -> SystemArrays:
         for number, place, shape in self._places:
             arrays[number] = flat[place].reshape(shape)
         return SystemArrays(*arrays)
+
+    def slopes(self, values: Array, index: int) -> SystemArrays:
+        """Derivatives of the arrays to one value."""
+        place = values.copy()
+        place[index] = 0.0
+        key = index, place.tobytes()
+        if self._slopes is None or self._slopes[0] != key:
+            weights = [1.0]
+            for each, ((low, high), value) in enumerate(zip(self._limits, values.tolist(),
+                                                            strict=True)):
+                x, rate = (value - low) / (high - low), 1.0 / (high - low)
+                below, above = (-rate, rate) if each == index else (1.0 - x, x)
+                weights = [w * below for w in weights] + [w * above for w in weights]
+            still = [np.zeros_like(array) if isinstance(array, np.ndarray)
+                     and array.dtype.kind == "f" else array for array in self._plain]
+            self._slopes = key, self._with(np.array(weights) @ self._flat, still)
+        return self._slopes[1]
 
     def agrees(self, arrays: SystemArrays, values: Array) -> bool:
         mine = self.at(values)
@@ -229,6 +258,13 @@ class _Corners:
 
 class _NotAffineError(Exception):
     pass
+
+
+def _slope(here: Any, above: Any, below: Any, far_above: Any, far_below: Any, step: float) -> Any:
+    """Derivative of fourth order of one array; ``here`` if it does not hold numbers of laws."""
+    if not (isinstance(here, np.ndarray) and here.dtype.kind == "f"):
+        return here
+    return (8.0 * (above - below) - (far_above - far_below)) / (12.0 * step)
 
 
 def _level(off: float, width: float) -> int:
