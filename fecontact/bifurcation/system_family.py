@@ -63,6 +63,8 @@ class SystemFamily:
         self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
         self._base, self._width = values, np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
         self._first: _Corners | None = None
+        # The box that was asked for last, and between which values it is asked for.
+        self._recent: tuple[list[tuple[float, float]], _Corners] | None = None
         if 0 < len(values) <= _MOST_PARAMETERS:
             self.system(values)
             self._first = self._box((0,) * len(values))
@@ -125,12 +127,22 @@ class SystemFamily:
         """The box for these values; None where they are not interpolated."""
         if self._first is None:
             return None
+        if self._recent is not None and all(low < value < high for (low, high), value in zip(
+                self._recent[0], values.tolist(), strict=True)):
+            return self._recent[1]
         levels = tuple(_level(value - base, width) for value, base, width in zip(
             values.tolist(), self._base.tolist(), self._width.tolist(), strict=True))
         if any(abs(level) > _MOST_LEVELS for level in levels):
             return None
         corners = self._box(levels)
-        return corners if corners is not None and corners.hold(values) else None
+        if corners is None or not corners.hold(values):
+            return None
+        self._recent = [
+            (max(low, base + least), min(high, base + most))
+            for low, high, base, (least, most) in zip(
+                corners.low.tolist(), corners.high.tolist(), self._base.tolist(),
+                map(_offsets, levels, self._width.tolist()), strict=True)], corners
+        return corners
 
     def _box(self, levels: tuple[int, ...]) -> "_Corners | None":
         """The box of so many doublings in each parameter; None where nothing is affine in it."""
@@ -273,6 +285,13 @@ def _level(off: float, width: float) -> int:
         return 0 if off >= 0.0 else -1
     doublings = int(np.ceil(np.log2(abs(off) / width))) if np.isfinite(off) else _MOST_LEVELS
     return (doublings + 1) * (1 if off > 0.0 else -1)
+
+
+def _offsets(level: int, width: float) -> tuple[float, float]:
+    """Between which offsets :func:`_level` surely gives a level."""
+    far = (1.0 - 1e-9) * width * 2.0 ** (abs(level) - 1 if level else 0)
+    near = (1.0 + 1e-9) * width * 2.0 ** (abs(level) - 2) if abs(level) > 1 else 0.0
+    return (near, far) if level >= 0 else (-far, -near)
 
 
 def _corners(family: SystemFamily, low: Array, high: Array) -> _Corners:
