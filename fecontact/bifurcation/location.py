@@ -207,7 +207,8 @@ def _zero(
             raise _LostError
         result = test(at)
         known.append((along, result, at))
-        return result
+        # What is left by the slope between the last two places, no bracket has to show.
+        return 0.0 if _settled(known, 0.5 * precision * length) else result
 
     done = False
     try:
@@ -227,6 +228,14 @@ def _zero(
         return at, 0.0
     ends = [(0.0, before, here), (length, after, there), *known]
     return at, min(abs(place - along) for place, other, _ in ends if other * size < 0.0)
+
+
+def _settled(known: list[tuple[float, float, Solution]], precision: float) -> bool:
+    """Whether the zero of the line through the last two values is as near to the last one."""
+    if len(known) < 2:
+        return False
+    (x, a, _), (y, b, _) = known[-2:]
+    return abs(b * (y - x)) <= precision * abs(b - a) and a != b
 
 
 def _guesses(

@@ -127,8 +127,7 @@ class SystemFamily:
         """The box for these values; None where they are not interpolated."""
         if self._first is None:
             return None
-        if self._recent is not None and all(low < value < high for (low, high), value in zip(
-                self._recent[0], values.tolist(), strict=True)):
+        if self._recent is not None and _inside(values, self._recent[0]):
             return self._recent[1]
         levels = tuple(_level(value - base, width) for value, base, width in zip(
             values.tolist(), self._base.tolist(), self._width.tolist(), strict=True))
@@ -292,6 +291,13 @@ def _offsets(level: int, width: float) -> tuple[float, float]:
     far = (1.0 - 1e-9) * width * 2.0 ** (abs(level) - 1 if level else 0)
     near = (1.0 + 1e-9) * width * 2.0 ** (abs(level) - 2) if abs(level) > 1 else 0.0
     return (near, far) if level >= 0 else (-far, -near)
+
+
+def _inside(values: Array, limits: list[tuple[float, float]]) -> bool:
+    for value, (low, high) in zip(values.tolist(), limits, strict=True):
+        if not low < value < high:
+            return False
+    return True
 
 
 def _corners(family: SystemFamily, low: Array, high: Array) -> _Corners:
