@@ -131,7 +131,7 @@ def batch_derivatives(t, x, s, r, h, f, J, P):  # type: ignore[no-untyped-def]
     r holds the derivatives of all arrays to the parameter p, h is the step of differences in it,
     for laws; P is (N, d), or (0, 0) where no derivative to a parameter is wanted.
     """
-    n, m = s.Tx.shape
+    m = s.Tx.shape[1]
     states = s.memory.max()
     step = h if len(P) > 0 else 0.0
     _fill_derivatives(t, x, s, r, step, laws_beside(s, r, step),

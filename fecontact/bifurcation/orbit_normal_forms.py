@@ -215,8 +215,7 @@ class Expansion:
         return self._T * J
 
     def _jacobians(self, a: Array, h: float) -> list[Array]:
-        """Jacobians at steps h, -h, 2 h and -2 h along a; second and third derivatives share them.
-        """
+        """Jacobians at h, -h, 2 h and -2 h along a, shared by second and third derivatives."""
         if self._last is None or self._last[1] != h or self._last[0] is not a:
             self._last = a, h, [self._jacobian(part * h * a)
                                       for part in (1.0, -1.0, 2.0, -2.0)]

@@ -40,8 +40,10 @@ def moves(rates):  # type: ignore[no-untyped-def]
 
 @helper
 def laws_beside(s, r, h):  # type: ignore[no-untyped-def]
-    """Parameters of the laws a few steps h beside: of normal laws, friction, profile, its variation
-    of friction, motion of the ground, drive and loads."""
+    """Parameters of all laws at the places of the differences, each (4, k, p) or (0, k, p).
+
+    Those of normal laws, friction, profile, friction along the ground, its motion, drive, loads.
+    """
     return (_beside(s.normal_parameters, r.normal_parameters, h),
             _beside(s.friction_parameters, r.friction_parameters, h),
             _beside(s.profile_parameters.reshape(1, -1), r.profile_parameters.reshape(1, -1), h),
