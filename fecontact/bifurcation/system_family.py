@@ -121,7 +121,7 @@ class SystemFamily:
             moved[index] += place * step
             sides.append(self.system(moved).arrays)
         here = self.system(values).arrays
-        return SystemArrays(*(_slope(*each, step=step) for each in zip(here, *sides, strict=True)))
+        return SystemArrays(*(_slope(step, *each) for each in zip(here, *sides, strict=True)))
 
     def _corners_of(self, values: Array) -> "_Corners | None":
         """The box for these values; None where they are not interpolated."""
@@ -271,7 +271,7 @@ class _NotAffineError(Exception):
     pass
 
 
-def _slope(here: Any, above: Any, below: Any, far_above: Any, far_below: Any, step: float) -> Any:
+def _slope(step: float, here: Any, above: Any, below: Any, far_above: Any, far_below: Any) -> Any:
     """Derivative of fourth order of one array; ``here`` if it does not hold numbers of laws."""
     if not (isinstance(here, np.ndarray) and here.dtype.kind == "f"):
         return here
