@@ -18,6 +18,8 @@ from fecontact.system import ContactSystem
 _DIRECTIONS = ("x", "y", "rotation")
 # Step of differences in a parameter, relative to its value.
 _STEP = 2e-4
+# Part of the base value below which the step does not get any smaller.
+_LEAST = 1e-3
 # Arrays that decide on what is given in time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
@@ -30,6 +32,7 @@ class ContactField(VectorField):
     def __init__(self, family: SystemFamily) -> None:
         self._family = family
         self.parameters = MappingProxyType(dict(family.parameters))
+        self._base_values = self.values
         base = family.base
         modes = range(1, base.basis.modes + 1)
         self.state_names = (*(f"q{i}" for i in modes), *(f"q{i}'" for i in modes),
@@ -76,12 +79,16 @@ class ContactField(VectorField):
         columns = []
         for index in chosen:
             column = np.empty((n, d))
-            h = _STEP * (abs(float(values[index])) or 1.0)
-            kernels.batch_derivatives(t, x, arrays, self._family.slopes(values, index, h), h, f, J,
-                                      column)
+            slopes = self._family.slopes(values, index, _STEP * (abs(float(values[index])) or 1.0))
+            kernels.batch_derivatives(t, x, arrays, slopes, self._step(values, index), f, J, column)
             columns.append(column)
         P = columns[0][:, :, np.newaxis] if len(columns) == 1 else np.stack(columns, axis=2)
         return f, J, P
+
+    def _step(self, values: Array, index: int) -> float:
+        """Step for laws; their parameters need not be small where the value is."""
+        base = abs(float(self._base_values[index]))
+        return _STEP * (max(abs(float(values[index])), _LEAST * base) or 1.0)
 
     def forcing_period(self, values: Array) -> float | None:
         """Common period [s] of drive, loads and ground; None where nothing depends on time.
