@@ -114,7 +114,8 @@ def node_forces(j, x, height, x_rate, height_rate, z, travel, speed, s, force, r
 def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates, out):  # type: ignore[no-untyped-def]
     """F and R of node j; fills out (3, 4) with derivatives to x, y, x', y' of F, R and pressing.
 
-    The pressing force is the one the friction law sees; ``force`` and ``rates`` as above.
+    The pressing force is the one the friction law sees; ``force`` and ``rates`` as above, but
+    ``force`` begins with R and its derivatives to slip velocity and pressing for all laws.
     """
     xi = s.abscissa[j] + x - travel
     ground, slope, curvature = ground_at(s.profile)(xi, s.profile_parameters)
@@ -141,6 +142,7 @@ def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force
         R, R_v, R_F = force[0], force[1], force[2]
     elif F != 0.0:
         R, R_v, R_F = friction_at(s.friction[j])(slip, pressing, s.friction_parameters[j])
+    force[0], force[1], force[2] = R, R_v, R_F
     for k in range(4):
         out[1, k] = R_F * out[2, k]
     out[1, 2] += R_v

@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 # The most by which a guess is bent away from the tangent, in steps.
 _MOST_BENT = 0.2
+# Part of its amplitude by which that of an orbit differs from one mesh and phase to others, at the
+# most.
+_UNLIKE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,13 +235,27 @@ class Collocation(Problem):
         return examined(kind, self, u, linearisation, self.precision < 1e-6)
 
     def met_again(
-        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array
+        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,
+        within: float,
     ) -> Array | None:
         """See :meth:`Problem.met_again`: on this mesh, in the phase of ``like``."""
         if not (isinstance(origin, Collocation)
                 and same_heading(self.weights(), tangent, heading, self.common)):
             return None
+        # No shift in time changes period, parameter and amplitude.
+        common = slice(-self.common, None)
+        if weighted_norm(self.weights()[common], u[common] - like[common]) > within:
+            return None
+        one, other = origin._amplitude(u, self.scales), self._amplitude(like, self.scales)
+        if abs(one - other) > within + _UNLIKE * max(one, other):
+            return None
         return in_phase(self, origin._on_other_mesh(self.mesh, [u])[0], like)
+
+    def _amplitude(self, u: Array, scales: Array) -> float:
+        """Distance of the orbit's states from their mean, the root of its mean square."""
+        nodes = self.nodes(u) / scales[: self.field.dimension]
+        weights = np.repeat(self.widths / self.degree, self.degree)
+        return float(np.sqrt((weights @ (nodes - weights @ nodes) ** 2).sum()))
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Along the tangent, and bent like the step before."""

@@ -16,8 +16,10 @@ from fecontact.forcing import common_period
 from fecontact.system import ContactSystem
 
 _DIRECTIONS = ("x", "y", "rotation")
-# Step of central differences in a parameter, relative to its value.
+# Step of differences in a parameter, relative to its value.
 _STEP = 2e-4
+# Part of the base value below which the step does not get any smaller.
+_LEAST = 1e-3
 # Arrays that decide on what is given in time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
@@ -30,6 +32,7 @@ class ContactField(VectorField):
     def __init__(self, family: SystemFamily) -> None:
         self._family = family
         self.parameters = MappingProxyType(dict(family.parameters))
+        self._base_values = self.values
         base = family.base
         modes = range(1, base.basis.modes + 1)
         self.state_names = (*(f"q{i}" for i in modes), *(f"q{i}'" for i in modes),
@@ -68,50 +71,24 @@ class ContactField(VectorField):
         """Rates and their derivatives; see :meth:`VectorField.derivatives`."""
         chosen = tuple(active)
         n, d = x.shape
-        f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(chosen)))
-        kernels.batch_derivatives(t, x, self._family.arrays(values), f, J)
-        for place, index in enumerate(chosen):
-            P[:, :, place] = self._parameter_derivative(t, x, values, index, f)
+        f, J = np.empty((n, d)), np.empty((n, d, d))
+        arrays = self._family.arrays(values)
+        if not chosen:
+            kernels.batch_derivatives(t, x, arrays, arrays, 0.0, f, J, np.empty((0, 0)))
+            return f, J, np.empty((n, d, 0))
+        columns = []
+        for index in chosen:
+            column = np.empty((n, d))
+            slopes = self._family.slopes(values, index, _STEP * (abs(float(values[index])) or 1.0))
+            kernels.batch_derivatives(t, x, arrays, slopes, self._step(values, index), f, J, column)
+            columns.append(column)
+        P = columns[0][:, :, np.newaxis] if len(columns) == 1 else np.stack(columns, axis=2)
         return f, J, P
 
-    def _parameter_derivative(
-        self, t: Array, x: Array, values: Array, index: int, f: Array
-    ) -> Array:
-        """df/dp (N, d): a central difference where f is affine in p, else of fourth order."""
-        h = self._step(values, index)
-        above, below = (self._beside(t, x, values, index, step) for step in (h, -h))
-        # Decided anew each time: derivatives are functions of the place, whatever was asked before.
-        curvature = np.abs(above + below - 2.0 * f).max(initial=0.0)
-        if curvature <= 1e-14 * np.abs(f).max(initial=0.0):
-            return np.asarray((above - below) / (2.0 * h))
-        total = 8.0 * (above - below)
-        total -= self._beside(t, x, values, index, 2.0 * h)
-        total += self._beside(t, x, values, index, -2.0 * h)
-        return np.asarray(total / (12.0 * h))
-
-    def _beside(self, t: Array, x: Array, values: Array, index: int, step: float) -> Array:
-        f = np.empty_like(x)
-        kernels.batch_rates(t, x, self._family.beside(values, index, step), f)
-        return f
-
     def _step(self, values: Array, index: int) -> float:
-        """Small beside the value, and beside the widths of the laws where it moves the ground."""
-        value = abs(float(values[index]))
-        h = _STEP * (value if value > 0.0 else 1.0)
-        speed, gap = self._moved(values, index, h)
-        base = self._family.base
-        if speed > 0.0:
-            h = min(h, 0.005 * base.velocity_scale / speed)
-        if gap > 0.0:
-            h = min(h, 0.002 * base.penetration_scale / gap)
-        return max(h, 1e-8 * value)
-
-    def _moved(self, values: Array, index: int, h: float) -> tuple[float, float]:
-        """Rates of the ground's motion and of the gaps with a parameter."""
-        here, there = self._family.arrays(values), self._family.beside(values, index, h)
-        return (float(np.abs(there.ground_motion_parameters
-                             - here.ground_motion_parameters).max()) / h,
-                float(np.abs(there.gap - here.gap).max()) / h)
+        """Step for laws; their parameters need not be small where the value is."""
+        base = abs(float(self._base_values[index]))
+        return _STEP * (max(abs(float(values[index])), _LEAST * base) or 1.0)
 
     def forcing_period(self, values: Array) -> float | None:
         """Common period [s] of drive, loads and ground; None where nothing depends on time.
@@ -154,8 +131,8 @@ def contact_field(
     Parameters
     ----------
     system : ContactSystem
-        Smoothed laws; the state derivatives are the system's own, those to parameters are
-        differences of fourth order.
+        Smoothed laws; the derivatives are the system's own. Laws alone are differenced, to fourth
+        order, where a parameter of the field moves their parameters.
     parameters : mapping, or sequence of str
         Dotted names of the system's parameters, with values or None for the value that the system
         has; or names of your own with a pair (value, function), the function making a system from

@@ -219,7 +219,8 @@ def _passes(
     away = min(abs(float(start.u[-1] - end.u[-1])) for end in (here, there))
     if away * np.sqrt(weights[-1]) > length:
         return False
-    again = problem.met_again(origin, start.u, start.tangent, here.u, here.tangent)
+    again = problem.met_again(origin, start.u, start.tangent, here.u, here.tangent,
+                              2.0 * length + _AGAIN)
     if again is None or not 0.0 < (along := float(row @ (again - here.u))) <= length:
         return False
     near = between(here, there, along, row)

@@ -82,7 +82,7 @@ def _aligned(groups: int, rows: int, columns: int) -> Array:
     """Room (groups, rows, columns, 8) of which no eight numbers lie across two cache lines."""
     size = groups * rows * columns * LANES
     room = np.empty(size + LANES)
-    first = -(room.ctypes.data // room.itemsize) % LANES
+    first = -(room.__array_interface__["data"][0] // room.itemsize) % LANES
     return room[first : first + size].reshape(groups, rows, columns, LANES)
 
 

@@ -69,8 +69,9 @@ class Floquet:
         are off by as much.
         """
         error = min(max(_ROUNDING, 2.0 * self.trivial_error), _WORST)
-        sizes = np.abs(self.others)
-        return int((sizes > 1.0 + error).sum()), int((sizes > 1.0 - error).sum())
+        sizes = [abs(multiplier) for place, multiplier in enumerate(self.multipliers.tolist())
+                 if place != self.trivial]
+        return sum(size > 1.0 + error for size in sizes), sum(size > 1.0 - error for size in sizes)
 
     @property
     def stable(self) -> bool:

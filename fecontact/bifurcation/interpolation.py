@@ -116,17 +116,14 @@ def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
         _combined(nodes, j, weights, out[row])
 
 
-@kernel(types.void(vector, vector, i8, matrix, matrix))
-def carry_over(mesh, renewed, m, given, out):  # type: ignore[no-untyped-def]
-    """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
-
-    The e last entries of each, which are no nodes, are copied.
-    """
+@helper
+def _fill_other_mesh(mesh, renewed, given, weights, scales, out):  # type: ignore[no-untyped-def]
     mesh, renewed, given, out = borrowed(mesh), borrowed(renewed), borrowed(given), borrowed(out)
+    weights, scales = borrowed(weights), borrowed(scales)
+    m = len(weights) - 1
     total, renewed_total = (len(mesh) - 1) * m, (len(renewed) - 1) * m
     d = given.shape[1] // total
     common = given.shape[1] - total * d
-    weights, scales = np.empty(m + 1), _scales_of_basis(m)
     j = 0
     for node in range(renewed_total):
         interval = node // m
@@ -134,11 +131,24 @@ def carry_over(mesh, renewed, m, given, out):  # type: ignore[no-untyped-def]
         t = renewed[interval] + width * (node - interval * m) / m
         j = _basis_at(mesh, t, j, scales, weights)
         for index in range(len(given)):
-            nodes = given[index, : total * d].reshape((total, d))
-            _combined(nodes, j, weights, out[index, node * d : (node + 1) * d])
+            for i in range(d):
+                value = 0.0
+                for k in range(m + 1):
+                    first = j * m + k if j * m + k < total else 0
+                    value += weights[k] * given[index, first * d + i]
+                out[index, node * d + i] = value
     for index in range(len(given)):
         for k in range(common):
             out[index, renewed_total * d + k] = given[index, total * d + k]
+
+
+@kernel(types.void(vector, vector, i8, matrix, matrix))
+def carry_over(mesh, renewed, m, given, out):  # type: ignore[no-untyped-def]
+    """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
+
+    The e last entries of each, which are no nodes, are copied.
+    """
+    _fill_other_mesh(mesh, renewed, given, np.empty(m + 1), _scales_of_basis(m), out)
 
 
 def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:

@@ -19,6 +19,9 @@ _EXACT = 1e-10
 _OFF, _ROUGH = 0.2, 1e-7
 # Part of a step to which a place is located at which the stability changes by a jump.
 _JUMP = 1e-3
+# Precision from which on a search may end without a bracket, and by what the values fall then; on a
+# coarse one test functions are not yet seen to be smooth.
+_SHARP, _FALLS = 1e-6, 0.1
 # Solutions from which Newton's method begins where it fails from the cubic between two points.
 _GUESSES = 3
 # Distance of a fold from a branch point below which both are one, in the precision of either.
@@ -207,7 +210,9 @@ def _zero(
             raise _LostError
         result = test(at)
         known.append((along, result, at))
-        return result
+        # Where it converges quickly, no bracket has to show how little is left.
+        settled = precision < _SHARP and _settled(known, 0.5 * precision * length)
+        return 0.0 if settled else result
 
     done = False
     try:
@@ -227,6 +232,14 @@ def _zero(
         return at, 0.0
     ends = [(0.0, before, here), (length, after, there), *known]
     return at, min(abs(place - along) for place, other, _ in ends if other * size < 0.0)
+
+
+def _settled(known: list[tuple[float, float, Solution]], precision: float) -> bool:
+    """Whether the last two values fall quickly, and the zero of the line through them is near."""
+    if len(known) < 2:
+        return False
+    (x, a, _), (y, b, _) = known[-2:]
+    return abs(b) <= _FALLS * abs(a) and abs(b * (y - x)) <= precision * abs(b - a)
 
 
 def _guesses(

@@ -96,13 +96,14 @@ class Expansion:
         self._J = self._T * J
         self._h = np.repeat(problem.widths, problem.degree)[:, None]
         self._motion = slopes / self._h
+        self._last: tuple[Array, float, list[Array]] | None = None
 
     def doubling(self, step: float) -> float:
         """Coefficient c of a period doubling, with differences over ``step``."""
         V = self._doubling_function
-        bend = self._second(V, V, step)
+        bend, cubic = self._second(V, V, step), self._third(V, V, V, step)
         h2, drift = self._response(bend)
-        third = (self._third(V, V, V, step) / 6.0 + self._second(h2, V, step) / 2.0
+        third = (cubic / 6.0 + self._second(h2, V, step) / 2.0
                  - drift / 2.0 * self._along(V))
         return float(self._share(self._J, V[:, :, None], V, third, -1.0)[0])
 
@@ -140,13 +141,18 @@ class Expansion:
 
     def _response(self, bend: Array) -> tuple[Array, float]:
         """Periodic h with h' - A h = bend - a x' at the points, and a: how the phase is sped up."""
+        system, rows = self._periodic
+        found = system.solve(np.append((self._h * bend).reshape(-1), np.zeros(rows)))
+        h = self._at_points(found[: self._x.size], self._x.shape[1], 1.0)
+        return h, float(found[-1]) if rows else 0.0
+
+    @cached_property
+    def _periodic(self) -> tuple[Bordered, int]:
+        """Equations of h' - A h + a x' with their phase, and how many rows fix that."""
         motion = self._motion[:, :, None] if self._problem.autonomous else np.zeros(
             (*self._x.shape, 0))
         rows = [np.append(self._problem.phase_row, 0.0)] if self._problem.autonomous else []
-        system = self._bordered(self._J, motion, rows, 1.0)
-        found = system.solve(np.append((self._h * bend).reshape(-1), np.zeros(len(rows))))
-        h = self._at_points(found[: self._x.size], self._x.shape[1], 1.0)
-        return h, float(found[-1]) if rows else 0.0
+        return self._bordered(self._J, motion, rows, 1.0), len(rows)
 
     def _oscillating(self, angle: float, bend: Array) -> Array:
         """Periodic h with h' + i angle h - A h = bend at the points, complex."""
@@ -208,6 +214,13 @@ class Expansion:
         _, J, _ = self._problem.field.derivatives(self._times, x, self._values, ())
         return self._T * J
 
+    def _jacobians(self, a: Array, h: float) -> list[Array]:
+        """Jacobians at h, -h, 2 h and -2 h along a, shared by second and third derivatives."""
+        if self._last is None or self._last[1] != h or self._last[0] is not a:
+            self._last = a, h, [self._jacobian(part * h * a)
+                                      for part in (1.0, -1.0, 2.0, -2.0)]
+        return self._last[2]
+
     def _scaled(self, direction: Array, step: float) -> float:
         return float(step / np.max(np.abs(direction) / self._range))
 
@@ -219,8 +232,8 @@ class Expansion:
         if not a.any():
             return np.zeros_like(b)
         h = self._scaled(a, step)
-        slope = (8.0 * (self._jacobian(h * a) - self._jacobian(-h * a))
-                 - self._jacobian(2.0 * h * a) + self._jacobian(-2.0 * h * a)) / (12.0 * h)
+        above, below, far_above, far_below = self._jacobians(a, h)
+        slope = (8.0 * (above - below) - far_above + far_below) / (12.0 * h)
         return np.einsum("cij,cj->ci", slope, b)
 
     def _third(self, a: Array, b: Array, c: Array, step: float) -> Array:
@@ -237,9 +250,9 @@ class Expansion:
         if not a.any():
             return np.zeros_like(self._J)
         h = self._scaled(a, step)
-        near = self._jacobian(h * a) + self._jacobian(-h * a)
-        far = self._jacobian(2.0 * h * a) + self._jacobian(-2.0 * h * a)
-        return np.asarray((16.0 * near - far - 30.0 * self._J) / (12.0 * h * h))
+        above, below, far_above, far_below = self._jacobians(a, h)
+        return np.asarray((16.0 * (above + below) - (far_above + far_below) - 30.0 * self._J)
+                          / (12.0 * h * h))
 
 
 def _split(V: Array) -> Array:

@@ -104,12 +104,14 @@ class Problem(Protocol):
         return None
 
     def met_again(
-        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array
+        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,
+        within: float,
     ) -> Array | None:
         """The start u of the branch in the unknowns of this problem; None where it goes elsewhere.
 
         ``origin`` is the problem at the start, and ``tangent`` the direction there; ``like`` and
-        ``heading`` are those of the point that was reached, on this problem.
+        ``heading`` are those of the point that was reached, on this problem. A start that is
+        surely farther from ``like`` than ``within`` need not be given.
         """
         if len(u) != len(like) or float(self.weights() * heading @ tangent) < _PARALLEL:
             return None

@@ -63,6 +63,8 @@ class SystemFamily:
         self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
         self._base, self._width = values, np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
         self._first: _Corners | None = None
+        # The box that was asked for last, and between which values it is asked for.
+        self._recent: tuple[list[tuple[float, float]], _Corners] | None = None
         if 0 < len(values) <= _MOST_PARAMETERS:
             self.system(values)
             self._first = self._box((0,) * len(values))
@@ -104,23 +106,42 @@ class SystemFamily:
         self._latest = (key, found)
         return found
 
-    def beside(self, values: Array, index: int, step: float) -> SystemArrays:
-        """Arrays for one value changed by a small step, which may leave the allowed range."""
-        moved = values.copy()
-        moved[index] += step
+    def slopes(self, values: Array, index: int, step: float) -> SystemArrays:
+        """Derivatives of the arrays to one value; all else, as the addresses of laws, as it is.
+
+        Where arrays are not affine they are differences of fourth order over a step, which may
+        leave the allowed range.
+        """
         corners = None if self._fixed is not None else self._corners_of(values)
-        return self.system(moved).arrays if corners is None else corners.at(moved)
+        if corners is not None:
+            return corners.slopes(values, index)
+        sides = []
+        for place in (1.0, -1.0, 2.0, -2.0):
+            moved = values.copy()
+            moved[index] += place * step
+            sides.append(self.system(moved).arrays)
+        here = self.system(values).arrays
+        return SystemArrays(*(_slope(step, *each) for each in zip(here, *sides, strict=True)))
 
     def _corners_of(self, values: Array) -> "_Corners | None":
         """The box for these values; None where they are not interpolated."""
         if self._first is None:
             return None
+        if self._recent is not None and _inside(values, self._recent[0]):
+            return self._recent[1]
         levels = tuple(_level(value - base, width) for value, base, width in zip(
             values.tolist(), self._base.tolist(), self._width.tolist(), strict=True))
         if any(abs(level) > _MOST_LEVELS for level in levels):
             return None
         corners = self._box(levels)
-        return corners if corners is not None and corners.hold(values) else None
+        if corners is None or not corners.hold(values):
+            return None
+        self._recent = [
+            (max(low, base + least), min(high, base + most))
+            for low, high, base, (least, most) in zip(
+                corners.low.tolist(), corners.high.tolist(), self._base.tolist(),
+                map(_offsets, levels, self._width.tolist()), strict=True)], corners
+        return corners
 
     def _box(self, levels: tuple[int, ...]) -> "_Corners | None":
         """The box of so many doublings in each parameter; None where nothing is affine in it."""
@@ -176,6 +197,7 @@ class _Corners:
         self.low, self.high = low, high
         first = corners[0]
         self._plain = first
+        self._slopes: tuple[tuple[int, bytes], SystemArrays] | None = None
         stacked: dict[str, Array] = {}
         for name in first._fields:
             values = [np.asarray(getattr(arrays, name)) for arrays in corners]
@@ -209,11 +231,29 @@ class _Corners:
         for (low, high), value in zip(self._limits, values.tolist(), strict=True):
             x = (value - low) / (high - low)
             weights = [w * (1.0 - x) for w in weights] + [w * x for w in weights]
-        flat = np.array(weights) @ self._flat
-        arrays: list[Any] = list(self._plain)
+        return self._with(np.array(weights) @ self._flat, list(self._plain))
+
+    def _with(self, flat: Array, arrays: list[Any]) -> SystemArrays:
         for number, place, shape in self._places:
             arrays[number] = flat[place].reshape(shape)
         return SystemArrays(*arrays)
+
+    def slopes(self, values: Array, index: int) -> SystemArrays:
+        """Derivatives of the arrays to one value."""
+        place = values.copy()
+        place[index] = 0.0
+        key = index, place.tobytes()
+        if self._slopes is None or self._slopes[0] != key:
+            weights = [1.0]
+            for each, ((low, high), value) in enumerate(zip(self._limits, values.tolist(),
+                                                            strict=True)):
+                x, rate = (value - low) / (high - low), 1.0 / (high - low)
+                below, above = (-rate, rate) if each == index else (1.0 - x, x)
+                weights = [w * below for w in weights] + [w * above for w in weights]
+            still = [np.zeros_like(array) if isinstance(array, np.ndarray)
+                     and array.dtype.kind == "f" else array for array in self._plain]
+            self._slopes = key, self._with(np.array(weights) @ self._flat, still)
+        return self._slopes[1]
 
     def agrees(self, arrays: SystemArrays, values: Array) -> bool:
         mine = self.at(values)
@@ -231,12 +271,33 @@ class _NotAffineError(Exception):
     pass
 
 
+def _slope(step: float, here: Any, above: Any, below: Any, far_above: Any, far_below: Any) -> Any:
+    """Derivative of fourth order of one array; ``here`` if it does not hold numbers of laws."""
+    if not (isinstance(here, np.ndarray) and here.dtype.kind == "f"):
+        return here
+    return (8.0 * (above - below) - (far_above - far_below)) / (12.0 * step)
+
+
 def _level(off: float, width: float) -> int:
     """Least n, with the sign of ``off``, for which |off| lies within 2^(|n| - 1) widths."""
     if abs(off) <= width:
         return 0 if off >= 0.0 else -1
     doublings = int(np.ceil(np.log2(abs(off) / width))) if np.isfinite(off) else _MOST_LEVELS
     return (doublings + 1) * (1 if off > 0.0 else -1)
+
+
+def _offsets(level: int, width: float) -> tuple[float, float]:
+    """Between which offsets :func:`_level` surely gives a level."""
+    far = (1.0 - 1e-9) * width * 2.0 ** (abs(level) - 1 if level else 0)
+    near = (1.0 + 1e-9) * width * 2.0 ** (abs(level) - 2) if abs(level) > 1 else 0.0
+    return (near, far) if level >= 0 else (-far, -near)
+
+
+def _inside(values: Array, limits: list[tuple[float, float]]) -> bool:
+    for value, (low, high) in zip(values.tolist(), limits, strict=True):
+        if not low < value < high:
+            return False
+    return True
 
 
 def _corners(family: SystemFamily, low: Array, high: Array) -> _Corners:

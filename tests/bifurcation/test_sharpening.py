@@ -99,7 +99,9 @@ def test_points_on_sharp_turns_are_found_again(second):
     doublings = second.of_kind("period doubling")
     for point, wanted in zip(doublings, (2.5385714591, 2.3468776149), strict=True):
         error = point.details["parameter_error"]
-        assert error < 1e-8
+        # The steps before it double rounding again and again: its mesh, and with it the error on
+        # 50 intervals, between 1e-10 and 3e-8, depends on the last digit of the scales.
+        assert error < 1e-7
         assert abs(point.parameter - wanted) <= 1.2 * error + 1e-10
         assert point.details["criticality"] == "subcritical"
     assert all(point.details.get("located", True) for point in second.special)

@@ -168,6 +168,69 @@ def test_many_nodes_waves_memory_and_drive(friction):
     assert np.abs(J - expected).max() < 1e-13 * np.abs(expected).max()
 
 
+def test_derivative_to_a_normal_force_that_begins_at_zero():
+    """There friction is still zero, but grows with the force."""
+    field = contact_field(two_mass_system(1.0), {"B": (1.0, with_force)})
+    x = np.random.default_rng(1).normal(size=(20, 4))
+    T = field.system().basis.contact_T[:, 0]
+    v = x[:, 2:] @ T.T - 1.0
+    mu = 0.14 * (1.0 + 1.14 * np.exp(-2.0 * np.abs(v))) * np.arctan(100.0 * v)
+    for B in (0.0, 3.0):
+        _, _, P = field.derivatives(np.zeros(20), x, np.array([B]), (0,))
+        assert P[:, 2:, 0] == pytest.approx(-mu @ T, abs=1e-12)
+
+
+def with_modes(system, size):
+    basis = system.basis
+    return system.with_(basis=replace(
+        basis, T=size**2 * basis.T, angular_frequencies=size * basis.angular_frequencies))
+
+
+def with_normals(system, stiffness):
+    return system.with_(**{"normal.stiffness": (stiffness, *[1.3 * stiffness] * 3)})
+
+
+@pytest.mark.parametrize(("law", "own"), [
+    (ExponentialFriction(0.8, 0.5, 3.0, 50.0), ["friction.decay", "friction.static_coefficient"]),
+    (LuGreFriction(), ["friction.bristle_stiffness", "friction.kinetic_coefficient"]),
+])
+def test_derivatives_to_parameters_of_everything(law, own):
+    """Against extrapolated differences of the rates, in one parameter at a time and in pairs."""
+    rng = np.random.default_rng(5)
+    basis = ModalBasis(np.array([1.0, 2.0, 5.0]), 0.1 * np.eye(3), rng.normal(size=(6, 3, 3)),
+                       rng.normal(size=(6, 2)), np.ones(4))
+    system = ContactSystem(
+        basis, normal=RoughSurface(10.0, 2.0, 0.5), friction=law,
+        ground=Ground(0.3, profile=Sine(0.3, 2.0), friction_variation=Sine(0.2, 1.0)),
+        drive=Drive(2.0, 3.0, 0.1, 0.2, 0.4, 0.5, 1.3), load=Load(2.0))
+    t, x = rng.normal(size=30), 0.5 * rng.normal(size=(30, system.size))
+    named = ["load.normal", "ground.speed", "ground.profile.amplitude", "ground.profile.wavelength",
+             "ground.friction_variation.amplitude", "drive.amplitude_x", "drive.damping_y",
+             "drive.angular_frequency", "normal.roughness_height", *own]
+    given = [*([name] for name in named), {"size": (1.0, with_modes)}, {"k": (9.0, with_normals)},
+             [own[0], "ground.speed"]]
+    for parameters in given:
+        field = contact_field(system, parameters)
+        values = 1.01 * field.values
+        _, _, P = field.derivatives(t, x, values, range(len(values)))
+        for index, value in enumerate(values):
+            def slope(h, index=index, field=field, values=values):
+                step = h * np.eye(len(values))[index]
+                return (field.rates(t, x, values + step) - field.rates(t, x, values - step)) / (
+                    2.0 * h)
+
+            coarse, middle, fine = (slope(part * abs(value)) for part in (2e-3, 1e-3, 5e-4))
+            first, second = (4.0 * middle - coarse) / 3.0, (4.0 * fine - middle) / 3.0
+            expected = (16.0 * second - first) / 15.0
+            # Differences fail where a node opens between them.
+            smooth = (np.abs(second - first) <= 1e-6 * np.abs(expected) + 1e-6).all(axis=1)
+            assert smooth.mean() > 0.8, parameters
+            scale = np.abs(expected[smooth]).max()
+            assert scale > 1e-3, parameters
+            off = np.abs(P[smooth, :, index] - expected[smooth]).max()
+            assert off < 1e-7 * scale, parameters
+
+
 @pytest.mark.parametrize("parameters", [
     {"B": (2.0, with_force), "ground.speed": None},
     {"a": (1.4, squared), "ground.speed": None},
