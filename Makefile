@@ -60,9 +60,9 @@ $(READY): pyproject.toml | $(BIN)/python
 	@echo "Installing fecontact and what it needs"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@echo "Compiling its kernels"
-	@$(BIN)/python -c 'import fecontact.integrate.control, fecontact.mesh_io, fecontact.study'
+	@$(BIN)/python -c 'import fecontact.integrate.rodas5p.driver, fecontact.fem.mesh_files, fecontact.study.study'
 	@touch $@
 
-$(SYSTEM): .ci/system-libraries fecontact/system_libraries.py | $(BIN)/python
+$(SYSTEM): .ci/system-libraries fecontact/core/system_libraries.py | $(BIN)/python
 	@$(BIN)/python .ci/system-libraries
 	@touch $@

@@ -23,12 +23,12 @@ from fecontact import (
     ProductFriction,
     basis_from_matrices,
 )
-from fecontact.bifurcation.branch import Branch
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.orbits import orbits_from_hopf
-from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.vector_field import VectorField
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.orbits.branches import orbits_from_hopf
 
 AUTO = {50: 0.13, 100: 0.25, 200: 0.49}
 AUTO_POINTS = 139

@@ -10,9 +10,9 @@ import time
 import numpy as np
 from scipy.sparse.linalg import eigsh
 
-from fecontact.body import ElasticBody
-from fecontact.eigen import backward_error, eigenmodes
-from fecontact.mesh import Mesh
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.mesh import Mesh
+from fecontact.reduction.eigenmodes import backward_error, eigenmodes
 
 MODES = 20
 

@@ -23,7 +23,7 @@ from integrator_peers import PEERS
 from integrator_problems import PROBLEMS, Problem, shortened
 from numpy.typing import NDArray
 
-from fecontact.integrate import control
+from fecontact.integrate.rodas5p import driver
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def own(problem: Problem) -> Prepared:
     """The package's integrator; its preparation is not measured, as that of its peers is not."""
 
     def prepare(rtol: float) -> Callable[[], Array]:
-        run = control.start(problem.system, problem.state, problem.times, rtol=rtol, work=False)
+        run = driver.start(problem.system, problem.state, problem.times, rtol=rtol, work=False)
 
         def solve() -> Array:
             run.advance(10**9)

@@ -14,9 +14,11 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from fecontact import contact_jacobian, contact_kernels
-from fecontact.compiled import borrowed
-from fecontact.integrate import motion, run_arrays
+from fecontact.core.compiled import borrowed
+from fecontact.integrate.rodas5p import dynamics
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.system import jacobian as contact_jacobian
+from fecontact.system import kernels
 
 Array = NDArray[np.float64]
 Solver = Callable[[float], Array]
@@ -42,7 +44,7 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     """Compiled ``rate(t, y, out)`` and ``jacobian(t, y, out)``, and what must outlive them."""
     arrays = problem.system.arrays
     n, m = arrays.Tx.shape
-    room = {"shapes": np.vstack([arrays.Tx, arrays.Ty]).T.copy(), "given": np.zeros(motion.GIVEN),
+    room = {"shapes": np.vstack([arrays.Tx, arrays.Ty]).T.copy(), "given": np.zeros(dynamics.GIVEN),
             "pull": np.zeros(m), "nodes": np.zeros((3, 2 * n))}
     scratch = run_arrays.gradients_for(n, problem.system.memory)
     held = {**room, **{f"g{k}": item for k, item in enumerate(scratch)},
@@ -62,8 +64,8 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     ])
     space: dict[str, Any] = {
         "carray": carray, "f8": np.float64, "i8": np.int64, "pointer": _pointer,
-        "borrowed": borrowed, "set_given": motion.set_given, "set_rate": motion.set_rate,
-        "System": contact_kernels.SystemArrays, "Gradients": motion.Gradients,
+        "borrowed": borrowed, "set_given": dynamics.set_given, "set_rate": dynamics.set_rate,
+        "System": kernels.SystemArrays, "Gradients": dynamics.Gradients,
         "fill": contact_jacobian.jacobian}
     exec(source, space)
     options = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}

@@ -20,7 +20,7 @@ from fecontact import (
     RoughSurface,
     modal_basis,
 )
-from fecontact.laws.signals import Constant
+from fecontact.laws.signals.harmonic import Constant
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fecontact.basis import ModalBasis
-from fecontact.contact_kernels import right_hand_side
-from fecontact.laws.contract import FrictionLaw, NodeLaw, NormalLaw
-from fecontact.laws.friction import ConstantFriction
-from fecontact.laws.names import law_class, law_names
-from fecontact.laws.normal_stop import LinearContact
-from fecontact.system import ContactSystem
+from fecontact.laws.base import FrictionLaw, NodeLaw, NormalLaw
+from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.normal.linear import LinearContact
+from fecontact.laws.registry import law_class, law_names
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import right_hand_side
 
 NODES, MODES = 400, 40
 SURFACE = {"stiffness": 0.3e6, "roughness_height": 5.2e-6, "damping": 6.0}

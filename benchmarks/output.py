@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from fecontact.body import ElasticBody, Material
-from fecontact.geometry import Beam, generate
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.generate import Beam, generate
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.output.movie import render
-from fecontact.output.probe import rendering_works
-from fecontact.output.pvd import export_pvd
-from fecontact.output.store import read_case, write_case
-from fecontact.reduction import modal_basis
-from fecontact.system import ContactSystem
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.output.files.case import read_case, write_case
+from fecontact.output.files.pvd import export_pvd
+from fecontact.output.render.movie import render
+from fecontact.output.render.offscreen import rendering_works
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.system.contact_system import ContactSystem
 
 FRAMES = 200
 

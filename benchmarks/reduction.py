@@ -10,11 +10,11 @@ import time
 import numpy as np
 from eigen import rectangle
 
-from fecontact.body import ElasticBody
-from fecontact.contact_face import contact_nodes
-from fecontact.eigen import FreeSystem, free_modes
-from fecontact.flexibility import Flexibility, modal_compliance, residual_modes
-from fecontact.mesh import Mesh
+from fecontact.fem.contact_face import contact_nodes
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.mesh import Mesh
+from fecontact.reduction.eigenmodes import FreeSystem, free_modes
+from fecontact.reduction.residual_vectors import Flexibility, modal_compliance, residual_modes
 
 MODES, NODES = 40, 200
 

@@ -15,8 +15,8 @@ import time
 import numpy as np
 
 from fecontact import Range, Study, SweepSettings, simulate, sweep
-from fecontact.sweeps.executors import cores, one_thread_each
-from fecontact.sweeps.summaries import functions_for, summarise
+from fecontact.sweep.executors import cores, one_thread_each
+from fecontact.sweep.summaries import functions_for, summarise
 
 STUDY = """
 geometry = { shape = "block", element_size = 0.01 }

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.bifurcation.branch import BranchPoint
-from fecontact.bifurcation.problem import Settings
-from fecontact.integrate.initial import initial_state
+from fecontact.bifurcation.continuation.branch import BranchPoint
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.integrate.initial_state import initial_state
 
 SPEED = "ground.speed"
 PULL = 9.5  # N, of the spring on the beam where it is not displaced

@@ -170,7 +170,7 @@ def soft_block(nodes: int = 16, youngs_modulus: float = 5e6) -> fc.ContactSystem
 
 def figure(runs: dict[str, fc.Trajectory]) -> Any:
     """Phase planes of B and of the contact, one row a run, as in Fig. 4.3-2."""
-    from fecontact.output.style import COLOURS, new_figure
+    from fecontact.output.plots.style import COLOURS, new_figure
 
     drawn = new_figure(8.0, 2.6 * len(runs))
     axes = drawn.subplots(len(runs), 2, sharex=True, sharey="col", squeeze=False)
@@ -189,7 +189,7 @@ def figure(runs: dict[str, fc.Trajectory]) -> Any:
 def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> None:
     """Run all cases; print slips, periods and vibrations, and draw them."""
     skip, periods, end = (12, 24, 0.1) if quick else (40, 100, 1.4)
-    from fecontact.output.style import save_figure
+    from fecontact.output.plots.style import save_figure
 
     folder.mkdir(parents=True, exist_ok=True)
     runs = {name: settled(case(), skip, periods) for name, case in CASES.items()}

@@ -15,8 +15,8 @@ from impact_oscillator import FREQUENCIES, mesh_system, settled, two_mode_system
 from matplotlib import rc_context
 
 from fecontact import ContactSystem, Trajectory
-from fecontact.analysis.periods import drive_period
-from fecontact.output.style import COLOURS, STYLE, new_figure
+from fecontact.analysis.periodicity import drive_period
+from fecontact.output.plots.style import COLOURS, STYLE, new_figure
 
 SHOWN_PERIODS = {64.32: 4, 30.84: 4, 37.41: 4, 23.63: 25, 9.845: 2}
 SECTION_POINTS = 3000

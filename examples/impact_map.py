@@ -20,10 +20,10 @@ from matplotlib import rc_context
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from fecontact import ContactSystem
-from fecontact.analysis.periods import count_periods
-from fecontact.console import progress_bar
+from fecontact.analysis.periodicity import count_periods
+from fecontact.cli.console import progress_bar
 from fecontact.integrate.ensemble import strobe
-from fecontact.output.style import COLOURS, STYLE, new_figure
+from fecontact.output.plots.style import COLOURS, STYLE, new_figure
 
 EXPECTED = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
 SWEPT = np.linspace(5.0, 80.0, 600)  # rad/s

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.bifurcation.branch import BranchPoint
-from fecontact.bifurcation.contact_field import ContactField
-from fecontact.bifurcation.problem import Settings
-from fecontact.errors import FecontactError
+from fecontact.bifurcation.continuation.branch import BranchPoint
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.core.errors import FecontactError
 
 Array = NDArray[np.float64]
 

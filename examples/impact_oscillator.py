@@ -30,7 +30,7 @@ from fecontact import (
     simulate,
 )
 from fecontact.analysis.impacts import Impacts, Rest, find_impacts, find_rests
-from fecontact.analysis.periods import Periodicity, drive_period, periodicity
+from fecontact.analysis.periodicity import Periodicity, drive_period, periodicity
 
 STUDY = Path(__file__).with_suffix(".toml")
 REDUCED_MASS = 0.092  # kg

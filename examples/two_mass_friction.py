@@ -36,13 +36,13 @@ from fecontact import (
     find_equilibrium,
     simulate,
 )
-from fecontact.bifurcation.contact_field import ContactField
-from fecontact.bifurcation.orbit_output import amplitude, orbit_history
-from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf
-from fecontact.bifurcation.problem import Settings
-from fecontact.output.basin_plots import plot_basins
-from fecontact.output.diagrams import plot_branches
-from fecontact.output.style import COLOURS, new_figure, save_figure
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.orbits.branches import orbits_beyond, orbits_from_hopf
+from fecontact.bifurcation.orbits.orbit_output import amplitude, orbit_history
+from fecontact.output.plots.basins import plot_basins
+from fecontact.output.plots.bifurcation_diagram import plot_branches
+from fecontact.output.plots.style import COLOURS, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,108 +1,113 @@
+from .analysis.frequency_response import frequency_response
+from .analysis.histories import history
 from .analysis.impacts import Impacts, find_impacts, find_rests
-from .analysis.periods import Periodicity, count_periods, periodicity, strobed_states
-from .analysis.quantities import history
-from .analysis.receptance import frequency_response
+from .analysis.periodicity import Periodicity, count_periods, periodicity, strobed_states
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from .analysis.window import window
-from .assembled import basis_from_matrices
-from .basis import ModalBasis
-from .basis_report import BasisReport
-from .bifurcation.basins import Attractor, Axis, Basins, basins
-from .bifurcation.branch import Branch
-from .bifurcation.brute_force import BruteForce, brute_force
-from .bifurcation.contact_field import contact_field
-from .bifurcation.curves import fold_curve, hopf_curve
-from .bifurcation.equilibria import find_equilibrium
-from .bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
-from .bifurcation.function_field import vector_field
-from .bifurcation.lyapunov import LyapunovExponents, lyapunov_exponents
-from .bifurcation.observation import motion_of, observe
-from .bifurcation.orbit_curves import orbit_curve
-from .bifurcation.orbit_output import amplitude, orbit_history, quantity_range
-from .bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
-from .bifurcation.settled import SettledMotion, settled_motion
-from .bifurcation.shooting_branch import orbits_by_shooting
-from .bifurcation.shooting_switch import doubled_by_shooting, hopf_orbits_by_shooting
-from .bifurcation.stability_map import stability_map
-from .bifurcation.vector_field import VectorField
-from .body import ElasticBody, Material
-from .damping import LossFactor, Rayleigh
-from .eigen import eigenfrequencies_hz
-from .errors import FecontactError, InputError, ModelWarning
-from .forcing import forcing_period
-from .formats.matrices import read_matrix
-from .formats.uff import read_uff
-from .gap import Crown
-from .geometry import Beam, Block, Pendulum, generate
+from .bifurcation.attractors.basins import Attractor, Axis, Basins, basins
+from .bifurcation.attractors.lyapunov import LyapunovExponents, lyapunov_exponents
+from .bifurcation.attractors.poincare_scan import BruteForce, brute_force
+from .bifurcation.continuation.branch import Branch
+from .bifurcation.equilibria.branches import equilibrium_branch, switched_branch
+from .bifurcation.equilibria.codim2 import fold_curve, hopf_curve
+from .bifurcation.equilibria.equilibrium import find_equilibrium
+from .bifurcation.equilibria.stability_map import stability_map
+from .bifurcation.fields.contact_field import contact_field
+from .bifurcation.fields.function_field import vector_field
+from .bifurcation.fields.vector_field import VectorField
+from .bifurcation.orbits.branches import orbits_beyond, orbits_from_hopf, orbits_from_motion
+from .bifurcation.orbits.codim2 import orbit_curve
+from .bifurcation.orbits.from_run import SettledMotion, settled_motion
+from .bifurcation.orbits.orbit_output import amplitude, orbit_history, quantity_range
+from .bifurcation.orbits.period_doubling import doubled_by_shooting, hopf_orbits_by_shooting
+from .bifurcation.orbits.samples import motion_of, observe
+from .bifurcation.orbits.shooting_branch import orbits_by_shooting
+from .core.errors import FecontactError, InputError, ModelWarning
+from .fem.elastic_body import ElasticBody, Material
+from .fem.generate import Beam, Block, Pendulum, generate
+from .fem.mesh import Mesh
+from .fem.mesh_files import read_mesh, write_mesh
+from .fem.points import Patch
 from .integrate.ensemble import Ensemble, ensemble, strobe
 from .integrate.events import ContactEvents, Crossing, Event, Events, event
-from .integrate.initial import RigidStart
+from .integrate.initial_state import RigidStart
 from .integrate.sensitivity import Sensitivity, sensitivity
-from .integrate.set_valued_cost import SmoothingCost, smoothing_cost
 from .integrate.simulate import simulate
+from .integrate.smoothing_cost import SmoothingCost, smoothing_cost
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
+from .laws.base import FrictionLaw, NormalLaw, PerNode
 from .laws.check import check_law
-from .laws.contract import FrictionLaw, NormalLaw, PerNode
-from .laws.drive import Drive, Load, PointLoad
-from .laws.fourier_series import FourierSeries
-from .laws.friction import (
+from .laws.excitation import Drive, Load, PointLoad
+from .laws.friction.bristle import BoucWenFriction, DahlFriction, LuGreFriction
+from .laws.friction.friction_minimum import CubicFriction, GalvanettoFriction
+from .laws.friction.maxwell_slip import IwanFriction, JenkinsFriction
+from .laws.friction.stribeck import (
     ConstantFriction,
     ExponentialFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
-from .laws.friction_minimum import CubicFriction, GalvanettoFriction
-from .laws.ground import Ground
-from .laws.ground_motion import HarmonicSpeed, SpeedRamp
-from .laws.maxwell_slip import IwanFriction, JenkinsFriction
-from .laws.memory import BoucWenFriction, DahlFriction, LuGreFriction
-from .laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
-from .laws.normal_measured import MeasuredSurface
-from .laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
-from .laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
-from .laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
-from .laws.profiles import Flat, Sine
-from .laws.random_roughness import RandomRoughness
-from .laws.signals import Constant, Harmonic, Harmonics, Sweep
+from .laws.ground.fourier_series import FourierSeries
+from .laws.ground.ground import Ground
+from .laws.ground.measured_profile import Trace
+from .laws.ground.motion import HarmonicSpeed, SpeedRamp
+from .laws.ground.profiles import Flat, Sine
+from .laws.ground.random_roughness import RandomRoughness
+from .laws.normal.linear import LinearContact, PrescribedForce, TwoSidedStop
+from .laws.normal.measured_surface import MeasuredSurface
+from .laws.normal.power import PowerContact, PowerLawContact, RestitutionContact
+from .laws.normal.rough_surface import (
+    CosineSurface,
+    GaussianSurface,
+    ParabolicSurface,
+    RoughSurface,
+)
+from .laws.normal.statistical import ExponentialContact, GreenwoodWilliamson
+from .laws.signals.harmonic import Constant, Harmonic, Harmonics, Sweep
+from .laws.signals.transient import Pulse, Step, Tabulated
 from .laws.signatures import friction_law, memory_friction_law, normal_law
-from .laws.trace import Trace
-from .laws.transients import Pulse, Step, Tabulated
-from .mesh import Mesh
-from .mesh_io import read_mesh, write_mesh
-from .mode_convergence import mode_convergence
-from .normalisation import basis_from_modes
-from .output.analysis_plots import (
+from .output.files.branches import read_branch, read_branches, write_branch, write_branches
+from .output.files.case import read_case, write_case
+from .output.files.dataset import to_xarray
+from .output.files.export import export_csv, export_mat, export_netcdf
+from .output.files.hdf5 import read_basis, write_basis
+from .output.files.pvd import export_pvd
+from .output.plots.analysis import (
     plot_friction_work,
     plot_poincare,
     plot_response,
     plot_spectrogram,
     plot_spectrum,
 )
-from .output.basin_plots import plot_basins
-from .output.branches import read_branch, read_branches, write_branch, write_branches
-from .output.dataset import to_xarray
-from .output.diagram_extras import Inset, phase_inset
-from .output.diagrams import plot_branches
-from .output.export import export_csv, export_mat, export_netcdf
-from .output.hdf5 import read_basis, write_basis
-from .output.movie import picture, render
-from .output.plots import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
-from .output.pvd import export_pvd
-from .output.stability_plots import plot_eigenvalues, plot_stability_map
-from .output.store import read_case, write_case
-from .output.sweep_plots import plot_sobol, plot_strobed, plot_sweep
-from .points import Patch
-from .reduction import modal_basis
-from .rows import rows_from_dofs
-from .statics import static_equilibrium
-from .study import Study
-from .sweeps.executors import dask_executor
-from .sweeps.settings import Distribution, Range, Strobing, SweepSettings
-from .sweeps.statistics import SobolIndices, sobol_indices, statistics
-from .sweeps.sweep import sweep
-from .sweeps.table import SweepTable, read_table
-from .system import ContactSystem
+from .output.plots.basins import plot_basins
+from .output.plots.bifurcation_diagram import plot_branches
+from .output.plots.diagram_insets import Inset, phase_inset
+from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
+from .output.plots.stability import plot_eigenvalues, plot_stability_map
+from .output.render.movie import picture, render
+from .reduction.convergence import mode_convergence
+from .reduction.damping import LossFactor, Rayleigh
+from .reduction.eigenmodes import eigenfrequencies_hz
+from .reduction.from_matrices import basis_from_matrices
+from .reduction.from_modes import basis_from_modes
+from .reduction.matrix_files import read_matrix
+from .reduction.matrix_files.uff import read_uff
+from .reduction.modal_basis import ModalBasis
+from .reduction.reduce_body import modal_basis
+from .reduction.report import BasisReport
+from .reduction.restriction import rows_from_dofs
+from .study.study import Study
+from .study.sweep_section import Distribution, Range, Strobing, SweepSettings
+from .sweep.executors import dask_executor
+from .sweep.plots import plot_sobol, plot_strobed, plot_sweep
+from .sweep.statistics import SobolIndices, sobol_indices, statistics
+from .sweep.sweep import sweep
+from .sweep.table import SweepTable, read_table
+from .system.contact_system import ContactSystem
+from .system.forcing_period import forcing_period
+from .system.gap import Crown
+from .system.statics import static_equilibrium
 
 __version__: str
 

@@ -21,7 +21,7 @@ import sys
 import time
 from pathlib import Path
 
-import fecontact.errors
+import fecontact.core.errors
 
 
 def failing(run):

@@ -3,13 +3,13 @@
 import numpy as np
 import scipy.sparse as sp
 
-from fecontact.basis import ModalBasis
-from fecontact.field import Field
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.system import ContactSystem
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.field import Field
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_system import ContactSystem
 
 YOUNGS_MODULUS = 2.1e11
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
-from fecontact.analysis.receptance import frequency_response
+from fecontact.analysis.frequency_response import frequency_response
 from fecontact.analysis.window import window
-from fecontact.cli import execute
-from fecontact.errors import InputError
+from fecontact.cli import execute, plot_kinds
+from fecontact.core.errors import InputError
 from fecontact.integrate.simulate import simulate
-from fecontact.laws.drive import Drive
-from fecontact.output import analysis_figures, redraw
-from fecontact.output.store import write_case
+from fecontact.laws.excitation import Drive
+from fecontact.output.files.case import write_case
+from fecontact.output.plots import analysis_figures
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
     system = trajectory.system.with_(drive=Drive(stiffness_x=1e5, amplitude_x=1e-5,
                                                  angular_frequency=2.0 * np.pi * 200.0))
     case = write_case(tmp_path / "beam.vtkhdf", simulate(system, 0.02, outputs=801), frames=0)
-    for kind in redraw.KINDS:
+    for kind in plot_kinds.KINDS:
         assert execute(["plot", str(case), kind, "--start", "0.002"]) == 0
         assert (tmp_path / f"beam-{kind}.png").read_bytes()[:4] == b"\x89PNG"
     assert execute(["plot", str(case), "history", "--point", "C", "--point", "2", "-o",
@@ -113,18 +113,19 @@ def test_a_pendulum_is_drawn_across_the_ground(tmp_path):
 
     trajectory = simulate(pendulum(64.32), 0.5, outputs=801)
     for kind in ("phase", "spectrum", "spectrogram", "receptance"):
-        redraw.redraw(trajectory, kind, tmp_path / f"{kind}.svg")
+        plot_kinds.redraw(trajectory, kind, tmp_path / f"{kind}.svg")
     assert b"velocity y" in (tmp_path / "phase.svg").read_bytes()
     for kind in ("spectrum", "spectrogram"):
-        redraw.redraw(trajectory, kind, tmp_path / f"{kind}.png",
-                      redraw.Choice("total_friction_force"))
+        plot_kinds.redraw(trajectory, kind, tmp_path / f"{kind}.png",
+                          plot_kinds.Choice("total_friction_force"))
     with pytest.raises(InputError, match="B x does not move by a force at B x"):
-        redraw.redraw(trajectory, "receptance", tmp_path / "none.png", redraw.Choice(axis="x"))
+        plot_kinds.redraw(trajectory, "receptance", tmp_path / "none.png",
+                          plot_kinds.Choice(axis="x"))
 
 
 def test_points_of_a_command_line():
-    assert redraw.point_of("B") == "B"
-    assert redraw.point_of("12") == 12
-    assert redraw.point_of("0.1,0.02") == (0.1, 0.02)
+    assert plot_kinds.point_of("B") == "B"
+    assert plot_kinds.point_of("12") == 12
+    assert plot_kinds.point_of("0.1,0.02") == (0.1, 0.02)
     with pytest.raises(InputError, match="place x,y in m"):
-        redraw.point_of("1,b")
+        plot_kinds.point_of("1,b")

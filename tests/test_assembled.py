@@ -5,15 +5,15 @@ import pytest
 import scipy.sparse as sp
 from meshes_for_tests import rectangle, skewed
 
-from fecontact.assembled import basis_from_matrices
-from fecontact.body import ElasticBody
-from fecontact.damping import LossFactor, Rayleigh
-from fecontact.errors import InputError
-from fecontact.formats.matrices import AssembledMatrix
-from fecontact.normalisation import basis_from_modes, normalisation
-from fecontact.null_space import null_space, relative_energies
-from fecontact.reduction import modal_basis
-from fecontact.rows import rows_from_dofs
+from fecontact.core.errors import InputError
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.reduction.damping import LossFactor, Rayleigh
+from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.reduction.from_modes import basis_from_modes, normalisation
+from fecontact.reduction.matrix_files import AssembledMatrix
+from fecontact.reduction.null_space import null_space, relative_energies
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.reduction.restriction import rows_from_dofs
 
 SUPPORTS = {"free": {}, "hinged": {"hinge": "xy"}, "on rollers": {"left": "x"},
             "clamped": {"left": "xy"}}

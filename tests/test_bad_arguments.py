@@ -12,10 +12,11 @@ import pytest
 from oscillators import friction_oscillator
 
 import fecontact
-from fecontact import memory, modal_basis
-from fecontact.bifurcation.branch import Branch, BranchPoint
-from fecontact.body import ElasticBody
-from fecontact.errors import FecontactError, InputError
+from fecontact import modal_basis
+from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact.core import memory
+from fecontact.core.errors import FecontactError, InputError
+from fecontact.fem.elastic_body import ElasticBody
 
 CALLS = """
 Beam(None)

@@ -6,14 +6,14 @@ import pytest
 from meshes_for_tests import rectangle
 
 from fecontact import eigenfrequencies_hz, write_basis
-from fecontact.assembled import basis_from_matrices
-from fecontact.basis import ModalBasis
-from fecontact.body import ElasticBody, Material
-from fecontact.damping import Rayleigh, modal_damping
-from fecontact.eigen import fixed_signs
-from fecontact.errors import InputError
-from fecontact.output.hdf5 import read_basis
-from fecontact.reduction import modal_basis
+from fecontact.core.errors import InputError
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.output.files.hdf5 import read_basis
+from fecontact.reduction.damping import Rayleigh, modal_damping
+from fecontact.reduction.eigenmodes import fixed_signs
+from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.reduce_body import modal_basis
 
 NO_CONTACT = {"contact": np.zeros((1, 3, 2))}
 
@@ -306,7 +306,7 @@ def test_an_old_file_survives_a_failed_save(tmp_path, monkeypatch):
     def fail(*_):
         raise RuntimeError("disk full")
 
-    monkeypatch.setattr("fecontact.output.hdf5.store_basis", fail)
+    monkeypatch.setattr("fecontact.output.files.hdf5.store_basis", fail)
     with pytest.raises(RuntimeError, match="disk full"):
         write_basis(path, chain(0.3))
     assert path.read_bytes() == before

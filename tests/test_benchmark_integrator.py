@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fecontact.integrate import control, stepping
+from fecontact.integrate.rodas5p import driver, step_loop
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 
@@ -24,8 +24,8 @@ def problems(monkeypatch):
 def test_every_problem_runs(problems, name, part):
     """The first part of each against scipy's Radau."""
     problem = problems.shortened(problems.PROBLEMS[name](), part)
-    run = control.start(problem.system, problem.state, problem.times, rtol=1e-6, work=False)
-    assert run.advance(10**9) == stepping.FINISHED
+    run = driver.start(problem.system, problem.state, problem.times, rtol=1e-6, work=False)
+    assert run.advance(10**9) == step_loop.FINISHED
     system, times = problem.system, problem.times
     wanted = solve_ivp(system.rhs, times[[0, -1]], problem.state, method="Radau", t_eval=times,
                        jac=system.jacobian, rtol=1e-7, atol=1e-11).y.T

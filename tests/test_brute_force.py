@@ -22,7 +22,7 @@ from fecontact import (
     simulate,
     strobe,
 )
-from fecontact.errors import AnalysisError
+from fecontact.core.errors import AnalysisError
 
 
 def test_exponents_of_a_linear_oscillator():

@@ -9,9 +9,9 @@ import pytest
 
 import fecontact as fc
 from fecontact.cli import execute
-from fecontact.laws.contract import FrictionLaw, NormalLaw
+from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.cycles import cycle_work
-from fecontact.laws.names import law_names
+from fecontact.laws.registry import law_names
 
 NEEDED = {
     fc.RoughSurface: (1e6, 1e-5, 3.0), fc.ParabolicSurface: (1e6, 1e-5, 3.0),

@@ -10,13 +10,13 @@ import tomllib
 
 import pytest
 
-from fecontact import doctor as examination
-from fecontact import system_libraries
+from fecontact.cli import doctor as examination
 from fecontact.cli import execute
+from fecontact.core import system_libraries
+from fecontact.fem.mesh_files import read_mesh
 from fecontact.integrate.trajectory import Status
-from fecontact.mesh_io import read_mesh
-from fecontact.output.store import read_case
-from fecontact.study import Study
+from fecontact.output.files.case import read_case
+from fecontact.study.study import Study
 
 TINY = """
 geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.01 }
@@ -273,7 +273,7 @@ def test_a_run_that_fails_is_written_and_reported(cli, study, monkeypatch):
 
 
 def test_ctrl_c_while_drawing_leaves_nothing(cli, study, monkeypatch, tmp_path):
-    from fecontact.output import plots
+    from fecontact.output.plots import run as plots
 
     def interrupted(*_, **__):
         raise KeyboardInterrupt
@@ -313,7 +313,7 @@ def test_ctrl_c_writes_what_was_computed(cli, study, tmp_path):
 
 
 def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
-    from fecontact.integrate.run import Run
+    from fecontact.integrate.rodas5p.run import Run
 
     longer = ("--set", "simulation.t_end=0.05", "--set", "simulation.outputs=101")
     assert cli("run", study, "--resume")[0] == 1
@@ -384,7 +384,7 @@ def test_doctor_says_what_to_install(cli, monkeypatch):
 
 
 def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
-    from fecontact import demo
+    from fecontact.cli import demo
 
     full = demo.template
 

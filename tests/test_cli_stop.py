@@ -2,7 +2,7 @@
 
 from fecontact.cli import execute
 from fecontact.integrate.trajectory import Status
-from fecontact.output.store import read_case
+from fecontact.output.files.case import read_case
 
 FALLING = """
 geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.01 }

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 MODULE = '''
-from fecontact.compiled import compile_law, f8, kernel
+from fecontact.core.compiled import compile_law, f8, kernel
 
 
 @kernel(f8(f8))

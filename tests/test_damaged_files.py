@@ -17,11 +17,11 @@ from fecontact import (
     write_basis,
     write_branches,
 )
-from fecontact.bifurcation.branch import Branch, BranchPoint, Status
-from fecontact.errors import InputError
+from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
+from fecontact.core.errors import InputError
+from fecontact.core.stored import DamagedError, npz_arrays
 from fecontact.integrate.events import Events
-from fecontact.output.store import read_case, write_case
-from fecontact.stored import DamagedError, npz_arrays
+from fecontact.output.files.case import read_case, write_case
 
 
 @pytest.fixture(scope="module")

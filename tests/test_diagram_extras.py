@@ -5,12 +5,12 @@ import pytest
 from oscillators import impact_oscillator
 
 from fecontact import Axis, InputError, basins, brute_force
-from fecontact.bifurcation.basins import Attractor, Basins
-from fecontact.bifurcation.branch import Branch, BranchPoint
-from fecontact.bifurcation.brute_force import BruteForce
-from fecontact.output.basin_plots import basins_figure, plot_basins
-from fecontact.output.diagram_extras import Inset
-from fecontact.output.diagrams import branches_figure, plot_branches
+from fecontact.bifurcation.attractors.basins import Attractor, Basins
+from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact.output.plots.basins import basins_figure, plot_basins
+from fecontact.output.plots.bifurcation_diagram import branches_figure, plot_branches
+from fecontact.output.plots.diagram_insets import Inset
 
 
 def orbit(p, section, stable=True):

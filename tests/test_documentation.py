@@ -11,8 +11,8 @@ import pytest
 import fecontact as fc
 from fecontact.cli import execute
 from fecontact.cli.app import COMMANDS, app
-from fecontact.output.probe import rendering_works
-from fecontact.study import Study
+from fecontact.output.render.offscreen import rendering_works
+from fecontact.study.study import Study
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

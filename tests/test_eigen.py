@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 from meshes_for_tests import clamped_beam, grid, rectangle, skewed, tapered_membrane
 
-import fecontact.eigen as eigen
-from fecontact.body import ElasticBody, Material
-from fecontact.eigen import backward_error, eigenfrequencies_hz, eigenmodes, rigid_modes
-from fecontact.errors import InputError, MeshError
-from fecontact.mesh import Mesh
+import fecontact.reduction.eigenmodes as eigen
+from fecontact.core.errors import InputError, MeshError
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.mesh import Mesh
+from fecontact.reduction.eigenmodes import (
+    backward_error,
+    eigenfrequencies_hz,
+    eigenmodes,
+    rigid_modes,
+)
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 

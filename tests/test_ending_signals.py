@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from fecontact.cli import execute
-from fecontact.console import ending_signals, interrupted_code
-from fecontact.geometry import Beam, generate
+from fecontact.cli.console import ending_signals, interrupted_code
+from fecontact.fem.generate import Beam, generate
 from fecontact.integrate.trajectory import Status
-from fecontact.output.store import read_case
+from fecontact.output.files.case import read_case
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 
@@ -33,7 +33,7 @@ output = { frames = 0 }
 RUN = """
 import signal, sys, threading
 from fecontact.cli import execute
-from fecontact.integrate.control import Run
+from fecontact.integrate.rodas5p.driver import Run
 
 advance = Run.advance
 def told(run, steps):

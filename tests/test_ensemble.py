@@ -5,7 +5,7 @@ import pytest
 from oscillators import impact_oscillator
 
 from fecontact import InputError, Status, ensemble, forcing_period, simulate, strobe
-from fecontact.integrate import control
+from fecontact.integrate.rodas5p import driver
 
 W = 64.32
 PERIOD = 2.0 * np.pi / W
@@ -20,7 +20,7 @@ def test_runs_are_those_of_single_runs_bit_for_bit():
     assert found.states.shape == (3, 7, 4)
     assert found.finished.all()
     for system, state, got, steps in zip(systems, states, found.states, found.steps, strict=True):
-        run = control.start(system, state, times, rtol=1e-6, work=False)
+        run = driver.start(system, state, times, rtol=1e-6, work=False)
         run.advance(10**9)
         assert (run.states == got).all()
         assert run.statistics["steps"] == steps
@@ -52,8 +52,8 @@ def test_a_chain_hands_on_its_states():
     last = start
     for index in (0, 1):
         w = systems[index].drive.angular_frequency
-        run = control.start(systems[index], last, np.arange(4) * 2.0 * np.pi / w, rtol=1e-6,
-                            work=False)
+        run = driver.start(systems[index], last, np.arange(4) * 2.0 * np.pi / w, rtol=1e-6,
+                           work=False)
         run.advance(10**9)
         last = run.states[-1]
         assert found.states[index, 0] == pytest.approx(last, rel=1e-6)

@@ -19,7 +19,7 @@ from fecontact import (
     simulate,
     write_case,
 )
-from fecontact.integrate.checkpoint import Checkpoint
+from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 
 
 def drop():

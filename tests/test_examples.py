@@ -5,8 +5,8 @@ import pytest
 from scripts_for_tests import ROOT, check_numbers, run_script
 
 from fecontact.cli import execute
-from fecontact.output.probe import rendering_works
-from fecontact.output.store import read_case
+from fecontact.output.files.case import read_case
+from fecontact.output.render.offscreen import rendering_works
 
 # Spring of the drive and elastic mode with the contact held: w^2 of the one motion that is left.
 _w = 2.0 * np.pi * 30.0

@@ -8,10 +8,10 @@ from scipy.io import loadmat
 from synthetic import basis, run
 
 from fecontact.cli import execute
-from fecontact.errors import InputError
-from fecontact.output import export
-from fecontact.output.dataset import to_xarray
-from fecontact.output.store import write_case
+from fecontact.core.errors import InputError
+from fecontact.output.files import export
+from fecontact.output.files.case import write_case
+from fecontact.output.files.dataset import to_xarray
 
 
 @pytest.fixture(scope="module")

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fecontact.assembled import basis_from_matrices
-from fecontact.errors import InputError
-from fecontact.gap import Crown, gap_values
-from fecontact.laws.drive import Load
-from fecontact.laws.normal import RoughSurface
-from fecontact.statics import static_equilibrium
-from fecontact.system import ContactSystem
+from fecontact.core.errors import InputError
+from fecontact.laws.excitation import Load
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.gap import Crown, gap_values
+from fecontact.system.statics import static_equilibrium
 
 
 def rigid_mass(count, length):
@@ -28,7 +28,7 @@ def test_crown_is_the_circle_to_the_last_digit():
     np.testing.assert_allclose(crown(x), 2.0 * 0.5 * np.sin(angle / 2) ** 2, rtol=1e-14)
 
 
-@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 def test_pressed_cylinder_on_independent_springs():
     """F = 2/3 sqrt(8 R) k u^(3/2) for stiffness k per length under a parabola; R large."""
     radius, length, stiffness, load = 2.0, 0.02, 1e9, 50.0

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fecontact.errors import InputError, MeshError, MissingLibraryError
-from fecontact.geometry import Beam, Block, Pendulum, generate
-from fecontact.mesh import Mesh
-from fecontact.mesh_io import read_mesh, write_mesh
+from fecontact.core.errors import InputError, MeshError, MissingLibraryError
+from fecontact.fem.generate import Beam, Block, Pendulum, generate
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files import read_mesh, write_mesh
 
 try:
     import gmsh
@@ -170,8 +170,8 @@ def test_too_many_elements_name_an_element_size_that_works() -> None:
     with pytest.raises(InputError, match=r"element_size = 1e-08 makes 1e\+10 elements") as caught:
         generate(shape)
     enough = float(str(caught.value).split("at least ")[1].split()[0])
-    from fecontact.geometry import MAX_CELLS, _count_cells
-    from fecontact.grids import grid_of
+    from fecontact.fem.generate import MAX_CELLS, _count_cells
+    from fecontact.fem.grids import grid_of
 
     assert 0.2 * MAX_CELLS < _count_cells(shape, grid_of(shape), enough) <= MAX_CELLS
     with pytest.raises(InputError, match="more than 2000000"):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import fecontact as fc
-from fecontact.integrate import control, scipy_solvers
+from fecontact.integrate.reference import scipy
+from fecontact.integrate.rodas5p import driver
 
 MASS, STIFFNESS, DASHPOT = 2.0, 800.0, 3.0
 
@@ -140,10 +141,10 @@ def test_longest_steps_resolve_what_is_given_in_time():
         np.inf: point(drive=fc.Drive(stiffness_x=1.0, angular_frequency=4.0 * np.pi)),
     }
     for period, system in cases.items():
-        assert control.longest_step(system, times) == pytest.approx(min(10.0, period / 4.0))
-        assert control.longest_step(system, times, 0.06) == pytest.approx(min(0.06, period / 4.0))
-        assert scipy_solvers.longest_step(system, times) == pytest.approx(min(0.2, period / 20.0))
-        assert scipy_solvers.longest_step(system, times, 0.02) == pytest.approx(
+        assert driver.longest_step(system, times) == pytest.approx(min(10.0, period / 4.0))
+        assert driver.longest_step(system, times, 0.06) == pytest.approx(min(0.06, period / 4.0))
+        assert scipy.longest_step(system, times) == pytest.approx(min(0.2, period / 20.0))
+        assert scipy.longest_step(system, times, 0.02) == pytest.approx(
             min(0.02, period / 20.0))
     ramp = point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02,
                                   motion=fc.SpeedRamp(0.8, start=1.0, duration=1.0)))

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from fecontact.body import ElasticBody, Material
-from fecontact.eigen import eigenfrequencies_hz
-from fecontact.errors import InputError
-from fecontact.geometry import generate
-from fecontact.reduction import modal_basis
-from fecontact.shapes import Pendulum
+from fecontact.core.errors import InputError
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.generate import generate
+from fecontact.fem.shapes import Pendulum
+from fecontact.reduction.eigenmodes import eigenfrequencies_hz
+from fecontact.reduction.reduce_body import modal_basis
 
 
 def pendulum(element: str, size: float = 0.004, radius: float = 0.002) -> ElasticBody:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fecontact.analysis.periods import count_periods, drive_period, strobed_states
+from fecontact.analysis.periodicity import count_periods, drive_period, strobed_states
+from fecontact.fem.mesh_files import read_mesh
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.simulate import simulate
-from fecontact.mesh_io import read_mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 

@@ -7,25 +7,27 @@ import pytest
 from scipy.integrate import solve_ivp
 from test_simulate import mass_in_plane, mass_in_y, oscillator
 
-from fecontact.basis import ModalBasis
-from fecontact.errors import InputError
-from fecontact.integrate import control, run_arrays, stepping
+from fecontact.core.errors import InputError
+from fecontact.integrate.rodas5p import driver as control
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.drive import Drive, Load, PointLoad
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground, HarmonicSpeed
-from fecontact.laws.maxwell_slip import JenkinsFriction
-from fecontact.laws.memory import LuGreFriction
-from fecontact.laws.normal import RoughSurface
-from fecontact.laws.normal_power import PowerContact
-from fecontact.laws.normal_stop import LinearContact
-from fecontact.laws.signals import Harmonic, Pulse
-from fecontact.system import ContactSystem
+from fecontact.laws.excitation import Drive, Load, PointLoad
+from fecontact.laws.friction.bristle import LuGreFriction
+from fecontact.laws.friction.maxwell_slip import JenkinsFriction
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground, HarmonicSpeed
+from fecontact.laws.normal.linear import LinearContact
+from fecontact.laws.normal.power import PowerContact
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.laws.signals.harmonic import Harmonic, Pulse
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_system import ContactSystem
 
 
 def run_of(system, state, times, rtol=1e-7, work=True):
     run = control.start(system, np.array(state), np.array(times), rtol=rtol, work=work)
-    assert control.finish(run) == stepping.FINISHED
+    assert control.finish(run) == step_loop.FINISHED
     return run
 
 
@@ -68,7 +70,7 @@ def test_order_on_a_smooth_problem():
         longest = times[-1] / steps
         run = replace(run, control=run.control._replace(longest=longest, slip_part=1e9))
         run.progress.numbers[run_arrays.STEP] = longest
-        assert run.advance(10 * steps) == stepping.FINISHED
+        assert run.advance(10 * steps) == step_loop.FINISHED
         assert run.statistics["steps"] == steps
         errors.append(np.abs(run.states[-1] - wanted).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -139,7 +141,7 @@ def test_continued_runs_are_the_same_bit_for_bit():
     state, times = np.zeros(system.size), np.linspace(0.0, 0.02, 101)
     whole = run_of(system, state, times)
     pieces = control.start(system, state, times, rtol=1e-7)
-    while pieces.advance(7) == stepping.RUNNING:
+    while pieces.advance(7) == step_loop.RUNNING:
         taken_up = control.start(system, state, times, rtol=1e-7)
         copy_into(taken_up.progress, pieces.progress)
         taken_up.states[:], taken_up.work[:] = pieces.states, pieces.work
@@ -185,7 +187,7 @@ def test_motion_that_grows_beyond_all_numbers_ends_the_run():
     state = np.zeros(system.size)
     state[0] = 1e305
     run = control.start(system, state, np.array([0.0, 0.1]), rtol=1e-6)
-    assert control.finish(run) == stepping.NOT_FINITE
+    assert control.finish(run) == step_loop.NOT_FINITE
     assert run.time == 0.0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fecontact as fc
-from fecontact.integrate.set_valued import integrate_set_valued
+from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.integrate.trajectory import Trajectory
 
 MASS, STIFFNESS, AT, FORCE = 2.0, 800.0, 0.3, 5.0

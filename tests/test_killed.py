@@ -17,8 +17,8 @@ from test_cli import TINY
 
 from fecontact import read_case, read_table, sweep
 from fecontact.cli import execute
-from fecontact.integrate import control
-from fecontact.integrate.checkpoint import Checkpoint
+from fecontact.integrate.rodas5p import driver
+from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")]
@@ -50,7 +50,7 @@ def start(work):
     try:
         # Checkpoints after every piece of a run, and short pieces.
         Checkpoint.keep = Checkpoint.write
-        control.finish.__defaults__ = (None, 0.02, None)
+        driver.finish.__defaults__ = (None, 0.02, None)
         code = work() or 0
     except BaseException:
         traceback.print_exc()

@@ -9,12 +9,12 @@ import pytest
 
 import fecontact as fc
 from fecontact.cli import execute
-from fecontact.laws.contract import FrictionLaw, NormalLaw
-from fecontact.laws.names import law_names
-from fecontact.laws.profile_base import Profile
-from fecontact.laws.signal_base import Signal
-from fecontact.study import Study
-from fecontact.tables import from_table, to_table
+from fecontact.core.tables import from_table, to_table
+from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.ground.profile import Profile
+from fecontact.laws.registry import law_names
+from fecontact.laws.signals.base import Signal
+from fecontact.study.study import Study
 
 # Values for parameters that have no defaults.
 GIVEN = {

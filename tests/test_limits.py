@@ -116,7 +116,7 @@ def test_energy_from_nowhere_has_a_status():
     assert simulate(drop(), 0.5, initial=START).status is Status.FINISHED
 
 
-@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 @pytest.mark.parametrize("change", ["velocity", "speed"])
 def test_energies_beyond_all_numbers_have_a_status(change):
     """(1e300)^2 overflows, a motion at 1e300 m/s does not."""

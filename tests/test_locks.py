@@ -11,12 +11,12 @@ from test_cli import TINY
 
 from fecontact import InputError
 from fecontact.cli import execute
-from fecontact.locks import locked
+from fecontact.core.locks import locked
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from fecontact.locks import locked
+from fecontact.core.locks import locked
 with locked(Path(sys.argv[1]), "taken"):
     print("held", flush=True)
     time.sleep(60.0)
@@ -73,8 +73,8 @@ def test_locks_are_held_by_one_at_a_time(tmp_path):
     count.write_text("0")
     script = ("import sys, time\n"
               "from pathlib import Path\n"
-              "from fecontact.errors import InputError\n"
-              "from fecontact.locks import locked\n"
+              "from fecontact.core.errors import InputError\n"
+              "from fecontact.core.locks import locked\n"
               "count, done = Path(sys.argv[1]), 0\n"
               "while done < 50:\n"
               "    try:\n"

@@ -13,8 +13,8 @@ import scipy.io
 import scipy.sparse as sp
 
 from fecontact import basis_from_matrices, modal_basis
-from fecontact.errors import InputError
-from fecontact.formats.matrices import AssembledMatrix, read_matrix
+from fecontact.core.errors import InputError
+from fecontact.reduction.matrix_files import AssembledMatrix, read_matrix
 
 DATA = Path(__file__).parent / "data"
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))

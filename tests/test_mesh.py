@@ -3,8 +3,8 @@ import pickle
 import numpy as np
 import pytest
 
-from fecontact.errors import MeshError
-from fecontact.mesh import Mesh
+from fecontact.core.errors import MeshError
+from fecontact.fem.mesh import Mesh
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
 # Two quadrilaterals side by side, the second one given clockwise.

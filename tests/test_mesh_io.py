@@ -8,9 +8,9 @@ import meshio
 import numpy as np
 import pytest
 
-from fecontact.errors import InputError, MeshError
-from fecontact.mesh import Mesh
-from fecontact.mesh_io import read_mesh, write_fields, write_mesh
+from fecontact.core.errors import InputError, MeshError
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files import read_mesh, write_fields, write_mesh
 
 # 3 x 2 cells of 0.1 m x 0.05 m: nodes 0 ... 3 along the bottom, 8 ... 11 along the top.
 X, Y = np.meshgrid(np.linspace(0.0, 0.3, 4), np.linspace(0.0, 0.1, 3))
@@ -748,7 +748,7 @@ def test_failed_writing_leaves_the_old_file(
         stream.write("half of it")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fecontact.mesh_io.write_msh", full)
+    monkeypatch.setattr("fecontact.fem.mesh_files.write_msh", full)
     with pytest.raises(InputError, match="no space left on device"):
         write_mesh(quad_mesh(), path)
     assert path.read_text() == "old"

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.basis_report import BasisReport
-from fecontact.body import ElasticBody
-from fecontact.mode_convergence import mode_convergence
-from fecontact.output.mode_shapes import convergence_figure
-from fecontact.reduction import modal_basis
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.output.plots.modes import convergence_figure
+from fecontact.reduction.convergence import mode_convergence
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.reduction.report import BasisReport
 
 
 @pytest.mark.parametrize("triangles", [False, True])

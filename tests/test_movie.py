@@ -8,16 +8,17 @@ from matplotlib import colormaps
 from matplotlib.image import imread
 from synthetic import basis, run
 
-from fecontact.errors import InputError, MissingLibraryError
-from fecontact.laws.friction import ConstantFriction
-from fecontact.output import movie, probe
-from fecontact.output.force_chart import ForceChart
-from fecontact.output.frames import frame_indices
-from fecontact.output.furniture import Furniture
-from fecontact.output.motion import Motion
-from fecontact.output.movie import picture, render
-from fecontact.output.scene import NODE_COLOURS, Scene, needed_height
-from fecontact.output.style import STATE_COLOURS
+from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.output.files.frames import frame_indices
+from fecontact.output.plots.style import STATE_COLOURS
+from fecontact.output.render import movie
+from fecontact.output.render import offscreen as probe
+from fecontact.output.render.force_chart import ForceChart
+from fecontact.output.render.frames_data import Motion
+from fecontact.output.render.movie import picture, render
+from fecontact.output.render.overlay import Furniture
+from fecontact.output.render.scene import NODE_COLOURS, Scene, needed_height
 
 SMALL = (480, 270)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fecontact.parameter_units import parameter_label
+from fecontact.system.parameter_labels import parameter_label
 
 
 @pytest.mark.parametrize(("name", "label"), [

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fecontact.analysis.periods import count_periods, drive_period, periodicity, strobed_states
-from fecontact.basis import ModalBasis
-from fecontact.errors import InputError
+from fecontact.analysis.periodicity import count_periods, drive_period, periodicity, strobed_states
+from fecontact.core.errors import InputError
 from fecontact.integrate.simulate import simulate
-from fecontact.laws.drive import Drive
-from fecontact.laws.normal import RoughSurface
-from fecontact.system import ContactSystem
+from fecontact.laws.excitation import Drive
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_system import ContactSystem
 
 
 def logistic(r, count=400, start=0.3, skip=2000):

@@ -6,17 +6,18 @@ import pytest
 from synthetic import basis, run
 
 from fecontact import basis_from_matrices
-from fecontact import contact_kernels as kernels
-from fecontact.errors import InputError
+from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Energies, Trajectory
-from fecontact.output import figures, plots
-from fecontact.output.figures import (
+from fecontact.output.plots import figures
+from fecontact.output.plots import run as plots
+from fecontact.output.plots.figures import (
     contact_map_figure,
     energies_figure,
     history_figure,
     phase_figure,
 )
-from fecontact.output.mode_shapes import modes_figure
+from fecontact.output.plots.modes import modes_figure
+from fecontact.system import kernels as kernels
 
 
 def labels(figure):

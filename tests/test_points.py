@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from meshes_for_tests import grid, rectangle, skewed
 
-from fecontact.body import ElasticBody, Material
-from fecontact.contact_face import contact_nodes
-from fecontact.eigen import eigenmodes
-from fecontact.errors import InputError, MeshError
-from fecontact.mesh import Mesh
-from fecontact.points import Patch, place_rows
-from fecontact.reduction import modal_basis
+from fecontact.core.errors import InputError, MeshError
+from fecontact.fem.contact_face import contact_nodes
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.points import Patch, place_rows
+from fecontact.reduction.eigenmodes import eigenmodes
+from fecontact.reduction.reduce_body import modal_basis
 
 MATERIAL = Material(2.1e11, 0.3, 7850.0)
 POINTS = {"corner": (0.0, 0.0), "node": (0.5, 0.2)}
@@ -407,7 +407,7 @@ def test_missing_excitation_and_load_points_do_nothing():
 
 
 def test_modal_stress_of_a_linear_field():
-    from fecontact.reduction import modal_stress
+    from fecontact.reduction.reduce_body import modal_stress
 
     a, b, c, d = 1e-3, -4e-4, 7e-4, 2e-3
     E, nu = 2.1e11, 0.3

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.analysis.receptance import frequency_response
-from fecontact.assembled import basis_from_matrices
-from fecontact.body import ElasticBody, Material
-from fecontact.errors import AnalysisError, InputError
+from fecontact.analysis.frequency_response import frequency_response
+from fecontact.cli.plot_kinds import Choice, redraw
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.integrate.simulate import simulate
-from fecontact.laws.drive import Drive, Load, PointLoad
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.laws.normal_stop import LinearContact
-from fecontact.laws.signals import Harmonic
-from fecontact.output.analysis_figures import response_figure
-from fecontact.output.redraw import Choice, redraw
-from fecontact.reduction import modal_basis
-from fecontact.statics import static_equilibrium
-from fecontact.system import ContactSystem
+from fecontact.laws.excitation import Drive, Load, PointLoad
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.linear import LinearContact
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.laws.signals.harmonic import Harmonic
+from fecontact.output.plots.analysis_figures import response_figure
+from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.statics import static_equilibrium
 
 MASS = 2.0
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)

@@ -9,13 +9,13 @@ from meshes_for_tests import rectangle
 
 import fecontact
 from fecontact import read_basis, write_basis
-from fecontact.basis_report import BasisReport
-from fecontact.body import ElasticBody
-from fecontact.craig_bampton import craig_bampton
-from fecontact.eigen import FreeSystem, eigenfrequencies_hz
-from fecontact.errors import InputError
-from fecontact.flexibility import Flexibility
-from fecontact.substitution import SymmetricFactors
+from fecontact.core.errors import InputError
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.reduction.craig_bampton import craig_bampton
+from fecontact.reduction.eigenmodes import FreeSystem, eigenfrequencies_hz
+from fecontact.reduction.report import BasisReport
+from fecontact.reduction.residual_vectors import Flexibility
+from fecontact.reduction.substitution import SymmetricFactors
 
 modal_basis = partial(fecontact.modal_basis, contact="bottom")
 
@@ -162,7 +162,7 @@ def test_fixed_interface_modes_are_those_of_the_body_held_at_its_interface():
     # The lowest modes of the body on rigid supports at its face span what was added.
     exact = 2.0 * np.pi * eigenfrequencies_hz(held, 6)
     K = sp.csc_array(body.stiffness)
-    from fecontact.craig_bampton import _fixed_interface_modes, _independent
+    from fecontact.reduction.craig_bampton import _fixed_interface_modes, _independent
 
     patterns = _independent(only)
     shapes = _fixed_interface_modes(system, rows.T @ patterns, only.deflections(patterns),

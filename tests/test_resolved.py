@@ -8,10 +8,10 @@ from synthetic import run as made_by_hand
 import fecontact as fc
 from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
-from fecontact.laws.normal_stop import LinearContact
-from fecontact.output.analysis_figures import friction_work_figure
-from fecontact.output.figures import contact_map_figure, history_figure, phase_figure, thinned
-from fecontact.output.store import read_case, write_case
+from fecontact.laws.normal.linear import LinearContact
+from fecontact.output.files.case import read_case, write_case
+from fecontact.output.plots.analysis_figures import friction_work_figure
+from fecontact.output.plots.figures import contact_map_figure, history_figure, phase_figure, thinned
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 0.3
 

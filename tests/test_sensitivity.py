@@ -15,7 +15,7 @@ from fecontact import (
     sensitivity,
     simulate,
 )
-from fecontact.errors import AnalysisError
+from fecontact.core.errors import AnalysisError
 
 SMOOTH = {"friction.smoothing_slope": 3e3}
 

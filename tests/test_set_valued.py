@@ -4,21 +4,25 @@
 import numpy as np
 import pytest
 
-from fecontact.assembled import basis_from_matrices
-from fecontact.errors import InputError
-from fecontact.integrate.set_valued import integrate_set_valued
-from fecontact.integrate.set_valued_cost import smoothing_cost
+from fecontact.core.errors import InputError
+from fecontact.integrate.nonsmooth.driver import integrate_set_valued
+from fecontact.integrate.smoothing_cost import smoothing_cost
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.laws.drive import Drive, Load, PointLoad
-from fecontact.laws.friction import ConstantFriction, ExponentialFriction, HyperbolicFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.ground_motion import SpeedRamp
-from fecontact.laws.memory import LuGreFriction
-from fecontact.laws.normal import RoughSurface
-from fecontact.laws.normal_stop import LinearContact, PrescribedForce
-from fecontact.laws.signals import Constant
-from fecontact.statics import static_equilibrium
-from fecontact.system import ContactSystem
+from fecontact.laws.excitation import Drive, Load, PointLoad
+from fecontact.laws.friction.bristle import LuGreFriction
+from fecontact.laws.friction.stribeck import (
+    ConstantFriction,
+    ExponentialFriction,
+    HyperbolicFriction,
+)
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.ground.motion import SpeedRamp
+from fecontact.laws.normal.linear import LinearContact, PrescribedForce
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.laws.signals.harmonic import Constant
+from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.statics import static_equilibrium
 
 BOTH = pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
     ("events", 1e-11, 1e-11), ("stepping", 1e-6, 2e-6)])

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.body import ElasticBody, Material
-from fecontact.errors import InputError
-from fecontact.integrate.set_valued import integrate_set_valued
+from fecontact.core.errors import InputError
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.reduction import modal_basis
-from fecontact.statics import static_equilibrium
-from fecontact.system import ContactSystem
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.statics import static_equilibrium
 
 TIMES = np.linspace(0.0, 0.01, 201)
 

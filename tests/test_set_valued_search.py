@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fecontact as fc
-from fecontact.integrate.set_valued import integrate_set_valued
+from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.integrate.trajectory import Status
 
 SIDEWAYS, UPWARDS = [[1.0], [0.0], [0.0]], [[0.0], [1.0], [0.0]]

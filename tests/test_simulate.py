@@ -7,20 +7,20 @@ import pytest
 from meshes_for_tests import rectangle
 from scipy.optimize import brentq
 
-from fecontact.assembled import basis_from_matrices
-from fecontact.basis import ModalBasis
-from fecontact.body import ElasticBody, Material
-from fecontact.errors import AnalysisError, InputError
-from fecontact.integrate.initial import RigidStart, initial_state
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.integrate.initial_state import RigidStart, initial_state
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import ContactState, Status, Trajectory
-from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.reduction import modal_basis
-from fecontact.statics import static_equilibrium
-from fecontact.system import ContactSystem
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.statics import static_equilibrium
 
 RTOL = 1e-6
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
@@ -72,7 +72,7 @@ def test_contact_time_of_uniform_roughness(method, tolerance):
     assert run.energies.imbalance < (BALANCE if method != "BDF" else 10.0 * BALANCE)
 
 
-@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 def test_contact_time_of_a_linear_contact():
     width = 1e-9
     system = mass_in_y(MASS, normal=RoughSurface(C, width, 0.0))
@@ -97,7 +97,7 @@ def test_restitution_of_uniform_roughness(b, restitution):
     assert run.energies.contact_damping[-1] == pytest.approx(lost, rel=2e-5)
 
 
-@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 @pytest.mark.parametrize(("zeta", "restitution"), [
     (0.05, 0.8587581018), (0.1, 0.7440793977), (0.2, 0.5717400276)])
 def test_restitution_of_a_linear_contact(zeta, restitution):
@@ -108,7 +108,7 @@ def test_restitution_of_a_linear_contact(zeta, restitution):
     assert run.energies.imbalance < BALANCE
 
 
-@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 def test_mass_on_an_elastic_stop():
     """Code_Aster SDND101; the load moves the spring's rest to where the stop's force begins."""
     width = 1e-8
@@ -571,7 +571,7 @@ def test_other_errors_in_progress_are_passed_on():
         simulate(oscillator(), 1.0, outputs=3, progress=fail)
 
 
-@pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_a_motion_that_grows_beyond_all_numbers(method):
     rows = np.array([[[0.0], [1.0], [0.0]]])

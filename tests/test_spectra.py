@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fecontact.analysis.quantities import history
+from fecontact.analysis.histories import history
 from fecontact.analysis.spectra import (
     amplitude_spectrum,
     evenly_sampled,
     power_spectral_density,
     spectrogram,
 )
-from fecontact.errors import InputError
+from fecontact.core.errors import InputError
 
 T = np.linspace(0.0, 4.0, 4001)
 

@@ -6,23 +6,23 @@ from meshes_for_tests import rectangle
 from model_for_tests import Model
 from scipy.optimize import brentq, minimize
 
-from fecontact.assembled import basis_from_matrices
-from fecontact.body import ElasticBody, Material
-from fecontact.errors import AnalysisError, ModelWarning
-from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.reduction import modal_basis
-from fecontact.statics import static_equilibrium
-from fecontact.system import ContactSystem
+from fecontact.core.errors import AnalysisError, ModelWarning
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.statics import static_equilibrium
 
 STIFFNESS, R = 10e6, 10e-6
 NORMAL = RoughSurface(STIFFNESS, R, 40.0)
 LENGTH, HEIGHT, THICKNESS = 0.2, 0.02, 0.01
 
 # Presses far through the roughness, where the law is a plain spring.
-deep = pytest.mark.filterwarnings("ignore::fecontact.errors.ModelWarning")
+deep = pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 
 
 def mass_point(**parts):

@@ -10,15 +10,16 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from fecontact import write_basis
-from fecontact.assembled import basis_from_matrices
-from fecontact.errors import InputError
-from fecontact.field import Field
+from fecontact.core.errors import InputError
+from fecontact.core.units import quantity, round_125, suitable_unit
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.output import pvd, store
-from fecontact.output.frames import frame_indices, von_mises
-from fecontact.output.pvd import export_pvd
-from fecontact.output.store import read_case, write_case
-from fecontact.output.units import quantity, round_125, suitable_unit
+from fecontact.output.files import case as store
+from fecontact.output.files import pvd
+from fecontact.output.files.case import read_case, write_case
+from fecontact.output.files.frames import frame_indices, von_mises
+from fecontact.output.files.pvd import export_pvd
+from fecontact.reduction.field import Field
+from fecontact.reduction.from_matrices import basis_from_matrices
 
 LENGTH, HEIGHT = 0.2, 0.02
 

@@ -5,22 +5,22 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from fecontact.body import ElasticBody, Material
-from fecontact.damping import Rayleigh
-from fecontact.errors import FecontactError, InputError, MeshError
-from fecontact.geometry import generate
-from fecontact.integrate.initial import RigidStart
-from fecontact.laws.drive import Load
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.mesh_io import write_mesh
-from fecontact.points import Patch
-from fecontact.reduction import modal_basis
-from fecontact.shapes import Beam, Block, Pendulum
-from fecontact.study import Study
-from fecontact.system import ContactSystem
-from fecontact.templates import TEMPLATES, template
+from fecontact.cli.templates import TEMPLATES, template
+from fecontact.core.errors import FecontactError, InputError, MeshError
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.generate import generate
+from fecontact.fem.mesh_files import write_mesh
+from fecontact.fem.points import Patch
+from fecontact.fem.shapes import Beam, Block, Pendulum
+from fecontact.integrate.initial_state import RigidStart
+from fecontact.laws.excitation import Load
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.damping import Rayleigh
+from fecontact.reduction.reduce_body import modal_basis
+from fecontact.study.study import Study
+from fecontact.system.contact_system import ContactSystem
 
 TINY = """
 gap = 1e-6

@@ -8,9 +8,9 @@ import pytest
 
 from fecontact.cli import execute
 from fecontact.core.docstrings import documented
-from fecontact.laws.names import is_kind, law_names
-from fecontact.study import Study
-from fecontact.study_keys import study_keys
+from fecontact.laws.registry import is_kind, law_names
+from fecontact.study.reference_page import study_keys
+from fecontact.study.study import Study
 
 PAGE = Path(__file__).parents[1] / "docs" / "study.md"
 

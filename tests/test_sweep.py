@@ -10,12 +10,12 @@ import pytest
 from sweep_study import Serial, files_below, is_alive, write_study
 
 from fecontact import Range, Study, read_case, read_table, sweep
-from fecontact.errors import AnalysisError, InputError
-from fecontact.sweeps.batch import UnwritableError, changed
-from fecontact.sweeps.case import Row
-from fecontact.sweeps.shards import Store
-from fecontact.sweeps.summaries import functions_for, summarise
-from fecontact.whole_files import _MARK
+from fecontact.core.atomic_write import _MARK
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.sweep.batch import UnwritableError, changed
+from fecontact.sweep.case import Row
+from fecontact.sweep.store import Store
+from fecontact.sweep.summaries import functions_for, summarise
 
 AXES = {"ground.speed": [1e-3, 2e-3, 4e-3], "friction.static_coefficient": [0.6, 0.8]}
 
@@ -194,7 +194,7 @@ def test_files_of_cases_are_those_of_single_runs(study, tmp_path):
 
 
 def test_bodies_that_change_are_computed_once_each(study, tmp_path, monkeypatch):
-    from fecontact.study_sections import BasisSettings
+    from fecontact.study.sections import BasisSettings
 
     made = []
     original = BasisSettings.basis
@@ -322,7 +322,7 @@ def test_a_full_disk_is_one_sentence_and_finished_cases_stay(study, tmp_path, mo
 
 
 def test_a_case_that_cannot_be_written_stops_the_sweep(study, tmp_path, monkeypatch):
-    from fecontact.output import store
+    from fecontact.output.files import case as store
 
     def full(*_, **__):
         raise OSError(28, "No space left on device")

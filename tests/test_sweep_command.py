@@ -12,12 +12,11 @@ from sweep_study import Serial, write_study
 
 from fecontact import SweepTable, plot_sobol, plot_sweep, read_table, sweep
 from fecontact.cli import execute
-from fecontact.cli import sweeps as command
-from fecontact.errors import InputError
-from fecontact.output import sweep_figures
-from fecontact.sweeps import executors
-from fecontact.sweeps.progress import clock, note
-from fecontact.sweeps.statistics import Estimate, SobolIndices
+from fecontact.cli.commands import sweep as command
+from fecontact.cli.sweep_progress import clock, note
+from fecontact.core.errors import InputError
+from fecontact.sweep import executors, sweep_figures
+from fecontact.sweep.statistics import Estimate, SobolIndices
 
 SWEEP = """
 [sweep]

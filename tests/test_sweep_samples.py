@@ -5,9 +5,9 @@ import pytest
 from scipy import stats
 
 from fecontact import Distribution, Range, SweepSettings
-from fecontact.errors import InputError
-from fecontact.study import Study
-from fecontact.sweeps.samples import frozen, plan
+from fecontact.core.errors import InputError
+from fecontact.study.study import Study
+from fecontact.sweep.plan import frozen, plan
 
 D = Distribution
 

@@ -5,9 +5,9 @@ import pytest
 from scipy import stats
 
 from fecontact import Range, SweepSettings, SweepTable, sobol_indices, statistics
-from fecontact.errors import InputError
-from fecontact.sweeps.samples import plan
-from fecontact.sweeps.statistics import indices_of
+from fecontact.core.errors import InputError
+from fecontact.sweep.plan import plan
+from fecontact.sweep.statistics import indices_of
 
 
 def test_moments_and_quantiles():

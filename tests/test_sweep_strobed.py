@@ -6,8 +6,8 @@ from oscillators import impact_oscillator
 from sweep_study import Serial, files_below
 
 from fecontact import Study, plot_strobed, read_table, strobe, sweep
-from fecontact.errors import InputError
-from fecontact.integrate.initial import RigidStart
+from fecontact.core.errors import InputError
+from fecontact.integrate.initial_state import RigidStart
 
 STUDY = """
 geometry = { shape = "pendulum" }

@@ -10,13 +10,13 @@ import synthetic
 from oscillators import impact_oscillator
 
 from fecontact import RigidStart, simulate
-from fecontact.errors import InputError
+from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.friction import ConstantFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.sweeps.summaries import SUMMARIES, functions_for, since, summarise, unit_of
-from fecontact.system import ContactSystem
+from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.sweep.summaries import SUMMARIES, functions_for, since, summarise, unit_of
+from fecontact.system.contact_system import ContactSystem
 
 V, STIFFNESS, DEPTH, MU = 0.02, 3e5, 4e-5, 0.3
 TURNS = 8  # of the oscillation in the run of 0.02 s

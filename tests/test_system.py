@@ -6,17 +6,17 @@ from meshes_for_tests import rectangle
 from model_for_tests import Model
 
 from fecontact import basis_from_matrices, modal_basis
-from fecontact import contact_kernels as kernels
-from fecontact.basis import ModalBasis
-from fecontact.body import ElasticBody, Material
-from fecontact.contact_energy import POWERS, powers
-from fecontact.errors import InputError
-from fecontact.integrate.initial import RigidStart, initial_state
-from fecontact.laws.drive import Drive, Load
-from fecontact.laws.friction import ExponentialFriction
-from fecontact.laws.ground import Ground
-from fecontact.laws.normal import RoughSurface
-from fecontact.system import ContactSystem
+from fecontact.core.errors import InputError
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.integrate.initial_state import RigidStart, initial_state
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system import kernels as kernels
+from fecontact.system.contact_energy import POWERS, powers
+from fecontact.system.contact_system import ContactSystem
 
 R = 10e-6
 

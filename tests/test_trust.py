@@ -11,7 +11,7 @@ import pytest
 
 import fecontact as fc
 from fecontact.cli import execute
-from fecontact.study import Study
+from fecontact.study.study import Study
 
 LAW = """
 from dataclasses import dataclass

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import pyuff
 
-from fecontact.errors import InputError, MissingLibraryError
-from fecontact.formats.uff import read_uff
-from fecontact.reduction import modal_basis
+from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.reduction.matrix_files.uff import read_uff
+from fecontact.reduction.reduce_body import modal_basis
 
 BLOCK = Path(__file__).parent / "data" / "block.uff"
 NODES = [11, 12, 40]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fecontact import read_uff
-from fecontact.errors import InputError
+from fecontact.core.errors import InputError
 
 DATA = Path(__file__).parent / "data"
 

@@ -27,7 +27,7 @@ from fecontact import (
     sensitivity,
     simulate,
 )
-from fecontact.laws.profile_base import Profile
+from fecontact.laws.ground.profile import Profile
 from fecontact.laws.signatures import ground_profile
 
 UP = np.array([[0.0], [1.0]])
@@ -191,7 +191,7 @@ def test_longest_step_of_set_valued_runs(monkeypatch):
         handed.append(longest)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fecontact.integrate.set_valued.integrate_set_valued", run)
+    monkeypatch.setattr("fecontact.integrate.nonsmooth.driver.integrate_set_valued", run)
     for step in (None, 1e-3, 10.0):
         with pytest.raises(KeyboardInterrupt):
             simulate(thrown(), 1.0, initial=np.zeros(2), method="set-valued", max_step=step)

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
-from fecontact import whole_files
 from fecontact.cli import execute
-from fecontact.errors import InputError
-from fecontact.geometry import Beam, generate
-from fecontact.mesh_io import write_mesh
-from fecontact.output.export import export_csv
-from fecontact.output.hdf5 import new_file
-from fecontact.output.movie import render
-from fecontact.output.probe import rendering_works
-from fecontact.output.pvd import export_pvd
-from fecontact.output.store import read_case, write_case
-from fecontact.whole_files import clear_leftovers, replaced, replaced_folder
+from fecontact.core import atomic_write
+from fecontact.core.atomic_write import clear_leftovers, replaced, replaced_folder
+from fecontact.core.errors import InputError
+from fecontact.fem.generate import Beam, generate
+from fecontact.fem.mesh_files import write_mesh
+from fecontact.output.files.case import read_case, write_case
+from fecontact.output.files.export import export_csv
+from fecontact.output.files.hdf5 import new_file
+from fecontact.output.files.pvd import export_pvd
+from fecontact.output.render.movie import render
+from fecontact.output.render.offscreen import rendering_works
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="locks and limits of Linux")
 
@@ -120,7 +120,7 @@ def test_only_files_are_replaced(tmp_path):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from fecontact.whole_files import replaced, replaced_folder
+from fecontact.core.atomic_write import replaced, replaced_folder
 with (replaced_folder if sys.argv[2] == "folder" else replaced)(Path(sys.argv[1])) as part:
     (part / "x" if part.is_dir() else part).write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -144,8 +144,8 @@ def test_leftovers_of_killed_processes_are_cleared_and_no_others(tmp_path):
         # While it is written, another process neither clears it nor is kept from writing.
         clear_leftovers(tmp_path)
         in_process("import sys; from pathlib import Path; from fecontact import whole_files\n"
-                   "whole_files.clear_leftovers(Path(sys.argv[1]))\n"
-                   "with whole_files.replaced(sys.argv[1] + '/a.txt') as part:\n"
+                   "atomic_write.clear_leftovers(Path(sys.argv[1]))\n"
+                   "with atomic_write.replaced(sys.argv[1] + '/a.txt') as part:\n"
                    "    part.write_text('of another process')", tmp_path)
         assert (tmp_path / "a.txt").read_text() == "of another process"
         part.write_text("whole")
@@ -167,7 +167,7 @@ def test_a_folder_whose_replacing_was_cut_short_comes_back(tmp_path):
             real(source, target)
             os.kill(os.getpid(), signal.SIGKILL)
         os.replace = stop
-        with whole_files.replaced_folder(Path(sys.argv[1])) as part:
+        with atomic_write.replaced_folder(Path(sys.argv[1])) as part:
             (part / "new").write_text("new")
     """
     assert in_process(code, folder, check=False).returncode == -9
@@ -232,10 +232,10 @@ FULL = """
 import resource, sys
 from pathlib import Path
 from synthetic import run
-from fecontact.errors import InputError
-from fecontact.output.export import export_csv, export_mat
-from fecontact.output.plots import plot_history
-from fecontact.output.store import write_case
+from fecontact.core.errors import InputError
+from fecontact.output.files.export import export_csv, export_mat
+from fecontact.output.plots.run import plot_history
+from fecontact.output.files.case import write_case
 trajectory = run(times=50)
 folder, said = Path(sys.argv[1]), []
 for name, write in (("a.vtkhdf", write_case), ("a.csv", export_csv), ("a.mat", export_mat),
@@ -299,7 +299,7 @@ def test_a_full_disk_keeps_the_earlier_run_and_its_checkpoint(small_disk, tmp_pa
     code = """
         import sys
         from fecontact.integrate import checkpoint
-        from fecontact.integrate.control import Run
+        from fecontact.integrate.rodas5p.driver import Run
         from fecontact.cli import execute
         checkpoint.Checkpoint.__dataclass_fields__["period"].default = 0.0
         checkpoint.Checkpoint.__init__.__defaults__ = (0.0,
@@ -340,10 +340,10 @@ def test_an_interrupt_waits_until_the_file_is_whole(tmp_path):
 
 def test_every_atomic_write_is_the_one(tmp_path):
     """No other module renames over a file or makes temporary names of its own."""
-    root = Path(whole_files.__file__).parent
+    root = Path(atomic_write.__file__).parent
     for path in root.rglob("*.py"):
         text = path.read_text()
-        if path.name != "whole_files.py":
+        if path.name != "atomic_write.py":
             assert "os.replace" not in text, path
             assert '".part' not in text, path
 

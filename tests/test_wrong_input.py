@@ -16,9 +16,9 @@ from fecontact import (
     event,
     plot_branches,
 )
-from fecontact.bifurcation.problem import Settings
-from fecontact.errors import AnalysisError
-from fecontact.output.redraw import Choice, point_of
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.cli.plot_kinds import Choice, point_of
+from fecontact.core.errors import AnalysisError
 
 
 def plane(t, y, p):

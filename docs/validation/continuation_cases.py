@@ -20,7 +20,7 @@ from fecontact import (
     switched_branch,
     vector_field,
 )
-from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.continuation.problem import Settings
 
 CASCADE = (("asymmetric orbit", 229.407, 0.480867), ("doubled orbit", 218.210, 0.987949),
            ("twice doubled orbit", 215.966, 1.98675))

@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from pictures import save
 
 from fecontact import Trajectory, periodicity, simulate, window
-from fecontact.output.style import STYLE
+from fecontact.output.plots.style import STYLE
 
 FIGURES = {
     "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop with one slip, which "

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib import rc_context
 from PIL import Image
 
-from fecontact.output.style import STYLE
+from fecontact.output.plots.style import STYLE
 
 LARGEST = 100_000  # bytes
 

@@ -11,9 +11,9 @@ from pictures import save
 from scipy.optimize import brentq
 
 from fecontact import Branch, amplitude
-from fecontact.output.basin_plots import basins_figure
-from fecontact.output.diagrams import branches_figure
-from fecontact.output.style import STYLE
+from fecontact.output.plots.basins import basins_figure
+from fecontact.output.plots.bifurcation_diagram import branches_figure
+from fecontact.output.plots.style import STYLE
 
 SPEED = 3.8  # between the folds
 KINDS = (("Hopf", "Hopf points of steady sliding"), ("fold", "turning points of the orbits"),

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.analysis.contact_motion import ContactMotion, Nodes
-from fecontact.analysis.periods import drive_period
-from fecontact.arguments import require_kind
-from fecontact.errors import AnalysisError, InputError, require_not_negative, require_positive
+from fecontact.analysis.contact_phases import ContactMotion, Nodes
+from fecontact.analysis.periodicity import drive_period
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, InputError, require_not_negative, require_positive
 from fecontact.integrate.trajectory import Trajectory
 
 Array = NDArray[np.float64]

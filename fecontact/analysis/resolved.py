@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import FecontactError
+from fecontact.core.errors import FecontactError
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status, Trajectory
 

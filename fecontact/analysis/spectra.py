@@ -6,8 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.arguments import as_floats
-from fecontact.errors import InputError, require_positive
+from fecontact.core.checks import as_floats
+from fecontact.core.errors import InputError, require_positive
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from numbers import Real
 
 import numpy as np
 
-from fecontact.arguments import require_kind
-from fecontact.errors import InputError
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
 
 

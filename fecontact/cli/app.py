@@ -8,18 +8,18 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from fecontact.cli import about, branches, runs, studies, sweeps
+from fecontact.cli.commands import about, branch, run, study, sweep
 
 COMMANDS: tuple[Callable[..., int | None], ...] = (
-    studies.init,
-    studies.mesh,
-    studies.modes,
-    studies.run,
-    sweeps.sweep,
-    branches.branch,
-    runs.render,
-    runs.plot,
-    runs.export,
+    study.init,
+    study.mesh,
+    study.modes,
+    study.run,
+    sweep.sweep,
+    branch.branch,
+    run.render,
+    run.plot,
+    run.export,
     about.keys,
     about.laws,
     about.demo,

@@ -7,9 +7,9 @@ from typing import Any
 from cyclopts import CycloptsError
 
 from fecontact.cli.app import app
+from fecontact.cli.console import INTERRUPTED, ending_signals, interrupted_code
 from fecontact.cli.printing import complain
-from fecontact.console import INTERRUPTED, ending_signals, interrupted_code
-from fecontact.errors import FecontactError, ModelWarning
+from fecontact.core.errors import FecontactError, ModelWarning
 
 
 def main() -> None:

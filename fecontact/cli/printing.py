@@ -21,7 +21,7 @@ def say(text: str) -> None:
 
 def say_written(*files: Path) -> None:
     """Print which files were written, and their sizes."""
-    from fecontact.report import file_size
+    from fecontact.cli.tables import file_size
 
     for file in files:
         size = f" ({file_size(file)})" if file.is_file() else ""

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from fecontact.errors import InputError
-from fecontact.whole_files import replaced
+from fecontact.core.atomic_write import replaced
+from fecontact.core.errors import InputError
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from math import comb
 
 import numpy as np
 
-from fecontact.compiled import helper
+from fecontact.core.compiled import helper
 
 # Parts of a step are told apart down to this, after so many halvings less two.
 FINEST = 2.0**-46

@@ -15,8 +15,10 @@ ends by no more than the differences of its coefficients from that line, and a n
 the sum over the modes. Of few nodes on flat ground the coefficients themselves cost less.
 """
 
-from fecontact.compiled import helper
-from fecontact.integrate import bernstein, motion, rodas
+from fecontact.core.compiled import helper
+from fecontact.integrate import bernstein
+from fecontact.integrate.rodas5p import dynamics as motion
+from fecontact.integrate.rodas5p import tableau
 from fecontact.laws.signatures import ground_at, signal_at
 
 # Entries of Control.ground: what bounds the ground.
@@ -72,7 +74,7 @@ def set_courses(s, shapes, bounds, before, after, room):  # type: ignore[no-unty
     out, inner = room.courses, room.inner
     n = shapes.shape[1] // 2
     columns = 2 * n if bounds[STEEPEST] == 0.0 else 3 * n
-    rodas.inner_coefficients(before, after, room.dense, inner)
+    tableau.inner_coefficients(before, after, room.dense, inner)
     _project(shapes, before, columns, out[0])
     for k in range(3):
         _project(shapes, inner[k], columns, out[1 + k])

@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.arguments import as_floats, require_kind
-from fecontact.errors import InputError
-from fecontact.forcing import forcing_period
-from fecontact.integrate import stepping
-from fecontact.integrate.control import ENDS, start
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import InputError
 from fecontact.integrate.events import Events, Watched, as_watched
-from fecontact.integrate.initial import Initial, initial_state
+from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.integrate.rodas5p import step_loop
+from fecontact.integrate.rodas5p.driver import ENDS, start
 from fecontact.integrate.simulate import require_max_step
 from fecontact.integrate.trajectory import Status
-from fecontact.system import ContactSystem
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.forcing_period import forcing_period
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def ensemble(
         The start of each run and the times to keep states at, ascending [s]; the first column
         belongs to the initial states.
     initial : (E, size) array, sequence of E, or one for all
-        Initial states, or what :func:`fecontact.integrate.initial.initial_state` takes.
+        Initial states, or what :func:`fecontact.integrate.initial_state.initial_state` takes.
     rtol : float
         Relative tolerance.
     max_step : float, optional
@@ -131,15 +131,15 @@ def ensemble(
             state = starts(index) if last is None else last
             run = start(members[index], state, instants[index], rtol=float(rtol), max_step=max_step,
                         work=False, events=watched)
-            result = stepping.RUNNING
-            while result == stepping.RUNNING:
+            result = step_loop.RUNNING
+            while result == step_loop.RUNNING:
                 if leave[0]:
                     return
                 result = run.advance(100_000)
             states[index, : run.outputs] = run.states[: run.outputs]
             seen[index] = run.events
             status[index], steps[index] = ENDS[result], run.statistics["steps"]
-            last = run.progress.state if result == stepping.FINISHED else None
+            last = run.progress.state if result == step_loop.FINISHED else None
             done[0] += 1
 
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.compiled import CompiledLaw, compile_law
-from fecontact.errors import InputError, choices, nearest
-from fecontact.integrate.watching import EVENT, FIRST_OWN
-from fecontact.system import ContactSystem
+from fecontact.core.compiled import CompiledLaw, compile_law
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.integrate.rodas5p.event_kernels import EVENT, FIRST_OWN
+from fecontact.system.contact_system import ContactSystem
 
 Array = NDArray[np.float64]
 

@@ -7,14 +7,14 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.arguments import require_kind
-from fecontact.errors import AnalysisError, InputError
-from fecontact.integrate import stepping
-from fecontact.integrate.control import ENDS, finish, start
-from fecontact.integrate.initial import Initial, initial_state
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.integrate.rodas5p import step_loop
+from fecontact.integrate.rodas5p.driver import ENDS, finish, start
+from fecontact.integrate.rodas5p.variational import MOVE
 from fecontact.integrate.simulate import output_times, require_max_step
-from fecontact.integrate.variation import MOVE
-from fecontact.system import ContactSystem
+from fecontact.system.contact_system import ContactSystem
 
 Array = NDArray[np.float64]
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
@@ -128,7 +128,7 @@ def sensitivity(
     run = start(system, state, times, rtol=float(rtol), max_step=max_step, work=False,
                 vary=vary, vary_rtol=derivative_rtol)
     result = finish(run)
-    if result != stepping.FINISHED:
+    if result != step_loop.FINISHED:
         raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = {t_end:.9g}: "
                             f"{ENDS[result].value}")
     columns = run.variation.transitions[1:].transpose(0, 2, 1)

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.arguments import as_path
-from fecontact.contact_energy import POWERS
-from fecontact.contact_kernels import PENETRATION
-from fecontact.errors import InputError, choices, nearest
+from fecontact.core.checks import as_path
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.memory import require_memory
 from fecontact.integrate.events import Watched, as_watched
-from fecontact.integrate.initial import Initial, initial_state
+from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.memory import require_memory
-from fecontact.model_limits import warn_of_limits
-from fecontact.system import ContactSystem
+from fecontact.system.contact_energy import POWERS
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import PENETRATION
+from fecontact.system.model_limits import warn_of_limits
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def simulate(
     t_start : float, optional
         Its start [s]; default the end of the run that it continues, else zero.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
-        Where it starts; see :func:`fecontact.integrate.initial.initial_state`.
+        Where it starts; see :func:`fecontact.integrate.initial_state.initial_state`.
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or the times themselves,
         ascending, the first ``t_start``, the last ``t_end``.
@@ -146,7 +146,7 @@ def simulate(
     m = system.basis.modes
     rest: dict[str, Any] = {}
     if method == "Rodas5P":
-        from fecontact.integrate.control import integrate
+        from fecontact.integrate.rodas5p.driver import integrate
 
         run = integrate(system, state, times, rtol=rtol, max_step=max_step, progress=progress,
                         checkpoint=None if checkpoint is None else Path(checkpoint),
@@ -158,8 +158,8 @@ def simulate(
         rest["node_friction_work"] = work[:, len(POWERS) :]
         work = work[:, : len(POWERS)]
     elif method == "set-valued":
-        from fecontact.integrate.scipy_solvers import longest_step
-        from fecontact.integrate.set_valued import integrate_set_valued
+        from fecontact.integrate.nonsmooth.driver import integrate_set_valued
+        from fecontact.integrate.reference.scipy import longest_step
 
         longest = None if max_step is None else longest_step(system, times, max_step)
         found = integrate_set_valued(system, state, times, rtol=rtol, restitution=restitution,
@@ -176,12 +176,12 @@ def simulate(
                 "held_normal_force": found.normal_force,
                 "held_friction_force": found.friction_force}
     elif method == "CVODE":
-        from fecontact.integrate import cvode
+        from fecontact.integrate.reference import cvode
 
         times, states, work, status, statistics = cvode.integrate(
             system, state, times, rtol=rtol, max_step=max_step, progress=progress)
     else:
-        from fecontact.integrate import scipy_solvers
+        from fecontact.integrate.reference import scipy as scipy_solvers
 
         times, states, work, status, statistics = scipy_solvers.integrate(
             system, state, times, method=method, rtol=rtol, max_step=max_step,

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact import contact_kernels as kernels
-from fecontact.contact_energy import POWERS
-from fecontact.errors import InputError
+from fecontact.core.errors import InputError
 from fecontact.integrate.events import Events
-from fecontact.system import ContactSystem
+from fecontact.system import kernels as kernels
+from fecontact.system.contact_energy import POWERS
+from fecontact.system.contact_system import ContactSystem
 
 Array = NDArray[np.float64]
 
@@ -124,7 +124,8 @@ class Trajectory:
     modal_coordinates, modal_velocities : (N, m) arrays
         q and q'.
     work : (N, 8) array
-        Integrals of the powers :data:`fecontact.contact_energy.POWERS` from the first time [J].
+        Integrals of the powers :data:`fecontact.system.contact_energy.POWERS` from the first time
+        [J].
     status : Status
         How the run ended.
     statistics : mapping
@@ -284,7 +285,7 @@ class Trajectory:
         Displacements beyond the body's own size, penetrations beyond a hundred times the height
         of the roughness; :func:`fecontact.simulate` gives them as a ModelWarning each.
         """
-        from fecontact.model_limits import limits_exceeded
+        from fecontact.system.model_limits import limits_exceeded
 
         return limits_exceeded(self.system, self.time, self.states)
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.errors import InputError
-from fecontact.laws.contract import FrictionLaw, NormalLaw
+from fecontact.core.errors import InputError
+from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.cycles import cycle_work
-from fecontact.laws.evaluation import friction_values, memory_values, normal_values
+from fecontact.laws.sampling import friction_values, memory_values, normal_values
 from fecontact.laws.soundness import require_sound
 
 Array = NDArray[np.float64]

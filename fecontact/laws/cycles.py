@@ -4,7 +4,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import f8, i8, kernel, vector
+from fecontact.core.compiled import f8, i8, kernel, vector
 from fecontact.laws.signatures import memory_at
 
 _CYCLES, _STEPS = 6, 1000

@@ -13,8 +13,8 @@ from numba import types
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from fecontact.compiled import CompiledLaw, f8, i8, kernel, matrix, vector
-from fecontact.errors import InputError
+from fecontact.core.compiled import CompiledLaw, f8, i8, kernel, matrix, vector
+from fecontact.core.errors import InputError
 from fecontact.laws.signatures import friction_at
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.compiled import f8, i8, kernel, matrix
+from fecontact.core.compiled import f8, i8, kernel, matrix
 from fecontact.laws.signatures import normal_at
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)

@@ -39,7 +39,7 @@ from typing import Any
 
 from numba import types
 
-from fecontact.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
+from fecontact.core.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
 
 NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
 FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)

@@ -4,10 +4,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from fecontact.compiled import CompiledLaw
-from fecontact.errors import InputError
-from fecontact.laws.contract import FrictionLaw, NormalLaw
-from fecontact.laws.evaluation import friction_values, memory_values, normal_values
+from fecontact.core.compiled import CompiledLaw
+from fecontact.core.errors import InputError
+from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.sampling import friction_values, memory_values, normal_values
 from fecontact.laws.signatures import FRICTION_FORM, MEMORY_FORM, NORMAL_FORM
 
 _NORMAL_PLACES = np.array([(u, v) for u in (-1e-3, 0.0, 1e-9, 1e-6, 1e-4)

@@ -16,7 +16,7 @@ from fecontact import (
     basis_from_matrices,
     vector_field,
 )
-from fecontact.bifurcation.contact_field import contact_field
+from fecontact.bifurcation.fields.contact_field import contact_field
 
 
 def lorenz(t, x, p, out):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from fecontact import Study, read_branch, read_branches, settled_motion
-from fecontact.bifurcation.branch import Status
+from fecontact.bifurcation.continuation.branch import Status
 from fecontact.cli import execute
 
 STUDY = """

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from fecontact import InputError, read_branch, simulate
-from fecontact import branching as module
-from fecontact.bifurcation.observation import motion_of
-from fecontact.branching import follow_branches
+from fecontact.bifurcation import diagram as module
+from fecontact.bifurcation.diagram import follow_branches
+from fecontact.bifurcation.diagram_options import BranchSettings
+from fecontact.bifurcation.orbits.samples import motion_of
 from fecontact.cli import execute
-from fecontact.output.branches import read_branches, write_branches
-from fecontact.study import Study
-from fecontact.study_branch import BranchSettings
+from fecontact.output.files.branches import read_branches, write_branches
+from fecontact.study.study import Study
 
 # The friction oscillator of section 4.3 without excitation, as a block of 5.632 kg.
 STUDY = """

@@ -13,14 +13,14 @@ from systems_for_bifurcations import (
 )
 from test_continuation import CUBIC
 
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.follow import follow
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
-from fecontact.bifurcation.problem import Settings
-from fecontact.output.stability_plots import plot_eigenvalues
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.orbits.branches import orbits_from_hopf, orbits_from_motion
+from fecontact.output.plots.stability import plot_eigenvalues
 
 CHANGES = {"fold": {-1, 1}, "branch point": {-1, 0, 1}, "period doubling": {-1, 1},
            "Hopf": {-2, 2}, "Neimark-Sacker": {-2, 2}}

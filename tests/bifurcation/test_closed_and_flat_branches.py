@@ -5,14 +5,18 @@ import pytest
 from systems_for_bifurcations import two_mass_field, two_mass_jacobian
 
 from fecontact import read_branch, write_branch
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.curves import hopf_curve
-from fecontact.bifurcation.equilibria import find_equilibrium
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
-from fecontact.bifurcation.problem import Settings
-from fecontact.branch_results import special_table
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.equilibria.codim2 import hopf_curve
+from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.orbits.branches import (
+    orbits_beyond,
+    orbits_from_hopf,
+    orbits_from_motion,
+)
+from fecontact.cli.commands.branch_results import special_table
 
 
 def island(t, x, p, out):

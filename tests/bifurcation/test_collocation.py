@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 from collocation_fields import settled
 
-from fecontact.bifurcation import elimination
-from fecontact.bifurcation.collocation import Collocation
-from fecontact.bifurcation.continuation import continuation
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.interpolation import (
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.pseudo_arclength import continuation
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.linalg import condensation as elimination
+from fecontact.bifurcation.orbits.branches import orbits_from_motion
+from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.mesh import (
     equidistributed,
     extremes,
     interpolate,
     node_times,
     rule,
 )
-from fecontact.bifurcation.orbit_starts import corrected, from_samples
-from fecontact.bifurcation.orbits import orbits_from_motion
-from fecontact.bifurcation.problem import Settings
-from fecontact.errors import AnalysisError, InputError
+from fecontact.bifurcation.orbits.starts import corrected, from_samples
+from fecontact.core.errors import AnalysisError, InputError
 
 
 def stuart_landau(t, x, p, out):

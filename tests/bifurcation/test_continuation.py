@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fecontact import write_branch
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.continuation import Problem, Settings, continuation
-from fecontact.bifurcation.follow import follow
-from fecontact.errors import AnalysisError, InputError
-from fecontact.output.branches import read_branch
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.pseudo_arclength import Problem, Settings, continuation
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.output.files.branches import read_branch
 
 
 class Linear:

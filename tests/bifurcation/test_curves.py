@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from systems_for_bifurcations import friction_slope, lorenz_field, two_mass_field, two_mass_jacobian
 
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.curves import fold_curve, hopf_curve
-from fecontact.bifurcation.equilibria import Equilibrium
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.errors import InputError
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.equilibria.codim2 import fold_curve, hopf_curve
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.core.errors import InputError
 
 BOX = {"b": (-2.0, 2.0), "c": (-2.0, 2.0)}
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from systems_for_bifurcations import mode_coupling, two_mass_field
 
-from fecontact.bifurcation.branch import Branch, BranchPoint
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.stability_map import stability_map
-from fecontact.errors import InputError
-from fecontact.output.diagrams import branches_figure, plot_branches
-from fecontact.output.stability_plots import (
+from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.equilibria.stability_map import stability_map
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.core.errors import InputError
+from fecontact.output.plots.bifurcation_diagram import branches_figure, plot_branches
+from fecontact.output.plots.stability import (
     eigenvalues_figure,
     plot_eigenvalues,
     plot_stability_map,

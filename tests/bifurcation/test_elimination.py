@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fecontact.bifurcation.bordered import Border, Bordered
-from fecontact.bifurcation.elimination import condense, factors_for
-from fecontact.bifurcation.interpolation import rule
-from fecontact.bifurcation.transitions import transitions
+from fecontact.bifurcation.linalg.bordered import Border, Bordered
+from fecontact.bifurcation.linalg.condensation import condense, factors_for
+from fecontact.bifurcation.linalg.transition_matrices import transitions
+from fecontact.bifurcation.orbits.mesh import rule
 
 
 def random_system(intervals, degree, states, parameters, seed=0):

@@ -25,11 +25,11 @@ from fecontact import (
     simulate,
     vector_field,
 )
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.equilibria import find_equilibrium
-from fecontact.bifurcation.stability_map import stability_map
-from fecontact.errors import AnalysisError, InputError
-from fecontact.laws.signals import Constant
+from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
+from fecontact.bifurcation.equilibria.stability_map import stability_map
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.laws.signals.harmonic import Constant
 
 
 def test_lorenz_equilibria():

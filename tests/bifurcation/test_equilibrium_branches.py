@@ -22,12 +22,12 @@ from fecontact import (
     basis_from_matrices,
     vector_field,
 )
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.continuation import Settings
-from fecontact.bifurcation.equilibria import find_equilibrium
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch, switched_branch
-from fecontact.errors import AnalysisError, InputError
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.pseudo_arclength import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch, switched_branch
+from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.core.errors import AnalysisError, InputError
 
 
 def reactor(t, x, p, out):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fecontact.bifurcation.collocation import Collocation
-from fecontact.bifurcation.floquet import Floquet
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.interpolation import node_times
-from fecontact.bifurcation.periodic_schur import eigenvalues_of_product
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
+from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.floquet import Floquet
+from fecontact.bifurcation.orbits.mesh import node_times
 
 
 def planted(multipliers, factors, seed=1):

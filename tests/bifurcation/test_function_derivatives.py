@@ -11,11 +11,11 @@ import numba
 import numpy as np
 import pytest
 
-from fecontact.bifurcation.equilibria import find_equilibrium
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.orbits import orbits_from_hopf
-from fecontact.errors import AnalysisError, InputError
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.orbits.branches import orbits_from_hopf
+from fecontact.core.errors import AnalysisError, InputError
 
 size_of = numba.njit(lambda x: abs(x))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fecontact import ContactEvents, doubled_by_shooting, simulate, strobe
-from fecontact.bifurcation.problem import Settings
+from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.integrate.sensitivity import sensitivity
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))

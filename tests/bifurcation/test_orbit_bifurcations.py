@@ -5,18 +5,18 @@ import pytest
 from collocation_fields import lorenz_field, settled, two_masses_field
 
 from fecontact import write_branch
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.orbits import (
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.orbits.branches import (
     orbits_beyond,
     orbits_from_hopf,
     orbits_from_motion,
     restored,
 )
-from fecontact.bifurcation.problem import Settings
-from fecontact.errors import InputError
-from fecontact.output.branches import read_branch
+from fecontact.core.errors import InputError
+from fecontact.output.files.branches import read_branch
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from collocation_fields import two_masses_field
 
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.orbit_curves import orbit_curve
-from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
-from fecontact.bifurcation.problem import Settings
-from fecontact.errors import InputError
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.orbits.branches import orbits_from_hopf, orbits_from_motion
+from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.core.errors import InputError
 
 
 def first_branch(**changes):

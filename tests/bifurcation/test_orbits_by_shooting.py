@@ -16,21 +16,25 @@ from systems_for_bifurcations import (
 )
 
 from fecontact import simulate, strobe
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.observation import motion_of, observe
-from fecontact.bifurcation.orbit_output import orbit_history
-from fecontact.bifurcation.orbits import orbits_beyond, orbits_from_hopf, orbits_from_motion
-from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.settled import settled_motion
-from fecontact.bifurcation.shooting_branch import orbits_by_shooting
-from fecontact.bifurcation.shooting_switch import (
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.orbits.branches import (
+    orbits_beyond,
+    orbits_from_hopf,
+    orbits_from_motion,
+)
+from fecontact.bifurcation.orbits.from_run import settled_motion
+from fecontact.bifurcation.orbits.orbit_output import orbit_history
+from fecontact.bifurcation.orbits.period_doubling import (
     doubled_by_shooting,
     hopf_orbits_by_shooting,
     restored_shooting,
 )
-from fecontact.errors import AnalysisError, InputError
+from fecontact.bifurcation.orbits.samples import motion_of, observe
+from fecontact.bifurcation.orbits.shooting_branch import orbits_by_shooting
+from fecontact.core.errors import AnalysisError, InputError
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 

@@ -8,14 +8,14 @@ from systems_for_bifurcations import belt
 from test_continuation import Plane
 
 from fecontact import simulate
-from fecontact.bifurcation.branch import Status
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.follow import follow
-from fecontact.bifurcation.orbits import orbits_from_hopf
-from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.shooting_branch import orbits_by_shooting
-from fecontact.errors import InputError
+from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.orbits.branches import orbits_from_hopf
+from fecontact.bifurcation.orbits.shooting_branch import orbits_by_shooting
+from fecontact.core.errors import InputError
 from fecontact.integrate.sensitivity import sensitivity
 
 MASS = 5.632

@@ -8,15 +8,15 @@ from collocation_fields import settled, two_masses_field
 from test_orbit_bifurcations import moebius, torus
 
 from fecontact import write_branch
-from fecontact.bifurcation import sharpening
-from fecontact.bifurcation.branch import Branch
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.function_field import vector_field
-from fecontact.bifurcation.orbit_normal_forms import verdict
-from fecontact.bifurcation.orbits import orbits_from_hopf, orbits_from_motion
-from fecontact.bifurcation.problem import Settings
-from fecontact.branch_results import branches_csv, special_table
-from fecontact.output.branches import read_branch
+from fecontact.bifurcation.continuation import sharpening
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation.orbits.branches import orbits_from_hopf, orbits_from_motion
+from fecontact.bifurcation.orbits.normal_forms import verdict
+from fecontact.cli.commands.branch_results import branches_csv, special_table
+from fecontact.output.files.branches import read_branch
 
 
 def circle_branch(function, c, intervals):

@@ -5,16 +5,16 @@ import pytest
 from systems_for_bifurcations import belt, lorenz_field, two_mass_field
 
 from fecontact import simulate
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.bifurcation.continuation import continuation
-from fecontact.bifurcation.equilibrium_branch import equilibrium_branch
-from fecontact.bifurcation.interpolation import interpolate
-from fecontact.bifurcation.orbit_output import quantity_range
-from fecontact.bifurcation.orbits import orbits_from_hopf, restored
-from fecontact.bifurcation.problem import Settings
-from fecontact.bifurcation.shooting import shooting_from
-from fecontact.bifurcation.shooting_branch import orbits_by_shooting
-from fecontact.errors import AnalysisError, InputError
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.pseudo_arclength import continuation
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.orbits.branches import orbits_from_hopf, restored
+from fecontact.bifurcation.orbits.mesh import interpolate
+from fecontact.bifurcation.orbits.orbit_output import quantity_range
+from fecontact.bifurcation.orbits.shooting import shooting_from
+from fecontact.bifurcation.orbits.shooting_branch import orbits_by_shooting
+from fecontact.core.errors import AnalysisError, InputError
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fecontact import contact_field, sensitivity, simulate
-from fecontact.errors import InputError
+from fecontact.core.errors import InputError
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 

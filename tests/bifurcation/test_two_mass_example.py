@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 import two_mass_friction as example
 
 from fecontact import simulate
-from fecontact.bifurcation.branch import Status
+from fecontact.bifurcation.continuation.branch import Status
 
 
 def test_table_and_attractors():

@@ -34,8 +34,8 @@ from fecontact import (
     stability_map,
     vector_field,
 )
-from fecontact.bifurcation.contact_field import contact_field
-from fecontact.errors import AnalysisError, InputError
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.core.errors import AnalysisError, InputError
 
 PLACES = np.random.default_rng(4).normal(size=(7, 3)) * 5.0
 TIMES = np.zeros(7)

@@ -12,9 +12,9 @@ import pyuff
 import scipy.io
 import scipy.sparse as sp
 
-from fecontact.body import ElasticBody, Material
-from fecontact.mesh import Mesh
-from fecontact.reduction import modal_basis
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.mesh import Mesh
+from fecontact.reduction.reduce_body import modal_basis
 
 HERE = Path(__file__).parent
 COLUMNS, ROWS, LENGTH, HEIGHT = 4, 2, 0.1, 0.04

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import types
 
-from fecontact.compiled import f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import f8, i8, kernel, matrix, vector
 from fecontact.laws.signatures import friction_at, memory_at
 
 SPEEDS = np.geomspace(1e-4, 1e5, 55)

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from scipy.integrate import quad
 
-from fecontact.compiled import i8, kernel, matrix, vector
+from fecontact.core.compiled import i8, kernel, matrix, vector
 from fecontact.laws.signatures import normal_at
 
 

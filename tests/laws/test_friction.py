@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from fecontact.assembled import basis_from_matrices
-from fecontact.errors import InputError
-from fecontact.laws.friction import ExponentialFriction
+from fecontact.core.errors import InputError
+from fecontact.laws.friction.stribeck import ExponentialFriction
+from fecontact.reduction.from_matrices import basis_from_matrices
 
 BOOK = (0.8, 0.55, 1000.0, 1e6)
 
@@ -70,9 +70,9 @@ def test_friction_takes_energy():
 
 
 def test_compiled_function_agrees_with_the_plain_one():
-    from fecontact.laws.ground import Ground
-    from fecontact.laws.normal import RoughSurface
-    from fecontact.system import ContactSystem
+    from fecontact.laws.ground.ground import Ground
+    from fecontact.laws.normal.rough_surface import RoughSurface
+    from fecontact.system.contact_system import ContactSystem
 
     rows = np.zeros((1, 3, 2))
     rows[0, 0, 0] = rows[0, 1, 1] = 1.0

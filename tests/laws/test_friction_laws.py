@@ -10,17 +10,17 @@ from friction_conformance import check_friction_law
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fecontact.errors import InputError
-from fecontact.laws.contract import PerNode, Positive, Range
-from fecontact.laws.friction import (
+from fecontact.core.errors import InputError
+from fecontact.laws.base import PerNode, Positive, Range
+from fecontact.laws.friction.base import MemorylessFriction
+from fecontact.laws.friction.friction_minimum import CubicFriction, GalvanettoFriction
+from fecontact.laws.friction.stribeck import (
     ConstantFriction,
     ExponentialFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
 )
-from fecontact.laws.friction_base import MemorylessFriction
-from fecontact.laws.friction_minimum import CubicFriction, GalvanettoFriction
 
 SMOOTHINGS = ("arctan", "tanh", "square-root")
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fecontact.errors import InputError
-from fecontact.laws.drive import Drive, Load, PointLoad
-from fecontact.laws.fourier_series import FourierSeries
-from fecontact.laws.ground import Ground, HarmonicSpeed, SpeedRamp
-from fecontact.laws.profiles import Flat, Sine
-from fecontact.laws.random_roughness import RandomRoughness
-from fecontact.laws.signals import Constant, Harmonic, Harmonics, Sweep
+from fecontact.core.errors import InputError
+from fecontact.laws.excitation import Drive, Load, PointLoad
+from fecontact.laws.ground.fourier_series import FourierSeries
+from fecontact.laws.ground.ground import Ground, HarmonicSpeed, SpeedRamp
+from fecontact.laws.ground.profiles import Flat, Sine
+from fecontact.laws.ground.random_roughness import RandomRoughness
+from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics, Sweep
 
 
 def profile(ground, xi):

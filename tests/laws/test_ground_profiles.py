@@ -9,14 +9,14 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from fecontact.errors import InputError
-from fecontact.laws.fourier_series import FourierSeries
-from fecontact.laws.ground import Ground
-from fecontact.laws.profile_base import Profile
-from fecontact.laws.profiles import Flat, Sine
-from fecontact.laws.random_roughness import RandomRoughness
+from fecontact.core.errors import InputError
+from fecontact.laws.ground.fourier_series import FourierSeries
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.ground.measured_profile import Trace
+from fecontact.laws.ground.profile import Profile
+from fecontact.laws.ground.profiles import Flat, Sine
+from fecontact.laws.ground.random_roughness import RandomRoughness
 from fecontact.laws.signatures import ground_profile
-from fecontact.laws.trace import Trace
 
 RNG = np.random.default_rng(3)
 TRACE_X = np.cumsum(RNG.uniform(0.5e-4, 2e-4, 40)) - 1e-3

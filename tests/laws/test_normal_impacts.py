@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fecontact.laws.normal import RoughSurface
-from fecontact.laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
-from fecontact.laws.normal_stop import LinearContact, TwoSidedStop
+from fecontact.laws.normal.linear import LinearContact, TwoSidedStop
+from fecontact.laws.normal.power import PowerContact, PowerLawContact, RestitutionContact
+from fecontact.laws.normal.rough_surface import RoughSurface
 
 
 def impact(law, mass, speed):

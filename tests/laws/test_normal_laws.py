@@ -11,13 +11,18 @@ import pytest
 from normal_conformance import check_normal_law, force
 from scipy.integrate import quad
 
-from fecontact.errors import InputError
-from fecontact.laws.contract import NormalLaw, PerNode
-from fecontact.laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
-from fecontact.laws.normal_measured import MeasuredSurface
-from fecontact.laws.normal_power import PowerContact, PowerLawContact, RestitutionContact
-from fecontact.laws.normal_statistical import ExponentialContact, GreenwoodWilliamson
-from fecontact.laws.normal_stop import LinearContact, PrescribedForce, TwoSidedStop
+from fecontact.core.errors import InputError
+from fecontact.laws.base import NormalLaw, PerNode
+from fecontact.laws.normal.linear import LinearContact, PrescribedForce, TwoSidedStop
+from fecontact.laws.normal.measured_surface import MeasuredSurface
+from fecontact.laws.normal.power import PowerContact, PowerLawContact, RestitutionContact
+from fecontact.laws.normal.rough_surface import (
+    CosineSurface,
+    GaussianSurface,
+    ParabolicSurface,
+    RoughSurface,
+)
+from fecontact.laws.normal.statistical import ExponentialContact, GreenwoodWilliamson
 from fecontact.laws.potential import stored_energy
 from fecontact.laws.signatures import normal_law
 from fecontact.laws.soundness import require_sound

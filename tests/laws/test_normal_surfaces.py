@@ -8,10 +8,15 @@ import pytest
 from normal_conformance import force
 from scipy.integrate import quad
 
-from fecontact.errors import InputError
-from fecontact.laws.normal import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
-from fecontact.laws.normal_measured import MeasuredSurface
-from fecontact.laws.normal_stop import LinearContact
+from fecontact.core.errors import InputError
+from fecontact.laws.normal.linear import LinearContact
+from fecontact.laws.normal.measured_surface import MeasuredSurface
+from fecontact.laws.normal.rough_surface import (
+    CosineSurface,
+    GaussianSurface,
+    ParabolicSurface,
+    RoughSurface,
+)
 
 R = 5e-6
 TRACE = np.random.default_rng(5).normal(size=400).cumsum() * 1e-7

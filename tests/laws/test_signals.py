@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fecontact.errors import InputError
-from fecontact.laws.signals import (
+from fecontact.core.errors import InputError
+from fecontact.laws.signals.harmonic import (
     Constant,
     Harmonic,
     Harmonics,

@@ -1,0 +1,101 @@
+"""Histories of a run by name: displacement x of B, friction force of node 3, total normal force."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+Point = str | int | tuple[float, float]
+
+_OF_POINTS = {"displacement": "m", "velocity": "m/s"}
+_OF_NODES = {"normal_force": "N", "friction_force": "N", "penetration": "m",
+             "penetration_rate": "m/s", "slip_velocity": "m/s", "pressure": "N/m",
+             "friction_work": "J"}
+_TOTALS = {"total_normal_force": "normal_force", "total_friction_force": "friction_force",
+           "total_friction_work": "friction_work"}
+_AXES = {"x": 0, "y": 1, "phi": 2}
+
+QUANTITIES = (*_OF_POINTS, *_OF_NODES, *_TOTALS)
+
+
+class History(NamedTuple):
+    """One quantity of a run over its output times.
+
+    values : (N,)
+    unit : SI unit
+    title : for people, ``velocity x of B``
+    """
+
+    values: Array
+    unit: str
+    title: str
+
+
+def history(
+    trajectory: Trajectory, quantity: str = "displacement", point: Point = "B", axis: str = "x"
+) -> History:
+    """A quantity of a run at one point over time.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    quantity : str
+        'displacement' or 'velocity' of any point; 'normal_force', 'friction_force',
+        'penetration', 'penetration_rate', 'slip_velocity', 'pressure' or 'friction_work' of a
+        contact node; 'total_normal_force', 'total_friction_force' or 'total_friction_work' of all.
+    point : str, int or (x, y)
+        As for :meth:`Trajectory.displacement`.
+    axis : 'x', 'y' or 'phi'
+        Of displacements and velocities: along the ground, away from it, or the rotation.
+
+    Raises
+    ------
+    InputError
+        For a quantity, a point or an axis that does not exist, and for a quantity of contact nodes
+        at a point that is none.
+    """
+    require_kind("history", Trajectory, trajectory=trajectory)
+    if quantity not in QUANTITIES:
+        raise InputError(f"quantity = {quantity!r} is not known{nearest(str(quantity), QUANTITIES)}"
+                         f"; choose from {choices(QUANTITIES)}.")
+    title = quantity.replace("_", " ")
+    if quantity in _TOTALS:
+        name = _TOTALS[quantity]
+        return History(getattr(trajectory, name).sum(axis=1), _OF_NODES[name], title)
+    if quantity in _OF_NODES:
+        if isinstance(point, bool) or not isinstance(point, int | np.integer):
+            raise InputError(f"The {title} is one of contact nodes, not of point = {point!r}; give "
+                             f"the number of a node, from 0 to "
+                             f"{trajectory.system.basis.contact_nodes - 1}.")
+        node = trajectory.system.basis.point_index(int(point)) - 2
+        return History(getattr(trajectory, quantity)[:, node], _OF_NODES[quantity],
+                       f"{title} of {point_name(point)}")
+    motion = getattr(trajectory, quantity)(point)
+    if axis not in _AXES or _AXES[axis] >= motion.shape[1]:
+        raise InputError(f"axis = {axis!r} is not one of {point_name(point)}; choose from "
+                         f"{choices(list(_AXES)[: motion.shape[1]])}.")
+    unit = _OF_POINTS[quantity]
+    return History(motion[:, _AXES[axis]], unit.replace("m", "rad") if axis == "phi" else unit,
+                   f"{title} {axis} of {point_name(point)}")
+
+
+def usual_axis(system: ContactSystem) -> str:
+    """Axis in which a system moves most: y where only this is driven, else x."""
+    drive = system.drive
+    return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"
+
+
+def point_name(point: Point) -> str:
+    """A point for people: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
+    if isinstance(point, str):
+        return point
+    if isinstance(point, int | np.integer):
+        return f"contact node {point}"
+    return f"({point[0]:g}, {point[1]:g}) m"

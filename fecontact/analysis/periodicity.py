@@ -1,0 +1,266 @@
+"""Periodic or not: states once per drive period, and the number of periods of a motion."""
+
+from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, require_positive
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+_LEAST_CHECKS = 8  # returns that must agree before a motion is called periodic
+
+
+def drive_period(system: ContactSystem) -> float:
+    """Period of the drive at B [s]; InputError if it has none."""
+    frequency = system.drive.frequency_hz
+    if not frequency > 0.0:
+        raise InputError("The drive of the system does not repeat, so it has no period; give the "
+                         "period.")
+    return 1.0 / frequency
+
+
+@dataclass(frozen=True, eq=False)
+class Strobe:
+    """States of a motion, once per period.
+
+    Attributes
+    ----------
+    time : (k,) array
+        [s].
+    states : (k, 2 m + n s) array
+        y = [q, q', z].
+    period : float
+        [s].
+    """
+
+    time: Array
+    states: Array
+    period: float
+
+
+@dataclass(frozen=True)
+class Periodicity:
+    """What :func:`count_periods` found.
+
+    Attributes
+    ----------
+    periods : int or None
+        Number of drive periods after which the motion repeats; None if it does not.
+    misfit : float
+        Largest difference between points that many periods apart (those of the best number
+        tried, if none fits), relative to the size of the attractor.
+    settled : bool
+        False if the motion is still approaching, or leaving, one of fewer periods: then
+        ``periods`` is None, and a longer run will tell.
+    """
+
+    periods: int | None
+    misfit: float
+    settled: bool = True
+
+
+def strobed_states(
+    trajectory: Trajectory,
+    *,
+    period: float | None = None,
+    phase: float = 0.0,
+    start: float | None = None,
+) -> Strobe:
+    """States of a run once per period, at the times ``(k + phase) period``.
+
+    Between output times they are those of the cubic that has the states and their rates at both
+    ends; a run whose outputs hit these times gives its states as they are.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    period : float, optional
+        [s]; that of the drive by default.
+    phase : float
+        Part of the period, 0 to 1, counted from t = 0.
+    start : float, optional
+        Transients before this time are left out [s]; the middle of the run by default.
+
+    Raises
+    ------
+    InputError
+        If the system has no drive and no period is given, for values out of range, or if the run
+        ends before.
+    """
+    require_kind("strobed_states", Trajectory, trajectory=trajectory)
+    system, t = trajectory.system, trajectory.time
+    if period is None:
+        period = drive_period(system)
+    require_positive("strobed_states", period=period)
+    if not 0.0 <= phase <= 1.0:
+        raise InputError(f"strobed_states: phase = {phase!r} must be from 0 to 1.")
+    begin = _start(trajectory, start)
+    tiny = 1e-9 * period
+    first = int(np.ceil((begin - tiny) / period - phase))
+    last = int(np.floor((t[-1] + tiny) / period - phase))
+    if last < first:
+        raise InputError(f"The run ends at {t[-1]:g} s, before a period of {period:g} s is over "
+                         f"after {begin:g} s; run it for longer.")
+    times = np.clip((np.arange(first, last + 1) + phase) * period, t[0], t[-1])
+    interval = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+    step = t[interval + 1] - t[interval]
+    part = (times - t[interval]) / step
+    states = trajectory.states
+    points = np.empty((len(times), states.shape[1]))
+    for k, (i, s, h) in enumerate(zip(interval, part, step, strict=True)):
+        if min(s, 1.0 - s) * h <= tiny:
+            points[k] = states[i if s < 0.5 else i + 1]
+            continue
+        y0, y1 = states[i], states[i + 1]
+        r0, r1 = h * system.rhs(t[i], y0), h * system.rhs(t[i + 1], y1)
+        rise = y1 - y0
+        points[k] = y0 + s * (r0 + s * ((3.0 * rise - 2.0 * r0 - r1)
+                                        + s * (r0 + r1 - 2.0 * rise)))
+    return Strobe(times, points, period)
+
+
+def count_periods(
+    points: ArrayLike, scale: ArrayLike, *, largest: int = 16, tolerance: float = 2e-3
+) -> Periodicity:
+    """Number of steps after which a sequence of points repeats.
+
+    The smallest k for which ``|x_(i+k) - x_i| <= tolerance scale`` holds in every component for
+    the last returns, at least 8 and at least 2 k of them. If the difference at a divisor of k
+    still shrinks or grows from return to return, the sequence is on its way: slowly to an orbit
+    of fewer steps, or away from it.
+
+    Parameters
+    ----------
+    points : (N, d) array
+        States once per period, transients cut off; or (N,) of one quantity.
+    scale : float or (d,) array
+        Size of the attractor in each component: of the whole motion, not of these points alone,
+        which coincide for a motion of one period.
+    largest : int
+        Largest number of periods tried; ``2 largest + largest`` points are needed.
+    tolerance : float
+        Relative to the scale.
+
+    Raises
+    ------
+    InputError
+        For too few points, points that are not finite, or values out of range.
+    """
+    x = np.asarray(points, dtype=float)
+    x = x[:, None] if x.ndim == 1 else x
+    size = np.broadcast_to(np.asarray(scale, dtype=float), x.shape[-1:])
+    require_positive("count_periods", tolerance=tolerance)
+    if isinstance(largest, bool) or not isinstance(largest, Integral) or largest < 1:
+        raise InputError(f"count_periods: largest = {largest!r} must be a whole number above zero.")
+    if x.ndim != 2 or not np.isfinite(x).all() or not (size > 0.0).all():
+        raise InputError("count_periods: points must be finite, of shape (N,) or (N, d), and "
+                         "scale above zero.")
+    needed = largest + max(2 * largest, _LEAST_CHECKS)
+    if len(x) < needed:
+        raise InputError(f"count_periods: {len(x)} points cannot show {largest} periods; "
+                         f"{needed} are needed.")
+    misfits = np.array([_returns(x / size, k).max() for k in range(1, largest + 1)])
+    fitting = np.flatnonzero(misfits <= tolerance)
+    if not len(fitting):
+        return Periodicity(None, float(misfits.min()))
+    periods = int(fitting[0]) + 1
+    misfit = float(misfits[periods - 1])
+    for divisor in range(1, periods + 1):
+        if periods % divisor == 0 and _drifts(x / size, divisor, periods, misfit, tolerance):
+            return Periodicity(None, misfit, settled=False)
+    return Periodicity(periods, misfit)
+
+
+def periodicity(
+    trajectory: Trajectory,
+    *,
+    period: float | None = None,
+    start: float | None = None,
+    largest: int = 16,
+    tolerance: float = 2e-3,
+) -> Periodicity:
+    """Number of drive periods after which a run repeats, or None.
+
+    Compares displacements and velocities of B and the contact nodes once per period; each
+    tolerance is relative to the range that the quantity has in the run after ``start``.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        A run over at least ``3 largest`` periods after ``start``, with at least eight outputs per
+        period, from which the size of the attractor is taken.
+    period, start
+        As for :func:`strobed_states`.
+    largest, tolerance
+        As for :func:`count_periods`.
+
+    Raises
+    ------
+    InputError
+        As :func:`strobed_states` and :func:`count_periods`, and for too few outputs per period.
+    """
+    require_kind("periodicity", Trajectory, trajectory=trajectory)
+    basis = trajectory.system.basis
+    found = strobed_states(trajectory, period=period, start=start)
+    late = trajectory.time >= _start(trajectory, start)
+    if np.count_nonzero(late) < 8 * (len(found.time) - 1):
+        raise InputError(f"The run has {np.count_nonzero(late)} outputs in {len(found.time) - 1} "
+                         f"periods, too few to show the size of the motion; give it at least "
+                         f"eight per period.")
+    m = basis.modes
+    points = [0, *range(2, 2 + basis.contact_nodes)]
+    rows = basis.T[points, :2].reshape(-1, m)
+
+    def observed(states: Array) -> Array:
+        return np.hstack([states[:, :m] @ rows.T, states[:, m : 2 * m] @ rows.T])
+
+    size = np.ptp(observed(trajectory.states[late]), axis=0)
+    # What does not move, or only by a billionth of what does, has no size to be compared with.
+    halves = np.split(size, 2)
+    moves = np.concatenate([half > 1e-9 * half.max(initial=0.0) for half in halves])
+    if not moves.any():
+        return Periodicity(1, 0.0)
+    return count_periods(observed(found.states)[:, moves], size[moves], largest=largest,
+                         tolerance=tolerance)
+
+
+def _start(trajectory: Trajectory, start: float | None) -> float:
+    t = trajectory.time
+    if start is None:
+        return 0.5 * float(t[0] + t[-1])
+    if not t[0] <= start < t[-1]:
+        raise InputError(f"start = {start!r} must be a time of the run, from {t[0]:g} s to below "
+                         f"{t[-1]:g} s.")
+    return float(start)
+
+
+def _returns(x: Array, k: int) -> Array:
+    """Largest component of the differences of the last points k apart."""
+    checks = max(2 * k, _LEAST_CHECKS)
+    return np.asarray(np.abs(x[-checks:] - x[-checks - k : -k]).max(axis=1))
+
+
+def _drifts(x: Array, divisor: int, periods: int, misfit: float, tolerance: float) -> bool:
+    """Whether the differences of points ``divisor`` apart shrink or grow steadily.
+
+    Those below the tolerance by a factor of twenty do not count: errors of the integrator, which
+    orbits that all but graze the ground amplify.
+    """
+    window = max(2 * max(2 * periods, _LEAST_CHECKS), len(x) // 2)
+    distance = np.abs(x[divisor:] - x[:-divisor]).max(axis=1)[-window:]
+    half = len(distance) // 2
+    early, late = (float(distance[part].max()) for part in (slice(None, half), slice(half, None)))
+    if max(early, late) < 0.05 * tolerance:
+        return False
+    if divisor == periods:
+        # Below the tolerance, only growth shows that the motion is not the one it seems to be.
+        return late > 2.0 * early
+    # Those of an orbit of more periods vary by no more than the orbit misses itself.
+    return abs(late - early) > 0.02 * max(early, late) + 2.0 * misfit

@@ -1,0 +1,247 @@
+"""Basins of attraction: to which motion a start on a plane of initial states leads."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices
+from fecontact.integrate.ensemble import ensemble, strobe
+from fecontact.integrate.events import Crossing
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A direction in the space of initial states: one displacement or velocity of a point.
+
+    Parameters
+    ----------
+    point : str or int
+        'B', 'C' or a further named point; a contact node by its number from 0.
+    axis : 'x', 'y' or 'phi'
+        Along the ground, away from it, counter-clockwise.
+    of : 'displacement' or 'velocity'
+        Which of them [m], [rad], [m/s], [rad/s].
+
+    Raises
+    ------
+    InputError
+        For other names.
+    """
+
+    point: str | int
+    axis: Literal["x", "y", "phi"]
+    of: Literal["displacement", "velocity"] = "displacement"
+
+    def __post_init__(self) -> None:
+        for name, names in (("axis", ("x", "y", "phi")), ("of", ("displacement", "velocity"))):
+            value = getattr(self, name)
+            if value not in names:
+                raise InputError(f"Axis: {name} = {value!r} must be one of {choices(names)}.")
+
+    def row(self, system: ContactSystem) -> Array:
+        """The quantity as a row (size,) that acts on states."""
+        return Crossing(self.point, self.axis, of=self.of).row(system)[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """A motion that others settle on.
+
+    Attributes
+    ----------
+    kind : 'equilibrium', 'periodic' or 'aperiodic'
+        The last where its section has more points than were kept, or none that repeat.
+    points : (k, size) array
+        States on its section, each once; its place for an equilibrium.
+    share : float
+        Part of the starts that lead to it.
+    """
+
+    kind: Literal["equilibrium", "periodic", "aperiodic"]
+    points: Array
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Basins:
+    """Which attractor each start leads to.
+
+    Attributes
+    ----------
+    first, second : (a,), (b,) arrays
+        Values along the two axes of the plane.
+    label : (a, b) array
+        Index into ``attractors``; -1 where a run could not go on or had not settled.
+    attractors : tuple of Attractor
+        In the order of their shares, the largest first.
+    """
+
+    first: Array
+    second: Array
+    label: NDArray[np.int64]
+    attractors: tuple[Attractor, ...]
+
+
+def basins(
+    system: ContactSystem,
+    first: tuple[Axis, ArrayLike],
+    second: tuple[Axis, ArrayLike],
+    *,
+    base: ArrayLike | None = None,
+    transient: int | float,
+    keep: int = 32,
+    section: Crossing | None = None,
+    tolerance: float = 1e-3,
+    rtol: float = 1e-6,
+    workers: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Basins:
+    """Run from a grid of initial states, and tell the motions apart that they settle on.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Excited with one period, or not excited at all.
+    first, second : (Axis, values)
+        The plane: at each start these two quantities have these values, by the smallest change
+        of the ``base`` state.
+    base : (size,) array, optional
+        State to start from; default zero.
+    transient : int or float
+        Periods of the excitation before sections count, or, with a ``section``, seconds.
+    keep : int
+        States on the section that are looked at, at least 4.
+    section : Crossing, optional
+        Poincare section of a system that is not excited; motions that do not meet it in the last
+        half of the run are equilibria.
+    tolerance : float
+        States that differ by less are the same, in parts of the largest modal displacement, and
+        velocity, of all starts and sections.
+    rtol, workers, progress
+        As for :func:`fecontact.ensemble`.
+
+    Raises
+    ------
+    InputError
+        For values out of range, for two quantities that no state has independently, and as
+        :func:`fecontact.ensemble`.
+    """
+    require_kind("basins", ContactSystem, system=system)
+    if keep < 4:
+        raise InputError(f"keep = {keep!r} must be at least 4.")
+    if not 0.0 < tolerance < 1.0:
+        raise InputError(f"tolerance = {tolerance!r} must be between 0 and 1.")
+    a, b = (_values(name, given) for name, given in (("first", first), ("second", second)))
+    start = np.zeros(system.size) if base is None else np.array(base, dtype=float)
+    if start.shape != (system.size,):
+        raise InputError(f"base must have {system.size} values [q, q', z], not shape "
+                         f"{start.shape}.")
+    rows = np.array([axis.row(system) for axis, _ in (first, second)])
+    lengths = np.linalg.norm(rows, axis=1)
+    if not lengths.all() or np.linalg.matrix_rank(rows / lengths[:, None], tol=1e-9) < 2:
+        raise InputError(f"first = {first[0]} and second = {second[0]} cannot be chosen each by "
+                         f"itself with the modes of this body; take other points or axes.")
+    wanted = np.stack(np.meshgrid(a, b, indexing="ij"), axis=-1).reshape(-1, 2)
+    states = start + (wanted - rows @ start) @ np.linalg.pinv(rows).T
+    settings: dict[str, Any] = {"initial": states, "rtol": rtol, "workers": workers,
+                                "progress": progress}
+    if section is None:
+        found = strobe(system, transient=int(transient), keep=keep, **settings)
+        sets: list[Array | None] = [
+            points if fine else None
+            for points, fine in zip(found.states, found.finished, strict=True)]
+        still = [False] * len(sets)
+    else:
+        found = ensemble(system, [0.0, float(transient), 2.0 * float(transient)],
+                         events=section, **settings)
+        sets, still = [], []
+        for events, ends, fine in zip(found.events or (), found.states, found.finished,
+                                      strict=True):
+            late = events.states[events.time > transient][-keep:]
+            still.append(len(late) == 0)
+            sets.append(None if not fine else ends[-1:] if len(late) == 0 else late)
+    labels, attractors = _told_apart(sets, still, _scale(system, states, sets), tolerance)
+    return Basins(a, b, labels.reshape(len(a), len(b)), attractors)
+
+
+def _values(name: str, given: Any) -> Array:
+    try:
+        axis, values = given
+        found = np.atleast_1d(np.array(values, dtype=float))
+    except (TypeError, ValueError):
+        axis, found = None, np.empty(0)
+    if not (isinstance(axis, Axis) and found.ndim == 1 and len(found)
+            and np.isfinite(found).all()):
+        raise InputError(f"{name} = {given!r} must be an Axis and a list of finite values: "
+                         f"(Axis('B', 'y'), [0.0, 1e-4]).")
+    return found
+
+
+def _scale(system: ContactSystem, starts: Array, sets: list[Array | None]) -> Array:
+    """Size (size,) of displacements, velocities and internal variables, each the same for all."""
+    m = system.basis.modes
+    size = np.abs(np.vstack([starts, *(points for points in sets if points is not None)])).max(
+        axis=0)
+    scale = np.ones(system.size)
+    for part in (slice(0, m), slice(m, 2 * m), slice(2 * m, None)):
+        scale[part] = size[part].max(initial=0.0) or 1.0
+    return scale
+
+
+def _told_apart(
+    sets: list[Array | None], still: list[bool], scale: Array, tolerance: float
+) -> tuple[NDArray[np.int64], tuple[Attractor, ...]]:
+    """Label of each set of points, and the attractors, the most frequent first."""
+    labels = np.full(len(sets), -1)
+    kinds: list[Literal["equilibrium", "periodic", "aperiodic"]] = []
+    prototypes: list[Array] = []
+    for index, points in enumerate(sets):
+        if points is None:
+            continue
+        period = None if still[index] else _period(points / scale, tolerance)
+        kind: Literal["equilibrium", "periodic", "aperiodic"] = (
+            "equilibrium" if still[index] else "aperiodic" if period is None else "periodic")
+        own = points[-(period or len(points)) :]
+        for label, (other, prototype) in enumerate(zip(kinds, prototypes, strict=True)):
+            if other == kind and _same(own / scale, prototype / scale, kind, tolerance):
+                labels[index] = label
+                break
+        else:
+            labels[index] = len(kinds)
+            kinds.append(kind)
+            prototypes.append(own)
+    counts = np.bincount(labels[labels >= 0], minlength=len(kinds))
+    order = np.argsort(-counts, kind="stable")
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    labels[labels >= 0] = rank[labels[labels >= 0]]
+    return labels, tuple(Attractor(kinds[k], prototypes[k], counts[k] / len(sets)) for k in order)
+
+
+def _period(points: Array, tolerance: float) -> int | None:
+    """Number of points after which they repeat, or None if they do not."""
+    for period in range(1, len(points) // 2 + 1):
+        if np.abs(points[period:] - points[:-period]).max() < tolerance:
+            return period
+    return None
+
+
+def _same(one: Array, other: Array, kind: str, tolerance: float) -> bool:
+    """Whether two motions are the same: every point of each near one of the other.
+
+    Aperiodic ones by the box that they fill, to a fifth of its size.
+    """
+    if kind == "aperiodic":
+        size = np.maximum(np.ptp(one, axis=0), np.ptp(other, axis=0))
+        low = np.abs(one.min(axis=0) - other.min(axis=0))
+        high = np.abs(one.max(axis=0) - other.max(axis=0))
+        return bool((np.maximum(low, high) <= 0.2 * size + tolerance).all())
+    distance = np.abs(one[:, None] - other[None]).max(axis=2)
+    return bool(max(distance.min(axis=0).max(), distance.min(axis=1).max()) < 2.0 * tolerance)

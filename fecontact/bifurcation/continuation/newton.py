@@ -1,0 +1,126 @@
+"""Newton's method back to a branch, and what is made at the solution."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.corrector_kernels import improve, right_side, weighted_norm
+from fecontact.bifurcation.continuation.problem import Linearisation, Problem, Settings
+from fecontact.core.errors import AnalysisError, FecontactError
+
+Array = NDArray[np.float64]
+
+# A matrix is kept as long as each step is shorter than this part of the one before.
+_SERVES = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A converged point, with all that was made there."""
+
+    u: Array
+    linearisation: Linearisation
+    tangent: Array
+    iterations: int
+    values: Mapping[str, Any]
+    tests: Mapping[str, float]
+
+
+def corrected(
+    problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int, *,
+    known: Linearisation | None = None, exact: bool = False,
+) -> tuple[Array, Linearisation, int] | None:
+    """Newton's method at right angles to a row, from a guess; None where it does not converge.
+
+    Problems that keep their matrix begin with that of ``known``, the equations at a neighbour, and
+    take the matrix at the guess only where the former does not serve. The linearisation returned
+    is that of the last step or, where that is much larger than rounding or ``exact`` is asked
+    for, of the solution itself. The number of steps is that which a new matrix would have taken.
+    """
+    if known is not None and problem.keeps_matrix:
+        try:
+            found = _iterated(problem, guess, row, tolerance, iterations, known, exact)
+        except FecontactError:
+            found = None
+        if found is not None:
+            return found
+    return _iterated(problem, guess, row, tolerance, iterations, None, exact)
+
+
+def _iterated(
+    problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int,
+    known: Linearisation | None, exact: bool,
+) -> tuple[Array, Linearisation, int] | None:
+    """One attempt of :func:`corrected`, beginning with the matrix of ``known`` if there is one."""
+    u, before, kept = guess, np.inf, known
+    weights, scale = problem.weights(), 1.0 + norm(problem, guess)
+    more = 0 if known is None else 1
+    steps, count_kept = np.empty((iterations + more, len(guess))), 0
+    rhs = np.empty(len(guess))
+    for count in range(1, iterations + more + 1):
+        linearisation = problem.linearise(u) if kept is None else problem.evaluate(u)
+        right_side(linearisation.residual, row, u, guess, rhs)
+        steps[count_kept] = (kept or linearisation).solve(row, rhs)
+        size = improve(weights, steps, count_kept)
+        change = steps[count_kept]
+        if count > 2 and size > before and before <= problem.rounding * scale:
+            return u, linearisation, count
+        if not math.isfinite(size) or (count > 2 - more and size > before):
+            return None
+        u = u + change
+        if kept is None and size <= tolerance * scale:
+            return u, problem.linearise(u) if exact else linearisation, count
+        # With a matrix that is kept the error falls by about the same factor each time.
+        falls = size / before if count > 1 else _SERVES
+        if kept is not None and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
+            return u, problem.linearise(u), max(1, count - 2 - more)
+        if problem.keeps_matrix:
+            keeps = kept is None or falls <= _SERVES
+            kept = (kept or linearisation) if keeps else None
+            count_kept = count_kept + 1 if keeps else 0
+        before = size
+    return None
+
+
+def finished(
+    problem: Problem, u: Array, linearisation: Linearisation, iterations: int, row: Array,
+    settings: Settings,
+) -> Solution:
+    """Tangent, stored values and test functions at a converged u.
+
+    Raises
+    ------
+    AnalysisError
+        If there is no finite tangent.
+    """
+    unit = np.zeros(len(u))
+    unit[-1] = 1.0
+    tangent = linearisation.solve(row, unit)
+    size = norm(problem, tangent)
+    if not (np.isfinite(size) and size > 0.0):
+        raise AnalysisError("The branch has no direction there: its equations grow beyond all "
+                            "numbers.")
+    tangent = tangent / size
+    values = problem.point(u, linearisation, tangent)
+    return Solution(u, linearisation, tangent, iterations, values,
+                     _tests(problem, u, linearisation, tangent, values, settings))
+
+
+def _tests(
+    problem: Problem, u: Array, linearisation: Linearisation, tangent: Array,
+    values: Mapping[str, Any], settings: Settings,
+) -> dict[str, float]:
+    found: dict[str, float] = {}
+    if settings.locate:
+        found |= {"fold": float(tangent[-1]), **problem.tests(u, linearisation, tangent)}
+    known = {**values, "parameter": float(u[-1])}
+    return found | {name: float(event(known)) for name, event in settings.events.items()}
+
+
+def norm(problem: Problem, vector: Array) -> float:
+    """Length of a vector in the problem's inner product."""
+    return float(weighted_norm(problem.weights(), vector))

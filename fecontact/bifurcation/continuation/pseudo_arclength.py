@@ -1,0 +1,246 @@
+"""Pseudo-arclength continuation of the solutions of N equations in N + 1 unknowns.
+
+Solutions G(u) = 0 form branches. From a point on one, a step goes along the tangent and Newton's
+method comes back to the branch at right angles to it. Sizes and angles are those of an inner
+product ``<a, b> = sum w a b`` that the problem gives. The last unknown is the parameter.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.branch import BranchPoint, Status
+from fecontact.bifurcation.continuation.crossings import UNRESOLVED
+from fecontact.bifurcation.continuation.hairpin import rounded
+from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
+from fecontact.bifurcation.continuation.problem import Linearisation, Problem, Settings
+from fecontact.bifurcation.continuation.special_points import between, located_between
+from fecontact.core.errors import FecontactError, InputError
+
+Array = NDArray[np.float64]
+
+# Part of the first step below which corners are taken for corners of the branch itself, as contact
+# laws with kinks make them.
+_SHORT = 1e-3
+# So many times a step is halved before a sharp turn is looked for, and each so many times again.
+_PATIENCE = 2
+# Steps go so far beyond a bound of the parameter, in what is left up to it: behind it there may be
+# no motion of the kind that is followed.
+_BEYOND = 1.2
+# Relative distance from a bound at which a start lies on it.
+_ON_BOUND = 1e-13
+
+# Distance in the diagram at which the start of a branch, found on another mesh, is met again.
+_AGAIN = 1e-5
+# Solutions whose distance is this many times what Newton's method leaves are the same.
+_ALIKE = 10.0
+
+__all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
+
+
+@dataclass(frozen=True)
+class End:
+    """How a continuation ended, and what the last failed step complained of."""
+
+    status: Status
+    message: str = ""
+
+
+def continuation(
+    problem: Problem,
+    u: Array,
+    settings: Settings,
+    *,
+    tangent: Array | None = None,
+    direction: float = 1.0,
+) -> Generator[BranchPoint, None, End]:
+    """Points of a branch one by one, from a solution (or something near to one) on.
+
+    Special points come in their places between the regular ones. The generator returns how the
+    branch ended.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is continued.
+    u : (N + 1,) array
+        Start; corrected at right angles to ``tangent``, or at the given parameter.
+    settings : Settings
+        How.
+    tangent : (N + 1,) array, optional
+        Direction of the first step.
+    direction : float
+        Sign of the first change of the parameter, where there is no tangent.
+
+    Raises
+    ------
+    FecontactError
+        If there is no solution near the start.
+    """
+    require_inside(float(u[-1]), settings)
+    start = start_of(problem, u, settings, tangent, direction)
+    yield BranchPoint(start.u, start.tangent, start.values)
+    if _leaves(start, settings):
+        return End(Status.BOUND)
+    here, step, count, message, origin = start, settings.step, 1, "", problem
+    stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
+    before: Solution | None = None
+    halved, whole = 0, step
+    while count < settings.points:
+        step = min(step, _BEYOND * _room(here, settings))
+        try:
+            reached = _step(problem, here, step, settings)
+        except FecontactError as error:
+            reached, message = None, str(error)
+        if reached is None:
+            whole = step if halved == 0 else whole
+            step, halved = 0.5 * step, halved + 1
+            if before is not None and halved % _PATIENCE == 0:
+                reached = rounded(problem, before, here, step, settings)
+        if reached is None:
+            if step < settings.smallest_step:
+                return End(Status.STALLED, message)
+            continue
+        last = here
+        for there, special in reached:
+            for located in special:
+                yield located
+                if located.kind in stops:
+                    return End(Status.STOPPED)
+                if located.kind is None:
+                    return End(Status.BOUND)
+            if count > 2 and _passes(problem, here, there, origin, start, settings):
+                yield BranchPoint(start.u, start.tangent, start.values)
+                return End(Status.CLOSED)
+            yield BranchPoint(there.u, there.tangent, there.values)
+            count += 1
+            last, here = here, there
+        before = last
+        # Short steps across a change that has no special point are of no use beyond it.
+        unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
+        step = whole if unresolved else _next_step(problem, last, here, step, settings)
+        halved = 0
+        adapted = problem.adapted(here.u, here.tangent)
+        if adapted is not None:
+            problem, moved, turned = adapted
+            turned = turned / norm(problem, turned)
+            if not np.array_equal(moved, here.u):
+                before = None
+            here = Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
+    return End(Status.POINTS)
+
+
+def require_inside(value: float, settings: Settings) -> None:
+    """Raise :class:`InputError` unless a value of the parameter lies within the bounds."""
+    low, high = settings.bounds
+    if not low <= value <= high:
+        raise InputError(f"The start lies at {value:.6g}, outside the bounds of the parameter, "
+                         f"{low:g} to {high:g}.")
+
+
+def _leaves(start: Solution, settings: Settings) -> bool:
+    """Whether the branch leaves the bounds of the parameter right where it starts."""
+    slope, value = float(start.tangent[-1]), float(start.u[-1])
+    bound = settings.bounds[1] if slope > 0.0 else settings.bounds[0]
+    ahead = np.copysign(1.0, slope) * (bound - value)
+    return slope != 0.0 and bool(ahead <= _ON_BOUND * max(abs(value), abs(slope)))
+
+
+def start_of(
+    problem: Problem, u: Array, settings: Settings, tangent: Array | None, direction: float
+) -> Solution:
+    """The solution near u, with its tangent."""
+    row = np.zeros(len(u))
+    if tangent is None:
+        row[-1] = 1.0 if direction >= 0.0 else -1.0
+    else:
+        row = problem.weights() * tangent / norm(problem, tangent)
+    found = corrected(problem, np.array(u, dtype=float), row, settings.tolerance,
+                       3 * settings.iterations)
+    if found is None:
+        raise InputError(f"There is no solution near the start at the parameter {u[-1]:.6g}; give "
+                         f"a start that is closer to one.")
+    return finished(problem, *found, row, settings)
+
+
+def _step(
+    problem: Problem, here: Solution, step: float, settings: Settings
+) -> list[tuple[Solution, list[BranchPoint]]] | None:
+    """The solution at a step, with the special points before it; None to be tried with less."""
+    row = problem.weights() * here.tangent
+    found = corrected(problem, problem.predicted(here.u, here.tangent, step), row,
+                      settings.tolerance, settings.iterations, known=here.linearisation)
+    if found is None:
+        return None
+    there = finished(problem, *found, row, settings)
+    short = step < _SHORT * settings.step
+    if not (short or _believable(problem, here, there, settings)):
+        return None
+    reached = located_between(problem, here, there, settings, row, strict=not short)
+    return None if reached is None else [reached]
+
+
+def _room(here: Solution, settings: Settings) -> float:
+    """Length along the tangent up to a bound of the parameter."""
+    slope = float(here.tangent[-1])
+    bound = settings.bounds[1] if slope > 0.0 else settings.bounds[0]
+    return (bound - float(here.u[-1])) / slope if slope != 0.0 else np.inf
+
+
+def _believable(problem: Problem, here: Solution, there: Solution, settings: Settings) -> bool:
+    """Whether a step does not turn too much."""
+    row = problem.weights() * here.tangent
+    chord = there.u - here.u
+    return min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) >= np.cos(
+        settings.largest_turn)
+
+
+def _next_step(
+    problem: Problem, here: Solution, there: Solution, step: float, settings: Settings
+) -> float:
+    """Longer after quick convergence on a straight piece, shorter after slow."""
+    factor = {1: 2.0, 2: 2.0, 3: 1.5, 4: 1.1}.get(there.iterations, 0.7)
+    turn = np.arccos(min(1.0, float(problem.weights() * here.tangent @ there.tangent)))
+    if turn > 0.0:
+        factor = min(factor, max(0.5, 0.5 * settings.largest_turn / turn))
+    return min(factor * step, settings.largest_step)
+
+
+def _passes(
+    problem: Problem, here: Solution, there: Solution, origin: Problem, start: Solution,
+    settings: Settings,
+) -> bool:
+    """Whether the start of the branch lies on the step from here to there."""
+    weights = problem.weights()
+    row = weights * here.tangent
+    length = float(row @ (there.u - here.u))
+    away = min(abs(float(start.u[-1] - end.u[-1])) for end in (here, there))
+    if away * np.sqrt(weights[-1]) > length:
+        return False
+    again = problem.met_again(origin, start.u, start.tangent, here.u, here.tangent,
+                              2.0 * length + _AGAIN)
+    if again is None or not 0.0 < (along := float(row @ (again - here.u))) <= length:
+        return False
+    near = between(here, there, along, row)
+    return (norm(problem, again - near) < 1e-2 * length + _AGAIN
+            and _lead_to_one(problem, again, near, row, settings))
+
+
+def _lead_to_one(
+    problem: Problem, one: Array, other: Array, row: Array, settings: Settings
+) -> bool:
+    """Whether Newton's method goes from two guesses to the same solution.
+
+    A branch may pass itself closer than the cubic between two of its points is accurate.
+    """
+    try:
+        found = [corrected(problem, guess, row, settings.tolerance, 2 * settings.iterations)
+                 for guess in (one, other)]
+    except FecontactError:
+        return False
+    if found[0] is None or found[1] is None:
+        return False
+    near = _ALIKE * max(settings.tolerance, problem.rounding) * (1.0 + norm(problem, one))
+    return norm(problem, found[0][0] - found[1][0]) < near

@@ -1,0 +1,233 @@
+"""All branches that the section ``[branch]`` of a study asks for."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch, switched_branch
+from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.orbits.samples import motion_of, observe, shot
+from fecontact.core.errors import FecontactError
+from fecontact.system.model_limits import limits_exceeded, warn_of_limits
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.diagram_options import BranchSettings
+    from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+_EQUILIBRIA = "steady sliding"
+# Longest step along equilibria, in parts of the diagram.
+_FINE = 0.02
+# Amplitudes of the first orbit that count as one in the length of a step.
+_SIZE = 10.0
+# Points of a branch that are held against the limits of the model.
+_LOOKS = 12
+
+
+@dataclass
+class Branches:
+    """Branches by name, in the order in which they were followed.
+
+    Attributes
+    ----------
+    contact_field : ContactField
+        The system as a function of the parameter.
+    observe : (point, axis)
+        The displacement that is observed.
+    found : dict of name to Branch
+        With the range of the observed displacement; see
+        :func:`fecontact.bifurcation.orbits.samples.observe`.
+    notes : list of str
+        Sentences on branches that could not be followed.
+    interrupted : bool
+        Whether Ctrl-C ended it; what was computed until then is there.
+    """
+
+    contact_field: ContactField
+    observe: tuple[str | int, Literal["x", "y"]]
+    found: dict[str, Branch] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    interrupted: bool = False
+
+
+def follow_branches(
+    system: "ContactSystem", wanted: "BranchSettings", initial: Any = "rest",
+    progress: Callable[[str, float], None] | None = None,
+) -> Branches:
+    """Follow steady sliding or an orbit over a parameter, and what begins at special points.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        What moves.
+    wanted : BranchSettings
+        What to follow.
+    initial : any
+        Start of the run to the first orbit; see :func:`fecontact.simulate`.
+    progress : callable, optional
+        Told the name of the branch that is being followed, and which part of its points there is.
+
+    Raises
+    ------
+    FecontactError
+        If the first branch cannot be begun; others that cannot leave a note.
+    """
+    basis, shown = system.basis, wanted.point
+    if shown is None:
+        shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
+    # Found out after a long computation, a wrong name would be found out too late.
+    basis.point_index(shown)
+    result = Branches(contact_field(system, {wanted.name: wanted.first}), (shown, wanted.axis))
+    tasks = deque(_first_tasks(result.contact_field, wanted, initial))
+    while tasks:
+        task = tasks.popleft()
+        try:
+            branch = task.follow(_settings(wanted, task.title, progress))
+        except KeyboardInterrupt:
+            if not result.found:
+                raise
+            result.interrupted = True
+            break
+        except FecontactError as error:
+            if not result.found:
+                raise
+            result.notes.append(f"The branch '{task.title}' was not followed: {error}")
+            continue
+        result.found[task.title] = observe(result.contact_field, branch, *result.observe)
+        warn_of_limits(_limits_exceeded(result.contact_field, branch), f"On '{task.title}'")
+        if branch.status is Status.INTERRUPTED:
+            result.interrupted = True
+            break
+        if task.generation < wanted.generations:
+            tasks.extend(_tasks_beyond(result.contact_field, branch, task, wanted))
+    return result
+
+
+def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
+    """Where a branch first leaves what the model holds for, at some of its points."""
+    values = np.array(branch.attributes["parameter_values"], dtype=float)
+    for place in np.unique(np.linspace(0, len(branch) - 1, _LOOKS).astype(int)):
+        point = branch.points[place]
+        values[field.index(branch.name)] = point.parameter
+        if "period" in point.values:
+            times, states = motion_of(field, branch, point)
+        else:
+            times, states = np.zeros(1), np.atleast_2d(point.values["state"])
+        found = limits_exceeded(field.system(values), times, states)
+        if found:
+            yield from (f"at {branch.name} = {point.parameter:.6g} {one}" for one in found)
+            return
+
+
+class _Task(NamedTuple):
+    """A branch that is to be followed."""
+
+    title: str
+    generation: int
+    follow: Callable[[Settings], Branch]
+
+
+def _settings(
+    wanted: "BranchSettings", title: str, progress: Callable[[str, float], None] | None
+) -> Settings:
+    settings = wanted.settings()
+    if progress is None:
+        return settings
+    progress(title, 0.0)
+    return replace(settings, progress=lambda points: progress(title, points / settings.points))
+
+
+def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[_Task]:
+    low, high = wanted.bounds
+    if wanted.kind != "orbits":
+        yield _Task(_EQUILIBRIA, 0, lambda settings: equilibrium_branch(
+            field, wanted.name, settings=_fine(settings),
+            direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
+    if wanted.kind != "equilibria":
+        yield _Task("orbits of the run", 0, partial(_orbits, field, wanted, initial))
+
+
+def _fine(settings: Settings) -> Settings:
+    """Shorter steps: equilibria cost little, and curves are drawn through them."""
+    return replace(settings, step=min(settings.step, _FINE),
+                   largest_step=min(settings.largest_step, _FINE))
+
+
+def _tasks_beyond(
+    field: ContactField, branch: Branch, task: _Task, wanted: "BranchSettings"
+) -> Iterator[_Task]:
+    for kind in wanted.switch:
+        points = branch.of_kind(kind)
+        for number, point in enumerate(points):
+            title = _title(task.title, kind, f" {number + 1}" if len(points) > 1 else "")
+            yield _Task(title, task.generation + 1,
+                        partial(_beyond, field, branch, point, wanted))
+
+
+def _orbits(
+    field: ContactField, wanted: "BranchSettings", initial: Any, settings: Settings
+) -> Branch:
+    """The orbit on which a run settles, over the parameter."""
+    from fecontact.bifurcation.orbits.branches import orbits_from_motion
+    from fecontact.bifurcation.orbits.from_run import settled_motion
+    from fecontact.bifurcation.orbits.shooting_branch import orbits_by_shooting
+
+    low, high = wanted.bounds
+    motion = settled_motion(field.system(), initial=initial, transient=wanted.transient,
+                            longest_period=wanted.longest_period)
+    common: dict[str, Any] = {
+        "period": motion.period, "periods": motion.periods, "settings": settings,
+        # So that a step is one of the parameter rather than of the orbit, which may grow.
+        "scales": _SIZE * _amplitudes(motion.states),
+        "direction": 1.0 if wanted.first < high else -1.0, "both": low < wanted.first < high}
+    if wanted.method == "shooting":
+        return orbits_by_shooting(field, wanted.name, motion.times, motion.states,
+                                  segments=wanted.segments, **common)
+    return orbits_from_motion(field, wanted.name, motion.times, motion.states,
+                              intervals=wanted.intervals, **common)
+
+
+def _amplitudes(states: Array) -> Array:
+    """Half the range (d,) of each state, those of small ones not below 1e-3 of the largest."""
+    found = np.ptp(states, axis=0) / 2.0
+    return np.asarray(np.maximum(found, 1e-3 * found.max()))
+
+
+def _beyond(
+    field: ContactField, branch: Branch, point: BranchPoint, wanted: "BranchSettings",
+    settings: Settings,
+) -> Branch:
+    """The branch that begins at a special point."""
+    from fecontact.bifurcation.orbits.branches import orbits_beyond, orbits_from_hopf
+    from fecontact.bifurcation.orbits.period_doubling import (
+        doubled_by_shooting,
+        hopf_orbits_by_shooting,
+    )
+
+    if point.kind == "Hopf" and wanted.method == "shooting":
+        return hopf_orbits_by_shooting(field, branch, point, settings=settings,
+                                       segments=wanted.segments)
+    if point.kind == "Hopf":
+        return orbits_from_hopf(field, branch, point, settings=settings,
+                                intervals=wanted.intervals)
+    if "period" not in point.values:
+        return switched_branch(field, branch.name, point, settings=settings)
+    if shot(branch):
+        return doubled_by_shooting(field, branch, point, settings)
+    return orbits_beyond(field, branch, point, settings=settings)
+
+
+def _title(name: str, kind: str, number: str) -> str:
+    if kind == "Hopf":
+        return f"orbits{number}"
+    if kind == "period doubling":
+        return f"{name}, doubled{number}"
+    return f"{name}, crossing{number}"

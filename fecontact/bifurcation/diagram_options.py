@@ -1,0 +1,150 @@
+"""The section ``[branch]`` of a study file."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from fecontact.core.errors import InputError, choices, require_finite, require_positive
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.continuation.problem import Settings
+
+# Pieces of an orbit and runs beneath a diagram; more is a slip of the pen.
+_MOST_PIECES, _MOST_RUNS = 10_000, 100_000
+_SWITCHES = ("Hopf", "period doubling", "branch point")
+
+
+@dataclass(frozen=True)
+class BranchSettings:
+    """``[branch]``: solutions over a parameter; see :func:`fecontact.equilibrium_branch`.
+
+    Parameters
+    ----------
+    parameter : str, optional
+        Dotted name of a number of the study that changes: 'ground.speed'; needed for
+        ``fecontact branch`` only.
+    range : (float, float), optional
+        Its least and largest value.
+    start : float, optional
+        Value at which the first branch begins; the first of the range by default.
+    kind : 'equilibria', 'orbits' or 'both'
+        What is followed first: steady sliding, the periodic orbit on which a run at ``start``
+        settles, or both.
+    switch : list of 'Hopf', 'period doubling', 'branch point'
+        Special points at which the branches that begin there are followed too: the orbits born at
+        Hopf points, those of twice the period, the other branch.
+    generations : int
+        How often to go over from a branch to others that begin on it.
+    step, largest_step : float
+        First and largest step, in parts of the diagram.
+    points : int
+        Most points of a branch.
+    method : 'collocation' or 'shooting'
+        For orbits: collocation on an adaptive mesh, or the compiled integrator, for steep
+        friction, impacts and many modes.
+    intervals : int
+        For collocation: mesh intervals of an orbit.
+    segments : int
+        For shooting: pieces of an orbit that are run for themselves; more for unstable orbits.
+    transient : float, optional
+        For orbits from a run: time before the motion counts as settled [s]; 200 periods of the
+        excitation by default.
+    longest_period : float, optional
+        For orbits from a run: time that the orbit takes at most [s]; 16 periods of the excitation
+        by default.
+    point : str or int, optional
+        What the diagram shows: 'B', 'C', a further named point, or a contact node by its number;
+        B by default, or the middle of the contact where there is no B.
+    axis : 'x' or 'y'
+        Its displacement along the ground or away from it.
+    show : 'maximum', 'minimum', 'amplitude' or 'section'
+        Of that displacement over the orbit; the amplitude is half of what lies between them, the
+        section what excited systems have once per period.
+    brute_force : int
+        For excited systems: number of values of the parameter, at least 2, at which runs are drawn
+        beneath the branches once per period, up and down; the diagram then shows sections. Zero
+        for none.
+    """
+
+    parameter: str | None = None
+    range: tuple[float, float] | None = None
+    start: float | None = None
+    kind: Literal["equilibria", "orbits", "both"] = "equilibria"
+    switch: tuple[str, ...] = ()
+    generations: int = 1
+    step: float = 0.01
+    largest_step: float = 0.05
+    points: int = 200
+    method: Literal["collocation", "shooting"] = "collocation"
+    intervals: int = 50
+    segments: int = 4
+    transient: float | None = None
+    longest_period: float | None = None
+    point: str | int | None = None
+    axis: Literal["x", "y"] = "x"
+    show: Literal["maximum", "minimum", "amplitude", "section"] = "maximum"
+    brute_force: int = 0
+
+    def __post_init__(self) -> None:
+        require_positive("BranchSettings", step=self.step, largest_step=self.largest_step,
+                         points=self.points, intervals=self.intervals, segments=self.segments)
+        for name in ("transient", "longest_period"):
+            if getattr(self, name) is not None:
+                require_positive("BranchSettings", **{name: getattr(self, name)})
+        if self.generations < 0:
+            raise InputError(f"BranchSettings: generations = {self.generations} must be zero or "
+                             f"above.")
+        if self.brute_force < 0 or self.brute_force == 1:
+            raise InputError(f"BranchSettings: brute_force = {self.brute_force} must be zero, for "
+                             f"none, or at least 2.")
+        if self.step > self.largest_step:
+            raise InputError(f"BranchSettings: step = {self.step:g} must not be above largest_step "
+                             f"= {self.largest_step:g}.")
+        for kind in self.switch:
+            if kind not in _SWITCHES:
+                raise InputError(f"BranchSettings: switch = '{kind}' is not known; choose from "
+                                 f"{choices(_SWITCHES)}.")
+        if self.start is not None:
+            require_finite("BranchSettings", start=self.start)
+        for name, most in (("intervals", _MOST_PIECES), ("segments", _MOST_PIECES),
+                           ("brute_force", _MOST_RUNS)):
+            if getattr(self, name) > most:
+                raise InputError(f"BranchSettings: {name} = {getattr(self, name)} must be at most "
+                                 f"{most}.")
+        if self.range is None:
+            return
+        low, high = self.range
+        require_finite("BranchSettings: the range", low=low, high=high)
+        if not low < high:
+            raise InputError(f"BranchSettings: range = {list(self.range)} must be two values, the "
+                             f"smaller one first.")
+        if self.start is not None and not low <= self.start <= high:
+            raise InputError(f"BranchSettings: start = {self.start:g} must lie in the range, "
+                             f"{low:g} to {high:g}.")
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The range; InputError where there is none."""
+        if self.range is None:
+            raise InputError("[branch] lacks the key 'range', the least and largest value of the "
+                             "parameter; give it, or --from and --to.")
+        return self.range
+
+    @property
+    def name(self) -> str:
+        """The parameter; InputError where there is none."""
+        if self.parameter is None:
+            raise InputError("[branch] lacks the key 'parameter', the dotted name of the number "
+                             "that changes, such as 'ground.speed'.")
+        return self.parameter
+
+    @property
+    def first(self) -> float:
+        """Value at which the first branch begins."""
+        return self.bounds[0] if self.start is None else self.start
+
+    def settings(self) -> "Settings":
+        """How branches are followed."""
+        from fecontact.bifurcation.continuation.problem import Settings
+
+        return Settings(step=self.step, largest_step=self.largest_step, points=self.points,
+                        bounds=self.bounds)

@@ -1,0 +1,278 @@
+"""The continuation problems of folds and of Hopf points of equilibria in two parameters.
+
+Both are minimally augmented systems: beside f(x, p) = 0 the border g of
+
+    [[J - l I, b], [c, 0]] [v, g] = [0, 1]      (states in units of their scales)
+
+is to vanish, which it does where l is an eigenvalue: l = 0 for a fold, l = i w for a Hopf point.
+Its derivatives follow from those of J along v, ``dg = -w (dJ) v``, w the left solution.
+
+References
+----------
+W. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, chapters 3, 4.
+"""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues
+from fecontact.bifurcation.equilibria.linear import solution
+from fecontact.bifurcation.equilibria.normal_forms import hopf, null_vectors
+from fecontact.bifurcation.equilibria.problem import pair_test
+from fecontact.bifurcation.fields.multilinear_forms import bend
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.core.errors import AnalysisError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+# Part of the first w^2 that takes its place in divisions by l where it is smaller.
+_NEAR_ZERO = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class _Augmented:
+    """Residual and derivative (N, N + 1) of an augmented system, with what was made on the way."""
+
+    residual: Array
+    matrix: Array
+    jacobian: Array
+    made: dict[str, Any]
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        return solution(np.vstack([self.matrix, row]), rhs)
+
+
+class PlaneCurve(Problem):
+    """What both curves have in common; u = [x, (w^2,) first parameter, second parameter]."""
+
+    def __init__(
+        self, field: VectorField, values: Array, active: tuple[int, int], sizes: Array,
+        limits: Array, b: Array, c: Array,
+    ) -> None:
+        self.field, self.active = field, active
+        self.scales = sizes[: field.dimension]
+        self._sizes, self._limits = sizes, limits
+        self._values, self._b, self._c = values.copy(), b, c
+
+    def values(self, u: Array) -> Array:
+        """Parameter values (k,) at u."""
+        values = self._values.copy()
+        values[list(self.active)] = u[-2:]
+        return values
+
+    def weights(self) -> Array:
+        """Those of states, parameters (and w^2)."""
+        return np.asarray(self._sizes**-2.0)
+
+    def evaluated(self, u: Array) -> tuple[Array, Array, Array, Array]:
+        """State, f, J and df/dp to both parameters."""
+        x = np.ascontiguousarray(u[: self.field.dimension])
+        f, J, P = self.field.derivatives(np.zeros(1), x[None], self.values(u), self.active)
+        if not (np.isfinite(J).all() and np.isfinite(f).all()):
+            raise AnalysisError("The rates are not finite there.")
+        return x, f[0], J[0], P[0]
+
+    def bordered(self, J: Array, shift: complex) -> tuple[Any, Any, Any]:
+        """Right and left vectors v and w (d,), and g; the borders are in the scales of states."""
+        d = len(J)
+        M = np.zeros((d + 1, d + 1), dtype=complex if isinstance(shift, complex) else float)
+        M[:d, :d] = scaled(J, self.scales) - shift * np.eye(d)
+        M[:d, d], M[d, :d] = self._b, self._c
+        unit = np.zeros(d + 1)
+        unit[d] = 1.0
+        right, left = np.linalg.solve(M, unit), np.linalg.solve(M.T, unit)
+        return right[:d] * self.scales, left[:d] / self.scales, right[d]
+
+    def curvature(self, x: Array, u: Array, direction: Array) -> Array:
+        """Derivative (d, d + 2) of [J, P] along a direction (d,)."""
+        return bend(self.field, x, self.values(u), np.ascontiguousarray(direction), self.scales,
+                    self.active, every=4)[0].first
+
+    def renewed(self, u: Array, b: Array, c: Array) -> "PlaneCurve":
+        """The same curve with other borders, and sizes that grow with the states."""
+        larger = np.clip(np.abs(u), self._sizes, self._limits)
+        sizes = np.where(larger > 1.5 * self._sizes, larger, self._sizes)
+        return type(self)(self.field, self._values, self.active, sizes, self._limits, b, c)
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
+        """State, parameters by name, and what the curve adds."""
+        names = list(self.field.parameters)
+        named = {names[index]: float(value)
+                 for index, value in zip(self.active, u[-2:], strict=True)}
+        return {"state": u[: self.field.dimension].copy(), **named,
+                **self.stored(u, linearisation)}
+
+    @abstractmethod
+    def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
+        """What the points hold besides state and parameters."""
+
+
+class FoldCurve(PlaneCurve):
+    """f = 0, g(0) = 0."""
+
+    def linearise(self, u: Array) -> _Augmented:
+        """The augmented equations about u."""
+        x, f, J, P = self.evaluated(u)
+        v, w, g = self.bordered(J, 0.0)
+        curvature = self.curvature(x, u, v)
+        matrix = np.vstack([np.hstack([J, P]), -w @ curvature])
+        return _Augmented(np.append(f, g), matrix, J, {"v": v, "w": w, "curvature": curvature})
+
+    def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
+        """The same curve with borders that belong to u."""
+        v, w = null_vectors(scaled(self.evaluated(u)[2], self.scales))
+        return self.renewed(u, w if w @ self._b > 0.0 else -w,
+                            v if v @ self._c > 0.0 else -v), u, tangent
+
+    def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
+        """Stability besides what is critical."""
+        others = _others(linearisation.jacobian, 0.0, 1)
+        return {"unstable_besides": int((others.real > 0.0).sum())}
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
+        """Points of codimension two."""
+        v, w = linearisation.made["v"], linearisation.made["w"]
+        w = w / (np.linalg.norm(w * self.scales) * np.linalg.norm(v / self.scales))
+        quadratic = linearisation.made["curvature"][:, : len(v)] @ v
+        found = {"cusp": float(w @ quadratic), "Bogdanov-Takens": float(w @ v)}
+        if len(v) > 2:
+            found["zero-Hopf"] = pair_test(_others(linearisation.jacobian, 0.0, 1))
+        return found
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> Mapping[str, Any] | None:
+        """Details of a point of codimension two; None for none."""
+        if kind == "zero-Hopf":
+            others = _others(linearisation.jacobian, 0.0, 1)
+            nearest = others[np.argmin(np.abs(others.real))] if len(others) else 0.0
+            return {"frequency_hz": abs(nearest.imag) / (2.0 * np.pi)} if nearest.imag else None
+        return None if kind == "fold" else {}
+
+
+class HopfCurve(PlaneCurve):
+    """f = 0 and, l = sqrt(-w^2), the even and the odd part of g(l): (g(l) +- g(-l)) / (2, 2 l)."""
+
+    def linearise(self, u: Array) -> _Augmented:
+        """The augmented equations about u."""
+        x, f, J, P = self.evaluated(u)
+        d = len(x)
+        least = _NEAR_ZERO * self._sizes[d]
+        square = u[d] if abs(u[d]) > least else (least if u[d] >= 0.0 else -least)
+        root = complex(np.sqrt(complex(-square)))
+        g: list[Any] = []
+        slope: list[Any] = []
+        gradient: list[Any] = []
+        for shift in (root, -root):
+            if g and u[d] > 0.0:  # the conjugate, as the borders are real
+                g.append(g[0].conj())
+                slope.append(slope[0].conj())
+                gradient.append(gradient[0].conj())
+                break
+            v, w, value = self.bordered(J, shift)
+            bent = self.curvature(x, u, v.real) + 1j * self.curvature(x, u, v.imag)
+            g.append(value)
+            slope.append(w @ v)
+            gradient.append(-w @ bent)
+        rate = -0.5 / root  # of the root with w^2
+        even, odd = 0.5 * (g[0] + g[1]), 0.5 * (g[0] - g[1]) / root
+        even_slope = 0.5 * (slope[0] - slope[1]) * rate
+        odd_slope = (0.5 * (slope[0] + slope[1]) - odd) / root * rate
+        matrix = np.zeros((d + 2, d + 3))
+        matrix[:d, :d], matrix[:d, d + 1 :] = J, P
+        for row, part, its_slope in ((d, 0.5 * (gradient[0] + gradient[1]), even_slope),
+                                     (d + 1, 0.5 * (gradient[0] - gradient[1]) / root, odd_slope)):
+            matrix[row, :d], matrix[row, d + 1 :] = part.real[:d], part.real[d:]
+            matrix[row, d] = its_slope.real
+        return _Augmented(np.append(f, [even.real, odd.real]), matrix, J, {"square": square})
+
+    def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
+        """The same curve with borders that belong to u."""
+        J = scaled(self.evaluated(u)[2], self.scales)
+        b, c = hopf_borders(J, float(u[self.field.dimension]))
+        return self.renewed(u, b, c), u, tangent
+
+    def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
+        """Stability besides what is critical."""
+        square = float(u[self.field.dimension])
+        others = _others(linearisation.jacobian, square, 2)
+        return {"frequency_hz": float(np.sqrt(max(square, 0.0))) / (2.0 * np.pi),
+                "first_lyapunov": self._lyapunov(u, linearisation),
+                "unstable_besides": int((others.real > 0.0).sum())}
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
+        """Points of codimension two."""
+        square = float(u[self.field.dimension])
+        J = scaled(linearisation.jacobian, self.scales)
+        J = J / np.abs(J).max()
+        sign = np.linalg.slogdet(J)[0]
+        found = {"Bogdanov-Takens": square, "Bautin": self._lyapunov(u, linearisation),
+                 "double Hopf": pair_test(_others(linearisation.jacobian, square, 2))}
+        # With two states an eigenvalue of zero is one of the pair.
+        if len(J) > 2:
+            found["zero-Hopf"] = float(sign * np.linalg.svd(J, compute_uv=False)[-1])
+        return found
+
+    def _lyapunov(self, u: Array, linearisation: _Augmented) -> float:
+        """First Lyapunov coefficient, computed once; NaN beyond a Bogdanov-Takens point."""
+        made = linearisation.made
+        if "lyapunov" not in made:
+            made["lyapunov"] = np.nan
+            square = u[self.field.dimension]
+            if square > 0.0 and (np.linalg.eigvals(linearisation.jacobian).imag > 0.0).any():
+                x = np.ascontiguousarray(u[: self.field.dimension])
+                made["lyapunov"] = hopf(self.field, x, self.values(u), self.scales,
+                                        1j * np.sqrt(square)).first_lyapunov
+        return float(made["lyapunov"])
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> Mapping[str, Any] | None:
+        """Details of a point of codimension two; None for none."""
+        square = float(u[self.field.dimension])
+        others = _others(linearisation.jacobian, square, 2)
+        if kind == "zero-Hopf" and square < 1e-3 * np.abs(others).max(initial=0.0) ** 2:
+            return None  # the end at a Bogdanov-Takens point
+        if kind == "double Hopf":
+            nearest = others[np.argmin(np.abs(others.real))]
+            return {"second_frequency_hz": abs(nearest.imag) / (2.0 * np.pi)} if nearest.imag \
+                else None
+        return None if kind == "fold" else {}
+
+
+def scaled(J: Array, scales: Array) -> Array:
+    """Jacobian of the states in units of their scales."""
+    return np.asarray(J * scales / scales[:, None])
+
+
+def hopf_borders(J: Array, square: float) -> tuple[Array, Array]:
+    """Real borders b and c (d,) for the eigenvalue sqrt(-w^2) of J."""
+    from scipy.linalg import eig
+
+    eigenvalues, left, right = eig(J, left=True, right=True)
+    at = np.argmin(np.abs(eigenvalues - np.sqrt(complex(-square))))
+    return _real(left[:, at]), _real(right[:, at])
+
+
+def _real(vector: ComplexArray) -> Array:
+    """Real part, of length one, in the phase in which it is largest."""
+    turned = vector * np.exp(-0.5j * np.angle(vector @ vector))
+    return np.asarray(turned.real / np.linalg.norm(turned.real))
+
+
+def _others(J: Array, square: float, count: int) -> ComplexArray:
+    """Eigenvalues without the ``count`` that are nearest to +-sqrt(-w^2)."""
+    eigenvalues = sorted_eigenvalues(J)
+    root = np.sqrt(complex(-square))
+    chosen = np.argmin(np.abs(eigenvalues - root))
+    rest = np.delete(eigenvalues, chosen)
+    if count == 2 and len(rest):
+        rest = np.delete(rest, np.argmin(np.abs(rest + root)))
+    return np.asarray(rest)

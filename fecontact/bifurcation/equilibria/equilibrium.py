@@ -1,0 +1,241 @@
+"""Equilibria of vector fields and contact systems, their stability and complex modes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.bifurcation.equilibria.linear import solution
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.vector_field import Array, VectorField, require_field
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import AnalysisError, InputError
+
+ComplexArray = NDArray[np.complex128]
+
+_ITERATIONS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """An equilibrium, and the linear motion about it.
+
+    Attributes
+    ----------
+    field : VectorField
+    values : (k,) array
+        Parameter values.
+    state : (d,) array
+        x with f(x, p) = 0; for contact systems steady sliding.
+    """
+
+    field: VectorField
+    values: Array
+    state: Array
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivative df/dx (d, d)."""
+        return self.field.derivatives(np.zeros(1), self.state[None], self.values)[1][0]
+
+    @cached_property
+    def eigenvalues(self) -> ComplexArray:
+        """Eigenvalues (d,) [1/s], the largest real part first."""
+        return sorted_eigenvalues(self.jacobian)
+
+    @property
+    def stable(self) -> bool:
+        """Whether no eigenvalue has a positive real part."""
+        return self.unstable_directions == 0
+
+    @property
+    def unstable_directions(self) -> int:
+        """Number of eigenvalues with positive real parts; see :func:`unstable_count`."""
+        return int(unstable_count(self.eigenvalues))
+
+    @cached_property
+    def modes(self) -> "ComplexModes":
+        """Frequencies, damping ratios and shapes of the linear motion."""
+        return ComplexModes.of(self.jacobian)
+
+
+@dataclass(frozen=True, eq=False)
+class ComplexModes:
+    """Complex modes, as in brake-squeal analysis: one for each pair l = -D w +- i w sqrt(1 - D^2).
+
+    Attributes
+    ----------
+    eigenvalues : (r,) complex array
+        Those with imaginary part above zero, the lowest frequency first [1/s].
+    frequencies_hz : (r,) array
+        Im l / (2 pi) [Hz].
+    damping_ratios : (r,) array
+        D = -Re l / |l|; negative for a mode that grows, the flutter mode.
+    shapes : (d, r) complex array
+        Eigenvectors of the state, of length one, with the largest entry real and positive.
+    real_eigenvalues : array
+        Those without a frequency [1/s], the largest first.
+    """
+
+    eigenvalues: ComplexArray
+    frequencies_hz: Array
+    damping_ratios: Array
+    shapes: ComplexArray
+    real_eigenvalues: Array
+
+    @classmethod
+    def of(cls, jacobian: Array) -> "ComplexModes":
+        """The modes of a Jacobian (d, d)."""
+        eigenvalues, vectors = np.linalg.eig(jacobian)
+        chosen = np.flatnonzero(eigenvalues.imag > 0.0)
+        chosen = chosen[np.argsort(eigenvalues[chosen].imag)]
+        found = np.asarray(eigenvalues[chosen], dtype=complex)
+        shapes = vectors[:, chosen].astype(complex)
+        if len(chosen):
+            largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(len(chosen))]
+            shapes = shapes * (np.abs(largest) / largest)
+        real = np.sort(eigenvalues[eigenvalues.imag == 0.0].real)[::-1]
+        return cls(found, found.imag / (2.0 * np.pi), -found.real / np.abs(found), shapes, real)
+
+    def displacement(self, field: ContactField, mode: int) -> ComplexArray:
+        """Complex displacement (points, 3) of one mode at B, C, the contact and further points."""
+        basis = field.system().basis
+        return np.asarray(basis.T @ self.shapes[: basis.modes, mode])
+
+    def growing(self) -> Array:
+        """Frequencies of the modes with negative damping [Hz]."""
+        return self.frequencies_hz[self.damping_ratios < 0.0]
+
+
+def sorted_eigenvalues(jacobian: Array) -> ComplexArray:
+    """Eigenvalues (d,), the largest real part first, pairs with the positive frequency first."""
+    found = np.linalg.eigvals(jacobian).astype(complex)
+    return np.asarray(found[np.lexsort((-found.imag, -found.real))])
+
+
+def unstable_count(eigenvalues: ComplexArray) -> NDArray[np.int64]:
+    """Number (...) of eigenvalues (..., d) with positive real parts.
+
+    Real parts below 1e-10 of the eigenvalue, or 1e-13 of the largest one, count as zero: those of
+    undamped modes and of rigid ones are round-off.
+    """
+    size = np.abs(eigenvalues)
+    least = 1e-10 * size + 1e-13 * size.max(axis=-1, keepdims=True)
+    return np.asarray((eigenvalues.real > least).sum(axis=-1))
+
+
+def find_equilibrium(
+    field: VectorField,
+    parameters: Mapping[str, float] | None = None,
+    *,
+    start: ArrayLike | None = None,
+    tolerance: float = 1e-12,
+) -> Equilibrium:
+    """An equilibrium f(x, p) = 0 by Newton's method with shortened steps.
+
+    Parameters
+    ----------
+    field : VectorField
+        Its rates must not depend on time.
+    parameters : mapping, optional
+        Values that differ from the field's base values, by name.
+    start : (d,) sequence, optional
+        Where to begin; for contact systems that of
+        :func:`fecontact.system.statics.static_equilibrium` with friction (steady sliding) by
+        default, else zero.
+    tolerance : float
+        Size of the last Newton step, relative to the state.
+
+    Raises
+    ------
+    AnalysisError
+        If the field depends on time, or none is found; the message says where it got stuck.
+    InputError
+        If a parameter is unknown or out of range.
+    """
+    require_field(field)
+    require_kind("find_equilibrium", (Mapping, type(None)), parameters=parameters)
+    values = field.values_with(**dict(parameters or {}))
+    require_autonomous(field, values)
+    if start is None:
+        start = steady_sliding(field, values) if isinstance(field, ContactField) else np.zeros(
+            field.dimension)
+    x = np.array(as_floats(start, "The start of an equilibrium"))
+    if x.shape != (field.dimension,):
+        raise InputError(f"The start of an equilibrium must have {field.dimension} values, not "
+                         f"shape {x.shape}.")
+    found = newton(field, x, values, tolerance)
+    if found is None:
+        rate = np.abs(field.rates(np.zeros(1), x[None], values)).max()
+        listed = ", ".join(f"{name} = {value:g}" for name, value in
+                           zip(field.parameters, values.tolist(), strict=True))
+        raise AnalysisError(f"No equilibrium was found for {listed} from the given start, where "
+                            f"the largest rate is {rate:.3g}; give a start that is nearer, for "
+                            f"example from a run that comes to rest, or follow one from other "
+                            f"parameters.")
+    return Equilibrium(field, values, found[0])
+
+
+def newton(
+    field: VectorField, start: Array, values: Array, tolerance: float
+) -> tuple[Array, Array] | None:
+    """Newton's method with steps that are halved until the next step is shorter.
+
+    Gives x (d,) and the Jacobian (d, d) about it, from before the last step.
+    """
+    x, t = start, np.zeros(1)
+    least = 1e-14 * float(np.linalg.norm(field.state_scales(values)))
+    for _ in range(_ITERATIONS):
+        f, J, _ = field.derivatives(t, x[None], values)
+        try:
+            step = solution(J[0], -f[0])
+        except AnalysisError:
+            return None
+        size = float(np.linalg.norm(step))
+        if not np.isfinite(size):
+            return None
+        if size <= max(tolerance * float(np.linalg.norm(x)), least):
+            return x + step, J[0]
+        part = 1.0
+        while part > 1e-6:
+            trial = x + part * step
+            # The size of the step that the old Jacobian would take next.
+            ahead = field.rates(t, trial[None], values)[0]
+            if np.isfinite(ahead).all() and _simplified(J[0], ahead) < (1.0 - 0.5 * part) * size:
+                break
+            part *= 0.5
+        else:
+            # Only rounding is left where the rates are as small as they can be.
+            return (x, J[0]) if size <= 1e-7 * np.linalg.norm(x) else None
+        x = trial
+    return None
+
+
+def _simplified(J: Array, f: Array) -> float:
+    try:
+        return float(np.linalg.norm(solution(J, f)))
+    except AnalysisError:
+        return np.inf
+
+
+def steady_sliding(field: ContactField, values: Array) -> Array:
+    """State [q, 0, z] of steady sliding of a contact system, the start for Newton's method."""
+    from fecontact.system.statics import equilibrium
+    from fecontact.system.steady_memory import settled
+
+    system = field.system(values)
+    state = np.zeros(field.dimension)
+    state[: system.basis.modes] = equilibrium(system, True, 0.0)
+    return settled(0.0, state, system.arrays)
+
+
+def require_autonomous(field: VectorField, values: Array) -> None:
+    """Raise AnalysisError where the rates depend on time."""
+    period = field.forcing_period(values)
+    if period is not None:
+        raise AnalysisError(f"The system is driven with the period {period:.6g} s and has no "
+                            f"equilibrium; take the drive's amplitude and the ground's waviness "
+                            f"away (drive.amplitude_x = 0, ground.amplitude = 0), or look for "
+                            f"periodic orbits.")

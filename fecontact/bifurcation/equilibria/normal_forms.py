@@ -1,0 +1,168 @@
+"""Normal forms of bifurcations of equilibria, as far as they tell what is born."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.fields.multilinear_forms import Bend, bend
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.core.errors import AnalysisError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+# Parts of the terms of l1, and of what a change of the Jacobian by itself over the scales would
+# make of it, that are rounding.
+_CANCELLED, _CONSTANT = 1e-9, 1e-15
+
+
+@dataclass(frozen=True)
+class Hopf:
+    """A Hopf point.
+
+    Attributes
+    ----------
+    angular_frequency : float
+        w of the pair +-iw [rad/s].
+    eigenvector : (d,) complex array
+        q with J q = i w q, of Euclidean length one.
+    first_lyapunov : float
+        l1, Kuznetsov's (5.62): negative where stable orbits are born (supercritical).
+    error : float
+        Difference of two formulas for the derivatives, and what rounding leaves of the terms that
+        add up to l1: at a centre they cancel.
+    """
+
+    angular_frequency: float
+    eigenvector: ComplexArray
+    first_lyapunov: float
+    error: float
+
+    @property
+    def criticality(self) -> str:
+        """'supercritical', 'subcritical', or 'undecided' where the error is as large as l1."""
+        if not abs(self.first_lyapunov) > self.error:
+            return "undecided"
+        return "supercritical" if self.first_lyapunov < 0.0 else "subcritical"
+
+
+def critical_pair(
+    J: Array, near: complex | None = None
+) -> tuple[complex, ComplexArray, ComplexArray]:
+    """Eigenvalue with positive imaginary part, q, and p.
+
+    ``J q = l q``, ``J^T p = conj(l) p``, ``|q| = 1``, ``conj(p) q = 1``. It is the one nearest to
+    the imaginary axis, or nearest to a given number.
+
+    Raises
+    ------
+    AnalysisError
+        If all eigenvalues are real.
+    """
+    from scipy.linalg import eig
+
+    eigenvalues, left, right = eig(J, left=True, right=True)
+    pairs = np.flatnonzero(eigenvalues.imag > 0.0)
+    if not len(pairs):
+        raise AnalysisError("All eigenvalues are real; there is no Hopf point here.")
+    distance = np.abs(eigenvalues[pairs].real if near is None else eigenvalues[pairs] - near)
+    at = pairs[np.argmin(distance)]
+    q = right[:, at] / np.linalg.norm(right[:, at])
+    p = left[:, at]
+    return complex(eigenvalues[at]), q, p / np.conj(np.vdot(p, q))
+
+
+def hopf(
+    field: VectorField, x: Array, values: Array, scales: Array, near: complex | None = None
+) -> Hopf:
+    r"""Normal form at a Hopf point x for parameter values (k,).
+
+    .. math:: l_1 = \frac{1}{2 w} \mathrm{Re}\, p^H \big[ C(q, q, \bar q)
+        - 2 B(q, J^{-1} B(q, \bar q)) + B(\bar q, (2 i w - J)^{-1} B(q, q)) \big]
+
+    with the second and third derivatives B and C from
+    :func:`fecontact.bifurcation.fields.multilinear_forms. bend`, for the pair nearest to the
+    imaginary axis or to ``near``.
+
+    It describes a neighbourhood in which the friction law is close to its Taylor polynomial. For
+    smoothed sign functions with slopes of 1e6 s/m and slow sliding that may be a few micrometres
+    per second, and the orbit that is seen in practice, which sticks, is not the one that is born
+    here: follow the orbits to know.
+
+    References
+    ----------
+    Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 5.4.
+    """
+    _, J, _ = field.derivatives(np.zeros(1), x[None], values)
+    eigenvalue, q, p = critical_pair(J[0], near)
+    w = eigenvalue.imag
+    along, across = (bend(field, x, values, part, scales)
+                     for part in (np.ascontiguousarray(q.real), np.ascontiguousarray(q.imag)))
+    (fine, terms), (coarse, _) = (_first_lyapunov(J[0], w, q, p, one, other)
+                                  for one, other in zip(along, across, strict=True))
+    # A Jacobian that changes by less than its rounding over the scales is constant.
+    constant = (np.abs(J[0] * scales / scales[:, None]).max() / w
+                * float(np.linalg.norm(q / scales)) ** 2)
+    error = abs(fine - coarse) + _CANCELLED * terms + _CONSTANT * float(constant)
+    return Hopf(w, q, fine, error)
+
+
+def _first_lyapunov(
+    J: Array, w: float, q: ComplexArray, p: ComplexArray, along: Bend, across: Bend
+) -> tuple[float, float]:
+    """First Lyapunov coefficient, and the sum of the sizes of all terms in it."""
+    B = along.first + 1j * across.first
+    cubic = (along.second + across.second) @ q
+    mean = np.linalg.solve(J, (B @ q.conj()).real)
+    double = np.linalg.solve(2j * w * np.eye(len(J)) - J, B @ q)
+    total = np.vdot(p, cubic - 2.0 * B @ mean + B.conj() @ double)
+    size = np.abs(p) @ (np.abs(cubic) + np.abs(B) @ (2.0 * np.abs(mean) + np.abs(double)))
+    return float(total.real) / (2.0 * w), float(size) / (2.0 * w)
+
+
+def null_vectors(J: Array) -> tuple[Array, Array]:
+    """Right and left singular vectors (d,) of the smallest singular value, of length one."""
+    U, _, V = np.linalg.svd(J)
+    return V[-1], U[:, -1]
+
+
+def fold_coefficient(field: VectorField, x: Array, values: Array, scales: Array) -> float:
+    """Quadratic coefficient a = w B(v, v) / 2 of a fold, v and w the null vectors, w v = 1."""
+    _, J, _ = field.derivatives(np.zeros(1), x[None], values)
+    v, w = null_vectors(J[0])
+    quadratic = bend(field, x, values, v, scales)[0].first @ v
+    return 0.5 * float(w @ quadratic) / float(w @ v)
+
+
+def branching_tangents(
+    field: VectorField, x: Array, values: Array, index: int, scales: Array, tangent: Array
+) -> Array | None:
+    """Direction (d + 1,) of the other branch through a branch point, beside a given one.
+
+    With the null space of [J, P] spanned by the given tangent t and a second vector s, the other
+    branch goes along ``c t + s``, c = -psi D2F(s, s) / (2 psi D2F(t, s)); None where no second
+    branch crosses at a finite angle.
+    """
+    _, J, P = field.derivatives(np.zeros(1), x[None], values, (index,))
+    U, _, V = np.linalg.svd(np.concatenate([J[0], P[0]], axis=1))
+    psi = U[:, -1]
+    t = tangent / np.linalg.norm(tangent)
+    t = V[-2:].T @ (V[-2:] @ t)
+    t /= np.linalg.norm(t)
+    rest = V[-2:] - np.outer(V[-2:] @ t, t)
+    s = rest[np.argmax(np.linalg.norm(rest, axis=1))]
+    s /= np.linalg.norm(s)
+
+    def second(direction: Array) -> Array:
+        shift = np.zeros(len(values))
+        shift[index] = direction[-1]
+        bent = bend(field, x, values, np.ascontiguousarray(direction[:-1]), scales, (index,), shift)
+        return np.asarray(psi @ bent[0].first)
+
+    mixed, own = float(second(s) @ t), float(second(s) @ s)
+    if abs(mixed) <= 1e-9 * abs(own):
+        return None
+    other = -0.5 * own / mixed * t + s
+    return np.asarray(other / np.linalg.norm(other))

@@ -1,0 +1,194 @@
+"""The continuation problem of equilibria over one parameter."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues, unstable_count
+from fecontact.bifurcation.equilibria.linear import solution
+from fecontact.bifurcation.equilibria.normal_forms import (
+    branching_tangents,
+    critical_pair,
+    fold_coefficient,
+    hopf,
+    null_vectors,
+)
+from fecontact.bifurcation.fields.multilinear_forms import bend
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.core.errors import AnalysisError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+# Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.
+_TRANSVERSAL = 1e-5
+_HUGE = 1e100
+# Rate along the branch, relative to the largest eigenvalue, below which a pair does not cross the
+# imaginary axis but lies on it, as those of undamped modes do.
+_CROSSING = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class _Bordered:
+    """df/dx, df/dp and f at one place."""
+
+    residual: Array
+    matrix: Array
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        return solution(np.vstack([self.matrix, row]), rhs)
+
+    @property
+    def jacobian(self) -> Array:
+        return self.matrix[:, :-1]
+
+    @cached_property
+    def eigenvalues(self) -> ComplexArray:
+        return sorted_eigenvalues(self.jacobian)
+
+
+class EquilibriumProblem(Problem):
+    """f(x, p) = 0 with one parameter of the field free; unknowns u = [x, p]."""
+
+    def __init__(
+        self, field: VectorField, values: Array, index: int, scales: Array, width: float,
+        limits: Array | None = None,
+    ) -> None:
+        self.field, self.index, self.scales = field, index, scales
+        self._values, self._width, self._limits = values.copy(), width, limits
+        self._weights = np.append(scales, width) ** -2.0
+
+    def values(self, u: Array) -> Array:
+        """Parameter values (k,) at u."""
+        values = self._values.copy()
+        values[self.index] = u[-1]
+        return values
+
+    def linearise(self, u: Array) -> _Bordered:
+        """The rates and their derivatives at u."""
+        f, J, P = self.field.derivatives(np.zeros(1), np.ascontiguousarray(u[None, :-1]),
+                                         self.values(u), (self.index,))
+        matrix = np.concatenate([J[0], P[0]], axis=1)
+        if not max(np.abs(f).max(), np.abs(matrix).max()) < _HUGE:
+            raise AnalysisError("The rates grow beyond all numbers there.")
+        return _Bordered(f[0], matrix)
+
+    def weights(self) -> Array:
+        """From the scales of the states and the width of the diagram."""
+        return self._weights
+
+    def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array] | None:
+        """Where the scales were not given, they grow with the states."""
+        if self._limits is None:
+            return None
+        larger = np.clip(np.abs(u[:-1]), self.scales, self._limits)
+        if (larger <= 1.5 * self.scales).all():
+            return None
+        return EquilibriumProblem(self.field, self._values, self.index, larger, self._width,
+                                  self._limits), u, tangent
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
+        """State, stability and eigenvalues."""
+        eigenvalues = linearisation.eigenvalues
+        unstable = int(unstable_count(eigenvalues))
+        return {"state": u[:-1].copy(), "unstable": unstable, "stable": unstable == 0,
+                "eigenvalues": eigenvalues}
+
+    def unstable_range(
+        self, linearisation: Any, values: Mapping[str, Any]
+    ) -> tuple[int, int]:
+        """Eigenvalues on the imaginary axis, to rounding, may lie on either side."""
+        eigenvalues = linearisation.eigenvalues
+        return int(values["unstable"]), len(eigenvalues) - int(unstable_count(-eigenvalues))
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
+        """Branch points and Hopf points; see :func:`pair_test`."""
+        scaled = np.vstack([linearisation.matrix, tangent * self._weights])
+        scaled = scaled / np.sqrt(self._weights)
+        scaled = scaled / np.abs(scaled).max()
+        sign = np.linalg.slogdet(scaled)[0]
+        smallest = np.linalg.svd(scaled, compute_uv=False)[-1]
+        return {"branch point": float(sign * smallest),
+                "Hopf": pair_test(linearisation.eigenvalues)}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> Mapping[str, Any] | None:
+        """Details of a fold, Hopf or branch point; None for what only looks like one."""
+        if kind == "Hopf":
+            return self._hopf(u, linearisation, tangent)
+        x, values = np.ascontiguousarray(u[:-1]), self.values(u)
+        v, w = null_vectors(linearisation.jacobian)
+        if kind == "fold":
+            P = linearisation.matrix[:, -1]
+            if abs(w @ P) <= _TRANSVERSAL * np.linalg.norm(P):
+                return None
+            return {"null_vector": v,
+                    "coefficient": fold_coefficient(self.field, x, values, self.scales)}
+        if kind == "branch point":
+            other = branching_tangents(self.field, x, values, self.index, self.scales, tangent)
+            return {"null_vector": v} | ({} if other is None else {"other_tangent": other})
+        return {}
+
+    def _hopf(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any] | None:
+        """Details of a Hopf point; None for real eigenvalues, or a pair that does not cross."""
+        if not crossing_is_complex(linearisation.eigenvalues):
+            return None
+        x = np.ascontiguousarray(u[:-1])
+        speed = self._crossing_speed(u, linearisation, tangent)
+        if abs(speed) <= _CROSSING * np.abs(linearisation.eigenvalues).max():
+            return None
+        found = hopf(self.field, x, self.values(u), self.scales)
+        return {
+            "angular_frequency": found.angular_frequency,
+            "frequency_hz": found.angular_frequency / (2.0 * np.pi),
+            "period": 2.0 * np.pi / found.angular_frequency,
+            "crossing_speed": speed / float(tangent[-1]) if tangent[-1] else np.inf,
+            "eigenvector": found.eigenvector,
+            "first_lyapunov": found.first_lyapunov,
+            "first_lyapunov_error": found.error,
+            "criticality": found.criticality,
+        }
+
+
+    def _crossing_speed(self, u: Array, linearisation: Any, tangent: Array) -> float:
+        """Rate of the critical pair's real part along the branch: Re p^H (dJ/ds) q."""
+        _, q, p = critical_pair(linearisation.jacobian)
+        values = self.values(u)
+        shift = np.zeros(len(values))
+        shift[self.index] = tangent[-1]
+        bent, _ = bend(self.field, np.ascontiguousarray(u[:-1]), values,
+                       np.ascontiguousarray(tangent[:-1]), self.scales, (), shift, every=4)
+        return float(np.vdot(p, bent.first @ q).real)
+
+
+def pair_test(eigenvalues: ComplexArray) -> float:
+    """Zero where two eigenvalues add up to zero: a Hopf point, or real ones of opposite sign.
+
+    The sign is that of the product of all sums of two; it changes at each of them. The size is
+    that of the smallest real sum.
+    """
+    real = eigenvalues[eigenvalues.imag == 0.0].real
+    first, second = np.triu_indices(len(real), 1)
+    sums = np.concatenate([2.0 * eigenvalues[eigenvalues.imag > 0.0].real,
+                           real[first] + real[second]])
+    if not len(sums):
+        return 1.0
+    sign = -1.0 if (sums < 0.0).sum() % 2 else 1.0
+    return float(sign * np.abs(sums).min())
+
+
+def crossing_is_complex(eigenvalues: ComplexArray) -> bool:
+    """Whether the sum nearest to zero in :func:`pair_test` is that of a complex pair."""
+    real = eigenvalues[eigenvalues.imag == 0.0].real
+    pairs = eigenvalues[eigenvalues.imag > 0.0]
+    if not len(pairs):
+        return False
+    first, second = np.triu_indices(len(real), 1)
+    of_reals = np.abs(real[first] + real[second]).min(initial=np.inf)
+    return bool(2.0 * np.abs(pairs.real).min() < of_reals)

@@ -1,0 +1,141 @@
+"""Maps of the stability of an equilibrium over two parameters."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.bifurcation.equilibria.equilibrium import (
+    Equilibrium,
+    find_equilibrium,
+    newton,
+    unstable_count,
+)
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.core.errors import AnalysisError, InputError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityMap:
+    """Eigenvalues of an equilibrium over a grid of two parameters.
+
+    Attributes
+    ----------
+    names : (str, str)
+        The parameters.
+    first, second : (n1,), (n2,) arrays
+        Their values.
+    states : (n1, n2, d) array
+        The equilibria; NaN where there is none.
+    critical : (n1, n2) complex array
+        Eigenvalue with the largest real part, of a pair the one with positive frequency [1/s].
+    unstable : (n1, n2) array of int
+        Number of eigenvalues with positive real part; -1 where there is no equilibrium.
+    """
+
+    names: tuple[str, str]
+    first: Array
+    second: Array
+    states: Array
+    critical: ComplexArray
+    unstable: NDArray[np.int64]
+
+    @property
+    def growth_rate(self) -> Array:
+        """Largest real part (n1, n2) [1/s]; positive where the equilibrium is unstable."""
+        return self.critical.real
+
+    @property
+    def frequency_hz(self) -> Array:
+        """Frequency (n1, n2) of the critical mode [Hz]."""
+        return np.asarray(np.abs(self.critical.imag) / (2.0 * np.pi))
+
+
+def stability_map(
+    field: VectorField, grid: Mapping[str, ArrayLike], *,
+    start: Equilibrium | ArrayLike | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> StabilityMap:
+    """Stability of an equilibrium over a grid of two parameters, such as speed and friction.
+
+    The equilibrium is followed from point to point by Newton's method; where it gets lost it is
+    looked for anew (for contact systems), and where there is none the map has NaN.
+
+    Parameters
+    ----------
+    field : VectorField
+        Its rates must not depend on time.
+    grid : mapping
+        Two names of parameters, and the values of each.
+    start : Equilibrium or (d,) sequence, optional
+        An equilibrium near that of the first values; see
+        :func:`fecontact.bifurcation.equilibria.equilibrium.find_equilibrium`.
+    progress : callable, optional
+        Told the part of the map that is done, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        If there are not two parameters, or one is unknown or out of range.
+    AnalysisError
+        If there is no equilibrium at the first values.
+    """
+    require_field(field)
+    if len(grid) != 2:
+        raise InputError(f"A stability map is over two parameters, not {len(grid)}; give the "
+                         f"values of two by name.")
+    names = tuple(grid)
+    indices = [field.index(name) for name in names]
+    axes = [np.array(values, dtype=float).ravel() for values in grid.values()]
+    for name, axis in zip(names, axes, strict=True):
+        if not len(axis) or not np.isfinite(axis).all():
+            raise InputError(f"The values of {name} for a stability map must be finite numbers, "
+                             f"at least one.")
+    begin = start.state if isinstance(start, Equilibrium) else start
+    corner = {name: float(axis[0]) for name, axis in zip(names, axes, strict=True)}
+    row_start: Array | None = find_equilibrium(field, corner, start=begin).state
+    shape = (len(axes[0]), len(axes[1]))
+    d = field.dimension
+    states, jacobians = np.full((*shape, d), np.nan), np.zeros((*shape, d, d))
+    values = field.values
+    for i in range(shape[0]):
+        x = row_start
+        for j in range(shape[1]):
+            values[indices] = axes[0][i], axes[1][j]
+            found = _equilibrium(field, values, x)
+            x = None if found is None else found[0]
+            if found is not None:
+                states[i, j], jacobians[i, j] = found
+            if j == 0 and x is not None:
+                row_start = x
+        if progress is not None:
+            progress((i + 1) / shape[0])
+    eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
+    order = np.lexsort((-eigenvalues.imag, -eigenvalues.real), axis=-1)
+    critical = np.take_along_axis(eigenvalues, order[..., :1], axis=-1)[..., 0]
+    unstable = unstable_count(eigenvalues)
+    lost = np.isnan(states[..., 0])
+    critical[lost], unstable[lost] = np.nan, -1
+    return StabilityMap((names[0], names[1]), axes[0], axes[1], states, critical, unstable)
+
+
+def _equilibrium(
+    field: VectorField, values: Array, near: Array | None
+) -> tuple[Array, Array] | None:
+    if near is not None:
+        close = newton(field, near, values, 1e-9)
+        if close is not None:
+            return close
+    if not isinstance(field, ContactField):
+        return None
+    parameters = dict(zip(field.parameters, values.tolist(), strict=True))
+    try:
+        found = find_equilibrium(field, parameters)
+        return found.state, found.jacobian
+    except AnalysisError:
+        return None

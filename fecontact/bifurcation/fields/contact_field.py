@@ -1,0 +1,151 @@
+"""A contact system as a vector field of some of its parameters."""
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.fields.parametrised_system import SystemFamily
+from fecontact.bifurcation.fields.vector_field import Array, VectorField
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices
+from fecontact.system import field_kernels as kernels
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.forcing_period import common_period
+
+_DIRECTIONS = ("x", "y", "rotation")
+# Step of differences in a parameter, relative to its value.
+_STEP = 2e-4
+# Part of the base value below which the step does not get any smaller.
+_LEAST = 1e-3
+# Arrays that decide on what is given in time.
+_FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
+                      "profile_parameters", "friction_scale_parameters",
+                      "ground_motion_parameters"})
+
+
+class ContactField(VectorField):
+    """See :func:`contact_field`."""
+
+    def __init__(self, family: SystemFamily) -> None:
+        self._family = family
+        self.parameters = MappingProxyType(dict(family.parameters))
+        self._base_values = self.values
+        base = family.base
+        modes = range(1, base.basis.modes + 1)
+        self.state_names = (*(f"q{i}" for i in modes), *(f"q{i}'" for i in modes),
+                            *(f"z{j}.{k + 1}" for j in range(base.basis.contact_nodes)
+                              for k in range(base.memory)))
+        varying = family.varying
+        self._constant_period = varying is not None and not self._moves_forcing(varying)
+
+    def _moves_forcing(self, varying: frozenset[str]) -> bool:
+        moved = varying & _FORCING
+        ground = self._family.base.ground
+        flat = not ground.wavy and ground.friction_variation is None and ground.motion is None
+        if flat and "profile_parameters" not in moved:
+            moved = moved - {"ground_motion_parameters"}
+        return bool(moved)
+
+    def system(self, values: Array | None = None) -> ContactSystem:
+        """The contact system for parameter values (k,); the base values by default.
+
+        Raises
+        ------
+        InputError
+            If a value is out of its parameter's range.
+        """
+        return self._family.system(self.values if values is None else values)
+
+    def rates(self, t: Array, x: Array, values: Array) -> Array:
+        """Rates (N, d); see :meth:`VectorField.rates`."""
+        f = np.empty_like(x)
+        kernels.batch_rates(t, x, self._family.arrays(values), f)
+        return f
+
+    def derivatives(
+        self, t: Array, x: Array, values: Array, active: Iterable[int] = ()
+    ) -> tuple[Array, Array, Array]:
+        """Rates and their derivatives; see :meth:`VectorField.derivatives`."""
+        chosen = tuple(active)
+        n, d = x.shape
+        f, J = np.empty((n, d)), np.empty((n, d, d))
+        arrays = self._family.arrays(values)
+        if not chosen:
+            kernels.batch_derivatives(t, x, arrays, arrays, 0.0, f, J, np.empty((0, 0)))
+            return f, J, np.empty((n, d, 0))
+        columns = []
+        for index in chosen:
+            column = np.empty((n, d))
+            slopes = self._family.slopes(values, index, _STEP * (abs(float(values[index])) or 1.0))
+            kernels.batch_derivatives(t, x, arrays, slopes, self._step(values, index), f, J, column)
+            columns.append(column)
+        P = columns[0][:, :, np.newaxis] if len(columns) == 1 else np.stack(columns, axis=2)
+        return f, J, P
+
+    def _step(self, values: Array, index: int) -> float:
+        """Step for laws; their parameters need not be small where the value is."""
+        base = abs(float(self._base_values[index]))
+        return _STEP * (max(abs(float(values[index])), _LEAST * base) or 1.0)
+
+    def forcing_period(self, values: Array) -> float | None:
+        """Common period [s] of drive, loads and ground; None where nothing depends on time.
+
+        Raises
+        ------
+        AnalysisError
+            If what is given in time has no common period.
+        """
+        return self._base_period if self._constant_period else common_period(self.system(values))
+
+    @cached_property
+    def _base_period(self) -> float | None:
+        return common_period(self.system())
+
+    def displacement_row(self, point: str | int, direction: str = "x") -> Array:
+        """Row (d,) that gives the displacement of a point [m] from a state.
+
+        ``point`` is 'B', 'C', a named point or the number of a contact node, ``direction`` 'x',
+        'y' or 'rotation' (then in rad).
+
+        Raises
+        ------
+        InputError
+            For a point or a direction that does not exist.
+        """
+        if direction not in _DIRECTIONS:
+            raise InputError(f"direction = {direction!r} must be one of {choices(_DIRECTIONS)}.")
+        basis = self._family.base.basis
+        row = np.zeros(self.dimension)
+        row[: basis.modes] = basis.T[basis.point_index(point), _DIRECTIONS.index(direction)]
+        return row
+
+
+def contact_field(
+    system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str]
+) -> ContactField:
+    """A contact system as a vector field x' = f(t, x, p), x = [q, q', z].
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Smoothed laws; the derivatives are the system's own. Laws alone are differenced, to fourth
+        order, where a parameter of the field moves their parameters.
+    parameters : mapping, or sequence of str
+        Dotted names of the system's parameters, with values or None for the value that the system
+        has; or names of your own with a pair (value, function), the function making a system from
+        a system and a value::
+
+            contact_field(system, {"ground.speed": None, "B": (10.0, with_normal_force)})
+
+        They are set in the order given.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, or it has a value per node.
+    """
+    require_kind("contact_field", ContactSystem, system=system)
+    return ContactField(SystemFamily(system, parameters))

@@ -1,0 +1,263 @@
+"""A vector field from a user's function of one state."""
+
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from types import CodeType, MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.bifurcation.fields import function_kernels as kernels
+from fecontact.bifurcation.fields.vector_field import Array, VectorField
+from fecontact.core.compiled import CompiledLaw, compile_law
+from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
+
+_FORM = "f(t, x, p, out)"
+_WAYS = ("automatic", "complex", "differences")
+# Places at which the complex step is compared with differences before it is used.
+_SAMPLES = 16
+# What takes complex numbers and loses their imaginary part.
+_NOT_ANALYTIC = {"abs", "absolute", "fabs", "sign", "real", "imag", "conj", "conjugate", "angle"}
+
+
+class FunctionField(VectorField):
+    """See :meth:`vector_field`.
+
+    Attributes
+    ----------
+    differentiation : str
+        'complex' or 'differences': how derivatives that are not given are formed.
+    """
+
+    def __init__(
+        self,
+        rates: CompiledLaw,
+        jacobian: CompiledLaw | None,
+        complex_rates: CompiledLaw | None,
+        parameters: Mapping[str, float],
+        state_names: tuple[str, ...],
+        scales: Array,
+        period: Callable[[Mapping[str, float]], float] | None,
+        required: bool = False,
+    ) -> None:
+        self.parameters = MappingProxyType(dict(parameters))
+        self.state_names = state_names
+        self.differentiation = "differences" if complex_rates is None else "complex"
+        self._rates, self._jacobian, self._complex = rates, jacobian, complex_rates
+        self._scales, self._period, self._required = scales, period, required
+        # A value may pass zero, and be rounding there.
+        base = np.abs(self.values)
+        self._sizes = np.where(base > 0.0, base, 1.0)
+
+    def rates(self, t: Array, x: Array, values: Array) -> Array:
+        """Rates (N, d); see :meth:`VectorField.rates`."""
+        f = np.empty_like(x)
+        kernels.batch_rates(self._rates.address, t, x, values, f)
+        return f
+
+    def derivatives(
+        self, t: Array, x: Array, values: Array, active: Iterable[int] = ()
+    ) -> tuple[Array, Array, Array]:
+        """Rates and their derivatives; see :meth:`VectorField.derivatives`.
+
+        Warns
+        -----
+        UserWarning
+            If the complex step is wrong at some of the places, and differences take its place.
+
+        Raises
+        ------
+        AnalysisError
+            If it is wrong, and was asked for.
+        """
+        chosen = np.array(tuple(active), dtype=np.int64)
+        f, J, P, wrong = self.checked(t, x, values, chosen)
+        if wrong.any():
+            told = self.complaint(wrong, chosen)
+            if self._required:
+                raise AnalysisError(told)
+            warnings.warn(f"{told} Where the step is wrong, differences take its place.",
+                          stacklevel=2)
+        return f, J, P
+
+    def checked(
+        self, t: Array, x: Array, values: Array, active: NDArray[np.int64]
+    ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        """As :meth:`derivatives`; and at how many places (d + a,) the complex step was wrong."""
+        n, d = x.shape
+        f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(active)))
+        wrong = np.zeros(d + len(active), dtype=np.int64)
+        address, scales, states = self._rates.address, self._scales, self._jacobian is None
+        kernels.batch_rates(address, t, x, values, f)
+        if self._jacobian is not None:
+            kernels.batch_jacobians(self._jacobian.address, t, x, values, J)
+        if not (states or len(active)):
+            return f, J, P, wrong
+        room, complex_room = kernels.rooms(d, len(values))
+        if self._complex is None:
+            kernels.differences(address, t, x, values, scales, self._sizes, f, active,
+                                states, room, J, P)
+        else:
+            kernels.complex_steps(address, self._complex.address, t, x, values, scales,
+                                  self._sizes, f, active, states, room, complex_room, J, P, wrong)
+        return f, J, P, wrong
+
+    def complaint(self, wrong: NDArray[np.int64], active: NDArray[np.int64]) -> str:
+        """Sentence that says for which states and parameters the complex step is wrong."""
+        parameters = list(self.parameters)
+        names = [*self.state_names, *(parameters[index] for index in active)]
+        listed = ", ".join(repr(name) for name, count in zip(names, wrong, strict=True) if count)
+        return (f"The complex step does not get the derivatives of {self._rates.python.__name__} "
+                f"to {listed} right; choose differentiation = 'differences' or give a jacobian.")
+
+    def forcing_period(self, values: Array) -> float | None:
+        """Period as the user gives it [s]; None where f does not depend on t."""
+        if self._period is None:
+            return None
+        return float(self._period(dict(zip(self.parameters, values.tolist(), strict=True))))
+
+    def state_scales(self, values: Array) -> Array:
+        """Typical sizes (d,) as the user gives them."""
+        return self._scales
+
+
+def vector_field(
+    function: Callable[..., Any],
+    parameters: Mapping[str, float],
+    states: int | Iterable[str],
+    *,
+    jacobian: Callable[..., Any] | None = None,
+    differentiation: str = "automatic",
+    scales: ArrayLike | None = None,
+    period: Callable[[Mapping[str, float]], float] | None = None,
+) -> VectorField:
+    """A vector field from a function of one state, compiled by numba.
+
+    Parameters
+    ----------
+    function : callable
+        ``f(t, x, p, out)`` that fills out (d,) with the rates at the state x (d,), for the
+        parameters p (k,). It is compiled: arithmetic, ``math`` or ``numpy`` functions, loops.
+    parameters : mapping
+        Names and base values, in the order of p.
+    states : int or sequence of str
+        Number of states, or their names.
+    jacobian : callable, optional
+        ``g(t, x, p, out)`` that fills out (d, d) with df_i/dx_j.
+    differentiation : 'automatic', 'complex' or 'differences'
+        How derivatives that are not given are formed. 'differences' are central ones,
+        extrapolated to order six, over steps that are halved, from 2e-3 of the larger of the
+        state and its scale on, until truncation is below rounding: good to some 1e-11 of the
+        rates over the scale, with kinks and steep laws beside the state too. 'complex' is the
+        complex step, exact to round-off for functions that are analytic and accept complex
+        numbers (``numpy`` functions instead of those of ``math``; no comparisons, abs, sign,
+        min or max of states, no powers of negative numbers). It is compared with differences
+        wherever it is used, and refused where it is wrong by more than 1e-7. 'automatic' is
+        complex if that is right at samples of either sign around zero, up to twice the
+        scales, else differences; see :attr:`differentiation` of the result. Where it turns
+        out wrong later, as functions do that overflow, differences take its place there, with
+        a warning.
+    scales : sequence, optional
+        Typical size (d,) of each state; one by default. Smaller states are fine.
+    period : callable, optional
+        Period in t from the parameters by name, for a function that depends on t.
+
+    Raises
+    ------
+    InputError
+        If the function cannot be compiled, or does not allow the differentiation asked for.
+        With 'complex', derivatives raise :class:`AnalysisError` where it turns out wrong.
+    """
+    if differentiation not in _WAYS:
+        raise InputError(f"differentiation = {differentiation!r} must be one of "
+                         f"{choices(_WAYS)}.")
+    names = (tuple(f"x{i + 1}" for i in range(states)) if isinstance(states, int)
+             else tuple(states))
+    if not names:
+        raise InputError("A vector field needs at least one state.")
+    require_finite("Vector field", **dict(parameters))
+    typical = np.ones(len(names)) if scales is None else np.array(scales, dtype=float)
+    if typical.shape != (len(names),) or not (typical > 0.0).all():
+        raise InputError(f"scales = {scales!r} must hold {len(names)} numbers above zero, one for "
+                         f"each state.")
+    rates = compile_law(kernels.RATES, _FORM, function)
+    _ = rates.address
+    given = None if jacobian is None else compile_law(kernels.JACOBIAN, _FORM, jacobian)
+    if given is not None:
+        _ = given.address
+    required = differentiation == "complex"
+    complex_rates = None
+    if differentiation != "differences":
+        complex_rates = _analytic(function, required)
+    if complex_rates is not None:
+        made = FunctionField(rates, given, complex_rates, parameters, names, typical, period,
+                             required)
+        told = _wrong_at_samples(made)
+        if told is None:
+            return made
+        if required:
+            raise InputError(told)
+    return FunctionField(rates, given, None, parameters, names, typical, period)
+
+
+def _wrong_at_samples(field: FunctionField) -> str | None:
+    """What is wrong with the complex step up to twice the scales, of either sign; None if nothing.
+
+    The samples are those of a Kronecker sequence: without order, but always the same.
+    """
+    d = field.dimension
+    spread = np.arange(1.0, _SAMPLES + 1.0)[:, None] * np.sqrt(np.arange(2.0, d + 2.0) + 0.37)
+    x = (4.0 * np.modf(spread)[0] - 2.0) * field.state_scales(field.values)
+    period = field.forcing_period(field.values) or 0.0
+    t = period * np.arange(_SAMPLES) / _SAMPLES
+    every = np.arange(len(field.parameters))
+    wrong = field.checked(t, x, field.values, every)[3]
+    return field.complaint(wrong, every) if wrong.any() else None
+
+
+def _analytic(function: Callable[..., Any], required: bool) -> CompiledLaw | None:
+    """The function for complex numbers, if it is analytic as far as can be seen."""
+    used = _names(function, set()) & _NOT_ANALYTIC
+    if used:
+        if required:
+            raise InputError(f"The function {function.__name__} uses {choices(used)}, which the "
+                             f"complex step does not get right; choose "
+                             f"differentiation = 'differences' or give a jacobian.")
+        return None
+    compiled = compile_law(kernels.COMPLEX_RATES, _FORM, function)
+    try:
+        _ = compiled.address
+    except (InputError, NotImplementedError) as error:
+        if required:
+            raise InputError(f"The function {function.__name__} does not take complex numbers; use "
+                             f"numpy functions and no comparisons, or choose "
+                             f"differentiation = 'differences'.") from error
+        return None
+    return compiled
+
+
+def _names_of(code: Any) -> set[str]:
+    """Names that the code of a function uses, and that of functions inside it."""
+    if not isinstance(code, CodeType):
+        return set()
+    return set(code.co_names).union(*(_names_of(inner) for inner in code.co_consts))
+
+
+def _names(function: Any, seen: set[int]) -> set[str]:
+    """Names that a function uses, and those of the functions that it calls."""
+    function = getattr(function, "py_func", function)
+    code = getattr(function, "__code__", None)
+    if not isinstance(code, CodeType) or id(code) in seen:
+        return set()
+    seen.add(id(code))
+    names = _names_of(code)
+    closure = getattr(function, "__closure__", None) or ()
+    outside = dict(zip(code.co_freevars, (cell.cell_contents for cell in closure), strict=False))
+    for name in (*code.co_names, *code.co_freevars):
+        called = outside.get(name, function.__globals__.get(name))
+        if callable(called):
+            if called is abs:
+                names.add("abs")
+            names |= _names(called, seen)
+    return names

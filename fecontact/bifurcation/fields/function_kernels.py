@@ -1,0 +1,269 @@
+"""Compiled loops over many states for a vector field that is given by its address."""
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import (
+    block,
+    borrowed,
+    f8,
+    function_at,
+    helper,
+    i8,
+    integers,
+    kernel,
+    matrix,
+    vector,
+)
+
+Array = NDArray[np.float64]
+c16 = types.complex128
+complex_vector = types.Array(c16, 1, "C")
+complex_matrix = types.Array(c16, 2, "C")
+
+RATES = types.void(f8, vector, vector, vector)
+JACOBIAN = types.void(f8, vector, vector, matrix)
+COMPLEX_RATES = types.void(f8, complex_vector, complex_vector, complex_vector)
+
+_rates_at = function_at(RATES)
+_jacobian_at = function_at(JACOBIAN)
+_complex_rates_at = function_at(COMPLEX_RATES)
+
+# Step of the complex step: its square is lost against one.
+_TINY = 1e-30
+# Widest step of extrapolated differences, and step of those with which the complex step is
+# compared, relative to the state or parameter, or to its scale if that is larger. No powers of two:
+# these might be periods of the function.
+_WIDEST, _CHECK = 2.1e-3, 2.3e-4
+# Halvings of the widest step: enough for a function that changes over 1e-9 of the scale.
+_LEVELS = 36
+# Places beside the state at which the rounding of the rates is measured.
+_PROBES = 16
+# Relative error of the complex step that is let pass.
+_RIGHT = 1e-7
+_EPS = 2.220446049250313e-16
+
+
+@helper
+def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, best, error):  # type: ignore[no-untyped-def]
+    """Fill best (d,) with the derivative to ``moved[at]``, an entry of y or q, and its error (d,).
+
+    Central differences over steps h that are halved again and again, extrapolated to order six.
+    The error is the change from order four to order six, and rounding; the step with the least
+    counts, for each rate, and is kept in orders[3]. What lies between x - h and x + h is seen by f
+    at x: a second difference that does not fall with h^2 shows a function that changes over less
+    than h. Once a rate has converged, the first step at which its error grows is the last one: over
+    shorter ones only rounding is seen, and none at all where it keeps f from changing.
+    """
+    value, h = moved[at], _WIDEST * size
+    for i in range(len(f)):
+        best[i], error[i], orders[4, i] = np.nan, np.inf, 0.0
+    for level in range(_LEVELS):
+        moved[at] = value + h
+        function(t, y, q, above)
+        moved[at] = value - h
+        function(t, y, q, below)
+        width = (value + h) - (value - h)
+        if not width > 0.0:
+            break
+        done, largest = level > 1, 0.0
+        for i in range(len(f)):
+            if abs(best[i]) > largest:
+                largest = abs(best[i])
+        for i in range(len(f)):
+            change = above[i] - below[i]
+            of_two = change / width
+            of_four = (4.0 * of_two - orders[0, i]) / 3.0
+            of_six = (16.0 * of_four - orders[1, i]) / 15.0
+            size_f = max(abs(above[i]), abs(below[i]), abs(f[i]))
+            noise = 4.0 * _EPS * size_f / h
+            second = above[i] + below[i] - 2.0 * f[i]
+            unseen = abs(second - orders[2, i]) - 0.1 * abs(orders[2, i]) - 0.01 * abs(change) \
+                - 16.0 * _EPS * size_f
+            off = abs(of_six - of_four) + noise + max(unseen, 0.0) / h
+            if off > 2.0 * error[i] and error[i] <= 1e-6 * abs(best[i]) + 1e-12 * largest:
+                orders[4, i] = 1.0
+            if level > 1 and off < error[i] and orders[4, i] == 0.0:
+                best[i], error[i], orders[3, i] = of_six, off, h
+            if not (off <= 2.0 * noise or orders[4, i] == 1.0):
+                done = False
+            orders[0, i], orders[1, i], orders[2, i] = of_two, of_four, 0.25 * second
+        if done:
+            break
+        h *= 0.5
+    moved[at] = value
+
+
+@helper
+def _roughness(function, t, y, q, moved, at, size, above, below, orders):  # type: ignore[no-untyped-def]
+    """Fill orders[0] with how much the rates jump beside x: their rounding, cancellation included.
+
+    It shows in second differences over steps, 1e-6 and less, over which the function is straight.
+    """
+    value, h = moved[at], _WIDEST * size
+    for i in range(len(above)):
+        orders[0, i] = 0.0
+    for sample in range(_PROBES):
+        place, part = value + h, 1e-9 * 4.0 ** (sample % 6) * size
+        moved[at] = place
+        function(t, y, q, above)
+        for i in range(len(above)):
+            orders[1, i] = -2.0 * above[i]
+        moved[at] = place + part
+        function(t, y, q, above)
+        moved[at] = place - part
+        function(t, y, q, below)
+        for i in range(len(above)):
+            jump = abs(above[i] + below[i] + orders[1, i])
+            if jump > orders[0, i]:
+                orders[0, i] = jump
+        h *= -0.4
+    moved[at] = value
+
+
+@helper
+def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, error, column):  # type: ignore[no-untyped-def]
+    """Put differences where the derivatives (d,) by the complex step are wrong; True if any are."""
+    value, h = moved[at], _CHECK * size
+    moved[at] = value + h
+    function(t, y, q, above)
+    moved[at] = value - h
+    function(t, y, q, below)
+    moved[at] = value
+    width = (value + h) - (value - h)
+    right = True
+    for i in range(len(f)):
+        change = above[i] - below[i]
+        noise = 64.0 * _EPS * (abs(above[i]) + abs(below[i]) + abs(f[i]))
+        seen = abs(above[i] + below[i] - 2.0 * f[i]) <= 0.01 * abs(change) + noise
+        near = abs(column[i] * width - change) <= _RIGHT * abs(change) + noise
+        right = right and seen and near
+    if right:
+        return False
+    _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, best, error)
+    wrong, largest = False, 0.0
+    for i in range(len(f)):
+        off = abs(column[i] - best[i])
+        if error[i] < np.inf:
+            largest = max(largest, abs(best[i]))
+            if not off <= 4.0 * error[i] + _RIGHT * abs(best[i]):
+                wrong = True
+    if not wrong:
+        return False
+    _roughness(function, t, y, q, moved, at, size, above, below, orders)
+    wrong = False
+    for i in range(len(f)):
+        off = abs(column[i] - best[i])
+        # A derivative that is zero but for rounding is another one in complex arithmetic.
+        rough = 4.0 * error[i] + 16.0 * orders[0, i] / orders[3, i] + 1e-12 * largest
+        if error[i] < np.inf and not off <= rough + _RIGHT * abs(best[i]):
+            column[i] = best[i]
+            wrong = True
+    return wrong
+
+
+@kernel(types.void(i8, vector, matrix, vector, matrix))
+def batch_rates(address, t, x, p, f):  # type: ignore[no-untyped-def]
+    """Fill f (N, d)."""
+    function = _rates_at(address)
+    for k in range(len(t)):
+        function(t[k], x[k], p, f[k])
+
+
+@kernel(types.void(i8, vector, matrix, vector, block))
+def batch_jacobians(address, t, x, p, J):  # type: ignore[no-untyped-def]
+    """Fill J (N, d, d) by the function that gives one."""
+    function = _jacobian_at(address)
+    for k in range(len(t)):
+        function(t[k], x[k], p, J[k])
+
+
+@kernel(types.void(i8, i8, vector, matrix, vector, vector, vector, matrix, integers,
+                   types.boolean, matrix, complex_matrix, block, block, integers))
+def complex_steps(  # type: ignore[no-untyped-def]
+    address, complex_address, t, x, p, scales, sizes, f, active, states, room, complex_room, J, P,
+    wrong,
+):
+    """Fill J (N, d, d) if ``states``, and P (N, d, a), by the complex step.
+
+    Each column is compared with differences, which take the place of what differs from them:
+    ``wrong`` (d + a,) counts the places at which that is so, by columns of J and P. The rooms are
+    those of :func:`rooms`; ``scales`` (d,) and ``sizes`` (k,) are typical of states and parameters.
+    """
+    function, complex_function = _rates_at(address), _complex_rates_at(complex_address)
+    x, p, f, room, complex_room = (borrowed(x), borrowed(p), borrowed(f), borrowed(room),
+                                   borrowed(complex_room))
+    d, k = x.shape[1], len(p)
+    above, below, best, error, column, y = (room[0, :d], room[1, :d], room[2, :d], room[3, :d],
+                                            room[4, :d], room[5, :d])
+    orders, q = room[6:11], room[11, :k]
+    z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]
+    q[:] = p
+    for a in range(k):
+        w[a] = p[a]
+    wrong[:] = 0
+    for n in range(len(t)):
+        for i in range(d):
+            z[i], y[i] = x[n, i], x[n, i]
+        for j in range(d if states else 0):
+            z[j] = complex(x[n, j], _TINY)
+            complex_function(t[n], z, w, out)
+            z[j] = x[n, j]
+            for i in range(d):
+                column[i] = out[i].imag / _TINY
+            size = max(abs(x[n, j]), scales[j])
+            if _correct(function, t[n], y, q, y, j, size, f[n], above, below, orders, best, error,
+                        column):
+                wrong[j] += 1
+            for i in range(d):
+                J[n, i, j] = column[i]
+        for a in range(len(active)):
+            at = active[a]
+            w[at] = complex(p[at], _TINY)
+            complex_function(t[n], z, w, out)
+            w[at] = p[at]
+            for i in range(d):
+                column[i] = out[i].imag / _TINY
+            size = max(abs(p[at]), sizes[at])
+            if _correct(function, t[n], y, q, q, at, size, f[n], above, below, orders, best, error,
+                        column):
+                wrong[d + a] += 1
+            for i in range(d):
+                P[n, i, a] = column[i]
+
+
+@kernel(types.void(i8, vector, matrix, vector, vector, vector, matrix, integers, types.boolean,
+                   matrix, block, block))
+def differences(  # type: ignore[no-untyped-def]
+    address, t, x, p, scales, sizes, f, active, states, room, J, P,
+):
+    """Fill J (N, d, d) if ``states``, and P (N, d, a), by extrapolated central differences."""
+    function = _rates_at(address)
+    x, p, f, room = borrowed(x), borrowed(p), borrowed(f), borrowed(room)
+    d, k = x.shape[1], len(p)
+    above, below, best, error, y = room[0, :d], room[1, :d], room[2, :d], room[3, :d], room[5, :d]
+    orders, q = room[6:11], room[11, :k]
+    q[:] = p
+    for n in range(len(t)):
+        for i in range(d):
+            y[i] = x[n, i]
+        for j in range(d if states else 0):
+            size = max(abs(x[n, j]), scales[j])
+            _extrapolated(function, t[n], y, q, y, j, size, f[n], above, below, orders, best,
+                          error)
+            for i in range(d):
+                J[n, i, j] = best[i]
+        for a in range(len(active)):
+            at = active[a]
+            size = max(abs(p[at]), sizes[at])
+            _extrapolated(function, t[n], y, q, q, at, size, f[n], above, below, orders, best,
+                          error)
+            for i in range(d):
+                P[n, i, a] = best[i]
+
+
+def rooms(states: int, parameters: int) -> tuple[Array, NDArray[np.complex128]]:
+    """Room for the work on one place, real and complex."""
+    widest = max(states, parameters)
+    return np.empty((12, widest)), np.empty((3, widest), dtype=complex)

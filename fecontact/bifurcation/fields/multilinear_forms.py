@@ -1,0 +1,98 @@
+"""Second and third derivatives of vector fields along directions, by differences of Jacobians."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.core.errors import InputError
+
+Array = NDArray[np.float64]
+
+# Central differences of order eight and six: weights of f(h k) - f(-h k) for the first, and of
+# f(h k) + f(-h k) - 2 f(0) for the second derivative, k = 1..4.
+_FIRST = (np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280]), np.array([3 / 4, -3 / 20, 1 / 60, 0.0]))
+_SECOND = (np.array([8 / 5, -1 / 5, 8 / 315, -1 / 560]), np.array([3 / 2, -3 / 20, 1 / 90, 0.0]))
+
+# Steps that are tried, in units of the scales of the states.
+_STEPS = 3.0 ** np.arange(3.0, -19.0, -1.0)
+# Where both orders agree this well, the step with the best agreement is taken.
+_GOOD = 1e-3
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Derivatives of the Jacobian along a direction e.
+
+    Attributes
+    ----------
+    first : (d, d + a) array
+        d/ds of [df/dx, df/dp] at x + s e: ``first @ y`` is the bilinear form B(e, y).
+    second : (d, d + a) array
+        d^2/ds^2 of the same: ``second @ y`` is the trilinear form C(e, e, y).
+    """
+
+    first: Array
+    second: Array
+
+
+def bend(
+    field: VectorField, x: Array, values: Array, direction: Array, scales: Array,
+    active: tuple[int, ...] = (), shift: Array | None = None, every: int = 1,
+) -> tuple[Bend, Bend]:
+    """Derivatives of the Jacobian at x along a direction (d,), by formulas of order eight and six.
+
+    Steps from 27 scales of the states down to 1e-9 of them are tried, and the one is taken at
+    which both formulas agree best; entries count in the scales of the states. ``shift`` (k,)
+    moves the parameter values along with the states. ``every`` leaves steps out, for derivatives
+    that need not be the best.
+    """
+    size = float(np.linalg.norm(direction / scales))
+    if shift is not None:
+        size = max(size, float(np.abs(shift).max()))
+    if size == 0.0:
+        zero = np.zeros((field.dimension, field.dimension + len(active)))
+        return Bend(zero, zero), Bend(zero, zero)
+    h = _STEPS[::every] / size
+    offsets = h[:, None] * np.arange(-4.0, 5.0)
+    A = _jacobians(field, x, values, direction, offsets.ravel(), active, shift)
+    A = A.reshape(len(h), 9, field.dimension, -1)
+    odd = A[:, 5:] - A[:, 3::-1]
+    even = A[:, 5:] + A[:, 3::-1] - 2.0 * A[:, 4:5]
+    balance = np.append(scales, np.ones(len(active))) / scales[:, None]
+    first, coarse_first = _best(odd, _FIRST, h, balance)
+    second, coarse_second = _best(even, _SECOND, h**2, balance)
+    return Bend(first, second), Bend(coarse_first, coarse_second)
+
+
+def _jacobians(
+    field: VectorField, x: Array, values: Array, direction: Array, offsets: Array,
+    active: tuple[int, ...], shift: Array | None,
+) -> Array:
+    """[df/dx, df/dp] (N, d, d + a) at x + offset e."""
+    places = x + offsets[:, None] * direction
+    if shift is None or not shift.any():
+        _, J, P = field.derivatives(np.zeros(len(places)), places, values, active)
+        return np.concatenate([J, P], axis=2)
+    found = []
+    for place, offset in zip(places, offsets.tolist(), strict=True):
+        try:
+            _, J, P = field.derivatives(np.zeros(1), place[None], values + offset * shift, active)
+            found.append(np.concatenate([J, P], axis=2))
+        except InputError:  # out of the range of a parameter: this step is not taken
+            found.append(np.full((1, field.dimension, field.dimension + len(active)), np.nan))
+    return np.concatenate(found)
+
+
+def _best(
+    parts: Array, weights: tuple[Array, Array], power: Array, balance: Array
+) -> tuple[Array, Array]:
+    fine, coarse = (np.einsum("k,skij->sij", w, parts) / power[:, None, None] for w in weights)
+    with np.errstate(invalid="ignore", over="ignore"):
+        error = np.abs((fine - coarse) * balance).max(axis=(1, 2))
+        size = np.abs(fine * balance).max(axis=(1, 2))
+    error[~np.isfinite(error)] = np.inf
+    relative = np.where(size > 0.0, error / np.where(size > 0.0, size, 1.0), np.inf)
+    at = int(np.argmin(relative)) if relative.min() < _GOOD else int(np.argmin(error))
+    return fine[at], coarse[at]

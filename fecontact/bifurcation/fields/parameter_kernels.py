@@ -1,0 +1,140 @@
+"""Compiled derivatives of a contact system's equations to one of its parameters.
+
+What the equations are linear in, or differentiate by themselves, goes by the chain rule; only a law
+whose own parameters move is differenced, at the state and the forces as they are. The system is
+given as arrays s, and the rates of all of them with the parameter as arrays r of the same form.
+"""
+
+import numpy as np
+
+from fecontact.core.compiled import helper
+from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
+
+# Differences of fourth order: places in steps, and weights in twelfths of a step.
+_PLACES = np.array([1.0, -1.0, 2.0, -2.0])
+_WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0])
+
+
+@helper
+def _beside(parameters, rates, h):  # type: ignore[no-untyped-def]
+    """Laws' parameters (4, k, p) at the places of the differences; (0, k, p) if none moves."""
+    k, p = parameters.shape
+    count = 4 if h > 0.0 and moves(rates) else 0
+    out = np.empty((count, k, p))
+    for place in range(count):
+        for i in range(k):
+            for c in range(p):
+                out[place, i, c] = parameters[i, c] + _PLACES[place] * h * rates[i, c]
+    return out
+
+
+@helper
+def moves(rates):  # type: ignore[no-untyped-def]
+    """Whether any entry of an array (k, p) of rates is not zero."""
+    for row in rates:
+        for rate in row:
+            if rate != 0.0:
+                return True
+    return False
+
+
+@helper
+def laws_beside(s, r, h):  # type: ignore[no-untyped-def]
+    """Parameters of all laws at the places of the differences, each (4, k, p) or (0, k, p).
+
+    Those of normal laws, friction, profile, friction along the ground, its motion, drive, loads.
+    """
+    return (_beside(s.normal_parameters, r.normal_parameters, h),
+            _beside(s.friction_parameters, r.friction_parameters, h),
+            _beside(s.profile_parameters.reshape(1, -1), r.profile_parameters.reshape(1, -1), h),
+            _beside(s.friction_scale_parameters.reshape(1, -1),
+                    r.friction_scale_parameters.reshape(1, -1), h),
+            _beside(s.ground_motion_parameters.reshape(1, -1),
+                    r.ground_motion_parameters.reshape(1, -1), h),
+            _beside(s.drive_parameters, r.drive_parameters, h),
+            _beside(s.load_parameters, r.load_parameters, h))
+
+
+@helper
+def _signal_rates(address, t, beside, row, h):  # type: ignore[no-untyped-def]
+    """Derivatives of a signal's value and rate."""
+    value, slope = 0.0, 0.0
+    for k in range(len(beside)):
+        a, b = signal_at(address)(t, beside[k, row])
+        value += _WEIGHTS[k] / (12.0 * h) * a
+        slope += _WEIGHTS[k] / (12.0 * h) * b
+    return value, slope
+
+
+@helper
+def given_rates(t, s, r, h, laws, load):  # type: ignore[no-untyped-def]
+    """Fill load (m,) with derivatives of the modal forces; returns those of travel and speed."""
+    m = len(load)
+    for i in range(m):
+        load[i] = r.constant_load[i]
+    for k in range(2):
+        value = signal_at(s.drive[k])(t, s.drive_parameters[k])[0]
+        rate = _signal_rates(s.drive[k], t, laws[5], k, h)[0]
+        for i in range(m):
+            load[i] += value * r.drive_shapes[k, i] + rate * s.drive_shapes[k, i]
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
+        rate = _signal_rates(s.load[k], t, laws[6], k, h)[0]
+        for i in range(m):
+            load[i] += value * r.load_shapes[k, i] + rate * s.load_shapes[k, i]
+    return _signal_rates(s.ground_motion, t, laws[4], 0, h)
+
+
+@helper
+def _ground_rates(address, xi, beside, h):  # type: ignore[no-untyped-def]
+    """Derivatives of a ground law's value and slope at one place."""
+    value, slope = 0.0, 0.0
+    for k in range(len(beside)):
+        a, b, _ = ground_at(address)(xi, beside[k, 0])
+        value += _WEIGHTS[k] / (12.0 * h) * a
+        slope += _WEIGHTS[k] / (12.0 * h) * b
+    return value, slope
+
+
+@helper
+def node_rates(j, xi, slip, height, height_rate, z, F, shifts, s, r, h, laws, force, partial, room, room_rates, memory):  # type: ignore[no-untyped-def] # noqa: E501
+    """Derivatives of F, R, slip velocity and pressing force at node j.
+
+    ``shifts`` holds those of xi, height, slip velocity and rate of the height by themselves;
+    ``force`` and ``partial`` are results of :func:`fecontact.system.kernels.node_gradients`.
+    Fills ``memory`` (s,) with what the friction law's own parameters add to the rates of its
+    internal variables; ``room`` (3 + s,) and ``room_rates`` (s, 3 + s) are overwritten.
+    """
+    ground, slope = _ground_rates(s.profile, xi, laws[2], h)
+    F_p = -partial[0, 1] * ground - partial[0, 3] * slope * slip
+    for k in range(4):
+        F_p += partial[0, k] * shifts[k]
+    if len(laws[0]) > 0:
+        ground, slope, _ = ground_at(s.profile)(xi, s.profile_parameters)
+        u, v = ground - height - s.gap[j], slope * slip - height_rate
+        for k in range(4):
+            F_p += _WEIGHTS[k] / (12.0 * h) * normal_at(s.normal[j])(u, v, laws[0][k, j])[0]
+    size, pressing_p = abs(F), F_p if F >= 0.0 else -F_p
+    pressing = size
+    if s.friction_scale != 0:
+        scale, scale_x, _ = ground_at(s.friction_scale)(xi, s.friction_scale_parameters)
+        pressing = scale * size
+        pressing_p = scale * pressing_p + size * (
+            scale_x * shifts[0] + _ground_rates(s.friction_scale, xi, laws[3], h)[0])
+    R_F = force[2]
+    if s.memory[j] == 0 and F == 0.0 and F_p != 0.0:
+        # Friction is not asked for without a normal force, but is about to begin.
+        R_F = friction_at(s.friction[j])(slip, 0.0, s.friction_parameters[j])[2]
+    R_p = force[1] * shifts[2] + R_F * pressing_p
+    for i in range(s.memory[j]):
+        memory[i] = 0.0
+    for k in range(len(laws[1])):
+        weight = _WEIGHTS[k] / (12.0 * h)
+        if s.memory[j] > 0:
+            memory_at(s.friction[j])(slip, pressing, z, laws[1][k, j], room, room_rates)
+            R_p += weight * room[0]
+            for i in range(s.memory[j]):
+                memory[i] += weight * room_rates[i, 0]
+        elif F != 0.0:
+            R_p += weight * friction_at(s.friction[j])(slip, pressing, laws[1][k, j])[0]
+    return F_p, R_p, shifts[2], pressing_p

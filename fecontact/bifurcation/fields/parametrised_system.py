@@ -1,0 +1,343 @@
+"""A contact system as a function of parameters, quick to evaluate.
+
+Making a system and its arrays takes some 0.2 ms of Python. Most arrays are affine in each
+parameter (or constant); where that is found to hold, they are interpolated between the corners of a
+box in which it was checked. Which box it is depends on the values alone, not on those asked for
+before: boxes about the base values, each twice as wide as the one before.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from itertools import product
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import FecontactError, InputError
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import SystemArrays
+
+Array = NDArray[np.float64]
+Setter = Callable[[ContactSystem, float], ContactSystem]
+
+_KEPT = 64
+# More corners than these take longer to make than they save.
+_MOST_PARAMETERS = 4
+_RELATIVE = 1e-12
+# Values more doublings away from the base values are not interpolated.
+_MOST_LEVELS = 50
+
+
+class SystemFamily:
+    """Systems of the same size for parameter values (k,).
+
+    Attributes
+    ----------
+    base : ContactSystem
+        The system before any of the parameters is set.
+    parameters : dict
+        Names and base values.
+    """
+
+    def __init__(
+        self, system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str]
+    ) -> None:
+        require_kind("A field of a system", ContactSystem, system=system)
+        require_kind("A field of a system", Iterable, names=parameters)
+        given = (parameters if isinstance(parameters, Mapping)
+                 else dict.fromkeys([parameters] if isinstance(parameters, str) else parameters))
+        self.base = system
+        self.parameters: dict[str, float] = {}
+        self._setters: list[Setter] = []
+        for name, value in given.items():
+            self.parameters[name], setter = _parameter(system, name, value)
+            self._setters.append(setter)
+        self._made: OrderedDict[bytes, ContactSystem] = OrderedDict()
+        self._size = system.size
+        values = np.array(list(self.parameters.values()), dtype=float)
+        self._latest: tuple[bytes, SystemArrays] | None = None
+        self._boxes: dict[tuple[int, ...], _Corners | None] = {}
+        self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
+        self._base, self._width = values, np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
+        self._first: _Corners | None = None
+        # The box that was asked for last, and between which values it is asked for.
+        self._recent: tuple[list[tuple[float, float]], _Corners] | None = None
+        if 0 < len(values) <= _MOST_PARAMETERS:
+            self.system(values)
+            self._first = self._box((0,) * len(values))
+        self._fixed = self.system(values).arrays if not len(values) else None
+
+    def system(self, values: Array) -> ContactSystem:
+        """The system itself; those made last are kept.
+
+        Raises
+        ------
+        InputError
+            If a value is out of its parameter's range, or changes the number of states.
+        """
+        key = values.tobytes()
+        found = self._made.get(key)
+        if found is not None:
+            return found
+        made = self.base
+        for setter, value in zip(self._setters, values.tolist(), strict=True):
+            made = setter(made, value)
+        if made.size != self._size:
+            raise InputError(f"The parameters {_named(self.parameters, values)} make a system of "
+                             f"{made.size} states from one of {self._size}; their number must "
+                             f"stay the same.")
+        self._made[key] = made
+        if len(self._made) > _KEPT:
+            self._made.popitem(last=False)
+        return made
+
+    def arrays(self, values: Array) -> SystemArrays:
+        """Arrays of the system for the kernels."""
+        if self._fixed is not None:
+            return self._fixed
+        key = values.tobytes()
+        if self._latest is not None and self._latest[0] == key:
+            return self._latest[1]
+        corners = self._corners_of(values)
+        found = self.system(values).arrays if corners is None else corners.at(values)
+        self._latest = (key, found)
+        return found
+
+    def slopes(self, values: Array, index: int, step: float) -> SystemArrays:
+        """Derivatives of the arrays to one value; all else, as the addresses of laws, as it is.
+
+        Where arrays are not affine they are differences of fourth order over a step, which may
+        leave the allowed range.
+        """
+        corners = None if self._fixed is not None else self._corners_of(values)
+        if corners is not None:
+            return corners.slopes(values, index)
+        sides = []
+        for place in (1.0, -1.0, 2.0, -2.0):
+            moved = values.copy()
+            moved[index] += place * step
+            sides.append(self.system(moved).arrays)
+        here = self.system(values).arrays
+        return SystemArrays(*(_slope(step, *each) for each in zip(here, *sides, strict=True)))
+
+    def _corners_of(self, values: Array) -> "_Corners | None":
+        """The box for these values; None where they are not interpolated."""
+        if self._first is None:
+            return None
+        if self._recent is not None and _inside(values, self._recent[0]):
+            return self._recent[1]
+        levels = tuple(_level(value - base, width) for value, base, width in zip(
+            values.tolist(), self._base.tolist(), self._width.tolist(), strict=True))
+        if any(abs(level) > _MOST_LEVELS for level in levels):
+            return None
+        corners = self._box(levels)
+        if corners is None or not corners.hold(values):
+            return None
+        self._recent = [
+            (max(low, base + least), min(high, base + most))
+            for low, high, base, (least, most) in zip(
+                corners.low.tolist(), corners.high.tolist(), self._base.tolist(),
+                map(_offsets, levels, self._width.tolist()), strict=True)], corners
+        return corners
+
+    def _box(self, levels: tuple[int, ...]) -> "_Corners | None":
+        """The box of so many doublings in each parameter; None where nothing is affine in it."""
+        if levels not in self._boxes:
+            low, high = np.array([self._interval(index, level)
+                                  for index, level in enumerate(levels)]).T
+            try:
+                made = _corners(self, low, high)
+            except (_NotAffineError, FecontactError):
+                made = None
+            self._boxes[levels] = made
+        return self._boxes[levels]
+
+    def _interval(self, index: int, level: int) -> tuple[float, float]:
+        """Values of one parameter about its base value, as far as its range allows."""
+        key = (index, level)
+        if key not in self._intervals:
+            base, width = float(self._base[index]), float(self._width[index])
+            far = base + np.copysign(1.0, level) * width * 2.0 ** (abs(level) - 1 if level else 0)
+            # Many ranges end at zero.
+            ends = [end for end in (far, 0.0) if self._allowed(index, end)
+                    and abs(end - base) <= abs(far - base)]
+            beside = base - np.copysign(1.0, level) * width
+            if not self._allowed(index, beside):
+                beside = base
+            end = ends[0] if ends else base
+            if end == beside:
+                end = base + np.copysign(1.0, level) * width
+            self._intervals[key] = (min(end, beside), max(end, beside))
+        return self._intervals[key]
+
+    def _allowed(self, index: int, value: float) -> bool:
+        values = self._base.copy()
+        values[index] = value
+        try:
+            self.system(values)
+        except FecontactError:
+            return False
+        return True
+
+    @property
+    def varying(self) -> frozenset[str] | None:
+        """Names of the arrays that depend on the parameters; None where that is not known."""
+        if self._fixed is not None:
+            return frozenset()
+        return None if self._first is None else self._first.varying
+
+
+class _Corners:
+    """Arrays at the corners of a box of parameter values, and between them."""
+
+    def __init__(self, low: Array, high: Array, corners: list[SystemArrays]) -> None:
+        self.low, self.high = low, high
+        first = corners[0]
+        self._plain = first
+        self._slopes: tuple[tuple[int, bytes], SystemArrays] | None = None
+        stacked: dict[str, Array] = {}
+        for name in first._fields:
+            values = [np.asarray(getattr(arrays, name)) for arrays in corners]
+            if any(value.shape != values[0].shape for value in values):
+                raise _NotAffineError
+            if any((value != values[0]).any() for value in values[1:]):
+                if values[0].dtype.kind != "f":
+                    raise _NotAffineError
+                stacked[name] = np.stack(values)
+        self.varying = frozenset(stacked)
+        # All varying arrays side by side, so that one product interpolates them.
+        self._flat = np.hstack([array.reshape(len(corners), -1) for array in stacked.values()]
+                               or [np.empty((len(corners), 0))])
+        self._limits = list(zip(low.tolist(), high.tolist(), strict=True))
+        self._places: list[tuple[int, slice, tuple[int, ...]]] = []
+        start = 0
+        for name, array in stacked.items():
+            size = array[0].size
+            number = first._fields.index(name)
+            self._places.append((number, slice(start, start + size), array.shape[1:]))
+            start += size
+
+    def hold(self, values: Array) -> bool:
+        for (low, high), value in zip(self._limits, values.tolist(), strict=True):
+            if not low <= value <= high:
+                return False
+        return True
+
+    def at(self, values: Array) -> SystemArrays:
+        weights = [1.0]
+        for (low, high), value in zip(self._limits, values.tolist(), strict=True):
+            x = (value - low) / (high - low)
+            weights = [w * (1.0 - x) for w in weights] + [w * x for w in weights]
+        return self._with(np.array(weights) @ self._flat, list(self._plain))
+
+    def _with(self, flat: Array, arrays: list[Any]) -> SystemArrays:
+        for number, place, shape in self._places:
+            arrays[number] = flat[place].reshape(shape)
+        return SystemArrays(*arrays)
+
+    def slopes(self, values: Array, index: int) -> SystemArrays:
+        """Derivatives of the arrays to one value."""
+        place = values.copy()
+        place[index] = 0.0
+        key = index, place.tobytes()
+        if self._slopes is None or self._slopes[0] != key:
+            weights = [1.0]
+            for each, ((low, high), value) in enumerate(zip(self._limits, values.tolist(),
+                                                            strict=True)):
+                x, rate = (value - low) / (high - low), 1.0 / (high - low)
+                below, above = (-rate, rate) if each == index else (1.0 - x, x)
+                weights = [w * below for w in weights] + [w * above for w in weights]
+            still = [np.zeros_like(array) if isinstance(array, np.ndarray)
+                     and array.dtype.kind == "f" else array for array in self._plain]
+            self._slopes = key, self._with(np.array(weights) @ self._flat, still)
+        return self._slopes[1]
+
+    def agrees(self, arrays: SystemArrays, values: Array) -> bool:
+        mine = self.at(values)
+        for name in arrays._fields:
+            expected, found = np.asarray(getattr(arrays, name)), np.asarray(getattr(mine, name))
+            if expected.shape != found.shape:
+                return False
+            scale = np.abs(expected).max(initial=0.0)
+            if np.abs(expected - found).max(initial=0.0) > _RELATIVE * scale:
+                return False
+        return True
+
+
+class _NotAffineError(Exception):
+    pass
+
+
+def _slope(step: float, here: Any, above: Any, below: Any, far_above: Any, far_below: Any) -> Any:
+    """Derivative of fourth order of one array; ``here`` if it does not hold numbers of laws."""
+    if not (isinstance(here, np.ndarray) and here.dtype.kind == "f"):
+        return here
+    return (8.0 * (above - below) - (far_above - far_below)) / (12.0 * step)
+
+
+def _level(off: float, width: float) -> int:
+    """Least n, with the sign of ``off``, for which |off| lies within 2^(|n| - 1) widths."""
+    if abs(off) <= width:
+        return 0 if off >= 0.0 else -1
+    doublings = int(np.ceil(np.log2(abs(off) / width))) if np.isfinite(off) else _MOST_LEVELS
+    return (doublings + 1) * (1 if off > 0.0 else -1)
+
+
+def _offsets(level: int, width: float) -> tuple[float, float]:
+    """Between which offsets :func:`_level` surely gives a level."""
+    far = (1.0 - 1e-9) * width * 2.0 ** (abs(level) - 1 if level else 0)
+    near = (1.0 + 1e-9) * width * 2.0 ** (abs(level) - 2) if abs(level) > 1 else 0.0
+    return (near, far) if level >= 0 else (-far, -near)
+
+
+def _inside(values: Array, limits: list[tuple[float, float]]) -> bool:
+    for value, (low, high) in zip(values.tolist(), limits, strict=True):
+        if not low < value < high:
+            return False
+    return True
+
+
+def _corners(family: SystemFamily, low: Array, high: Array) -> _Corners:
+    # The first parameter changes fastest, as in the weights.
+    order = [np.array(corner[::-1])
+             for corner in product(*zip(low[::-1].tolist(), high[::-1].tolist(), strict=True))]
+    result = _Corners(low, high, [family.system(corner).arrays for corner in order])
+    inside = np.modf(np.sqrt(2.0) * np.arange(1.0, 1.0 + len(low)))[0]
+    for part in (inside, 1.0 - inside**2):
+        point = low + part * (high - low)
+        if not result.agrees(family.system(point).arrays, point):
+            raise _NotAffineError
+    return result
+
+
+def _parameter(system: ContactSystem, name: str, given: Any) -> tuple[float, Setter]:
+    """Base value and setter of a parameter."""
+    if isinstance(given, tuple) and len(given) == 2 and callable(given[1]):
+        value, own = given
+        if not isinstance(value, Real) or isinstance(value, bool):
+            raise InputError(f"Parameter {name!r}: its value {value!r} must be a number.")
+        return float(value), own
+    if given is not None and (not isinstance(given, Real) or isinstance(given, bool)):
+        raise InputError(f"Parameter {name!r} = {given!r} must be a number, None for the value "
+                         f"that the system has, or a pair (value, function) of a function "
+                         f"(system, value) -> system.")
+    known = system.parameters()
+    if name not in known and name != "gap":
+        system.with_(**{name: given})  # raises, with the names that exist
+    value = known.get(name, system.gap) if given is None else given
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise InputError(f"Parameter {name!r} has the value {value!r}, which is not one number; "
+                         f"give a pair (value, function) instead.")
+
+    def setter(whole: ContactSystem, number: float) -> ContactSystem:
+        return whole.with_(**{name: number})
+
+    return float(value), setter
+
+
+def _named(parameters: Mapping[str, float], values: Array) -> str:
+    return ", ".join(f"{name} = {value:g}"
+                     for name, value in zip(parameters, values.tolist(), strict=True))

@@ -1,0 +1,91 @@
+"""Vector fields x' = f(t, x, p), evaluated at many places at once."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices, nearest
+
+Array = NDArray[np.float64]
+
+
+class VectorField(ABC):
+    """Rates x' = f(t, x, p) of d states with k parameters, for N places at once.
+
+    Parameters are named; where an array of values (k,) is asked for, they stand in the order of
+    :attr:`parameters`.
+
+    Attributes
+    ----------
+    parameters : mapping
+        Name and base value of each parameter, in order; read-only.
+    state_names : tuple of str
+        Names (d,) of the states.
+    """
+
+    parameters: Mapping[str, float]
+    state_names: tuple[str, ...]
+
+    @abstractmethod
+    def rates(self, t: Array, x: Array, values: Array) -> Array:
+        """Rates f (N, d) at times t (N,) and states x (N, d), for parameter values (k,)."""
+
+    @abstractmethod
+    def derivatives(
+        self, t: Array, x: Array, values: Array, active: Iterable[int] = ()
+    ) -> tuple[Array, Array, Array]:
+        """Rates f (N, d), df/dx (N, d, d) and df/dp (N, d, a) to parameters of indices ``active``.
+
+        All are C-contiguous.
+        """
+
+    def forcing_period(self, values: Array) -> float | None:
+        """Period of f in t [s]; None where f does not depend on t."""
+        return None
+
+    def state_scales(self, values: Array) -> Array:
+        """Typical size (d,) of each state; ones where nothing is known."""
+        return np.ones(self.dimension)
+
+    @property
+    def dimension(self) -> int:
+        """Number d of states."""
+        return len(self.state_names)
+
+    @property
+    def values(self) -> Array:
+        """Base values (k,) of the parameters, a new array."""
+        return np.array(list(self.parameters.values()), dtype=float)
+
+    def index(self, name: str) -> int:
+        """Place of a parameter.
+
+        Raises
+        ------
+        InputError
+            If there is none of this name; it lists those that exist.
+        """
+        require_kind("A vector field", str, parameter=name)
+        names = tuple(self.parameters)
+        if name not in names:
+            raise InputError(f"The vector field has no parameter {name!r}{nearest(name, names)}; "
+                             f"its parameters are: {choices(names)}.")
+        return names.index(name)
+
+    def values_with(self, **changes: float) -> Array:
+        """Parameter values (k,): the base values with some changed by name."""
+        values = self.values
+        for name, value in changes.items():
+            values[self.index(name)] = value
+        return values
+
+
+def require_field(given: object) -> None:
+    """InputError for what is no vector field, such as a contact system itself."""
+    if not isinstance(given, VectorField):
+        raise InputError(f"A vector field is needed, not a {type(given).__name__}; make one with "
+                         f"contact_field(system, names of parameters), or with "
+                         f"vector_field(function, ...).")

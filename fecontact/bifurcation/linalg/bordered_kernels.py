@@ -1,0 +1,258 @@
+"""Solutions of condensed collocation systems with further rows, the borders.
+
+What elimination does to a border or to a right side is kept as a vector with one entry for each
+pivot row: (G, (m - 1) d, 8) of the inner nodes, (G - 1, d, 8) of the chains within segments,
+(S - 1, d) of the chain along them. A border's own right side then loses the product of the two.
+"""
+
+import numpy as np
+from numba import types
+
+from fecontact.bifurcation.linalg.condensation import FACTORS
+from fecontact.bifurcation.linalg.lu import (
+    back_lanes,
+    eliminate,
+    forward,
+    forward_lanes,
+    reduce_row,
+    reduce_row_lanes,
+)
+from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
+from fecontact.core.simd import LANES, gather, read, spread, write
+
+
+@helper
+def _parts(factors, pivots):  # type: ignore[no-untyped-def]
+    """The three parts of a vector over the pivot rows."""
+    groups, size, _, _ = factors.inner.shape
+    d = len(factors.end)
+    inner = size - d
+    first = groups * inner * LANES
+    second = first + (groups - 1) * d * LANES
+    return (pivots[:first].reshape((groups, inner, LANES)),
+            pivots[first:second].reshape((groups - 1, d, LANES)),
+            pivots[second:].reshape((len(factors.top), d)))
+
+
+@helper
+def _take(given, first, group, groups, N, size, count, places, out):  # type: ignore[no-untyped-def]
+    """Fill out (count, 8) with given[j size + first ...] of a group's intervals, zero beyond N."""
+    for lane in range(LANES):
+        places[lane] = min(lane * groups + group, N - 1) * size + first
+    for c in range(count):
+        write(out[c], gather(given, places, c))
+    for lane in range(LANES):
+        if lane * groups + group >= N:
+            for c in range(count):
+                out[c, lane] = 0.0
+
+
+@kernel(types.void(FACTORS, vector, vector, vector))
+def reduce_border(factors, given, weights, small):  # type: ignore[no-untyped-def]
+    """Reduce a border ``given`` (N m d + e,) to x_0, x_N and the common unknowns.
+
+    Fills ``small`` (2 d + e,), and ``weights`` over the pivot rows with what its right side loses
+    by it, as multiples of the reduced right sides.
+    """
+    factors, given, small, weights = (borrowed(factors), borrowed(given), borrowed(small),
+                                      borrowed(weights))
+    inner_weights, chain_weights, top_weights = _parts(factors, weights)
+    groups, size, width, _ = factors.inner.shape
+    N, d, columns = factors.local.shape
+    e = columns - 2 * d
+    inner = size - d
+    nothing = spread(0.0)
+    row, link, left = (np.empty((width, LANES)), np.empty((3 * d + e, LANES)),
+                       np.empty((d, LANES)))
+    places = np.empty(LANES, dtype=np.int64)
+    _take(given, 0, 0, groups, N, size, d, places, left)
+    for c in range(d):
+        write(link[d + c], read(left[c]))
+        write(link[2 * d + c], nothing)
+    for c in range(e):
+        write(link[3 * d + c], nothing)
+    for group in range(groups):
+        _take(given, d, group, groups, N, size, inner, places, row)
+        for c in range(d):
+            # Until its interval is reached, x_j stands in the place of x_(j+1).
+            write(row[inner + c], read(link[2 * d + c]))
+            write(row[inner + d + c], nothing)
+        for c in range(e):
+            write(row[inner + 2 * d + c], read(link[3 * d + c]))
+        reduce_row_lanes(factors.inner[group], inner, row, inner_weights[group])
+        for c in range(e):
+            write(link[3 * d + c], read(row[inner + 2 * d + c]))
+        for c in range(d):
+            write(link[2 * d + c], nothing)
+        if group == 0:
+            for c in range(d):
+                write(link[d + c], read(link[d + c]) + read(row[inner + c]))
+        else:
+            _take(given, 0, group, groups, N, size, d, places, left)
+            for c in range(d):
+                write(link[c], read(row[inner + c]) + read(left[c]))
+            reduce_row_lanes(factors.chain[group - 1], d, link, chain_weights[group - 1])
+        for c in range(d):
+            write(link[2 * d + c], read(link[2 * d + c]) + read(row[inner + d + c]))
+    whole = np.empty(3 * d + e)
+    for c in range(d):
+        whole[d + c], whole[2 * d + c] = link[d + c, 0], link[2 * d + c, 0]
+    for c in range(e):
+        total = given[N * size + c]
+        for lane in range(len(factors.top) + 1):
+            total += link[3 * d + c, lane]
+        whole[3 * d + c] = total
+    for lane in range(1, len(factors.top) + 1):
+        for c in range(d):
+            whole[c] = whole[2 * d + c] + link[d + c, lane]
+            whole[2 * d + c] = 0.0
+        reduce_row(factors.top[lane - 1], d, whole, top_weights[lane - 1])
+        for c in range(d):
+            whole[2 * d + c] += link[2 * d + c, lane]
+    for c in range(columns):
+        small[c] = whole[d + c]
+
+
+@kernel(types.void(FACTORS, vector, vector, vector))
+def reduce_side(factors, rhs, reduced, side):  # type: ignore[no-untyped-def]
+    """Reduce the right side of the collocation rows, the first N m d entries of ``rhs``.
+
+    Fills ``reduced`` over the pivot rows, and ``side`` (d,), that of the rows of ``factors.end``.
+    """
+    factors, rhs, side, reduced = (borrowed(factors), borrowed(rhs), borrowed(side),
+                                   borrowed(reduced))
+    of_inner, of_chain, of_top = _parts(factors, reduced)
+    groups, size, _, _ = factors.inner.shape
+    N, d, _ = factors.local.shape
+    inner = size - d
+    r, pair, mixed = (np.empty((size, LANES)), np.empty((2 * d, LANES)),
+                      np.empty((2 * d, LANES)))
+    places = np.empty(LANES, dtype=np.int64)
+    for group in range(groups):
+        order = factors.inner_order[group]
+        for i in range(size):
+            for lane in range(LANES):
+                j = lane * groups + group
+                r[i, lane] = rhs[j * size + (order[i, lane] if inner else i)] if j < N else 0.0
+        forward_lanes(factors.inner[group], inner, r)
+        for i in range(inner):
+            write(of_inner[group, i], read(r[i]))
+        if group == 0:
+            for i in range(d):
+                write(pair[d + i], read(r[inner + i]))
+            continue
+        for i in range(d):
+            write(mixed[i], read(pair[d + i]))
+            write(mixed[d + i], read(r[inner + i]))
+        numbers = mixed.reshape(-1)
+        for i in range(2 * d):
+            for lane in range(LANES):
+                places[lane] = factors.chain_order[group - 1, i, lane] * LANES + lane
+            write(pair[i], gather(numbers, places, 0))
+        forward_lanes(factors.chain[group - 1], d, pair)
+        for i in range(d):
+            write(of_chain[group - 1, i], read(pair[i]))
+    both = np.empty(2 * d)
+    for i in range(d):
+        side[i] = pair[d + i, 0]
+    for lane in range(1, len(factors.top) + 1):
+        for i in range(d):
+            both[i] = side[i]
+            both[d + i] = pair[d + i, lane]
+        forward(factors.top[lane - 1], d, factors.top_pivots[lane - 1], both)
+        for i in range(d):
+            of_top[lane - 1, i] = both[i]
+            side[i] = both[d + i]
+
+
+@kernel(types.void(FACTORS, vector, vector, vector, vector, vector))
+def expand(factors, reduced, start, end, common, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` (N m d,) with all nodes from x_0, x_N and the common unknowns."""
+    factors, out, reduced = borrowed(factors), borrowed(out), borrowed(reduced)
+    of_inner, of_chain, of_top = _parts(factors, reduced)
+    groups, size, width, _ = factors.inner.shape
+    N, d, columns = factors.local.shape
+    e = columns - 2 * d
+    inner = size - d
+    segments = len(factors.top) + 1
+    # The left ends of the groups' intervals, and after them those of the segments that follow.
+    ends = np.zeros((groups + 1, d, LANES))
+    whole = np.empty(3 * d + e)
+    for c in range(d):
+        ends[0, c, 0] = start[c]
+        ends[groups, c, segments - 1] = end[c]
+        whole[d + c] = start[c]
+        whole[2 * d + c] = end[c]
+    for c in range(e):
+        whole[3 * d + c] = common[c]
+    for lane in range(segments - 1, 0, -1):
+        a, r = factors.top[lane - 1], of_top[lane - 1]
+        for k in range(d - 1, -1, -1):
+            total = r[k]
+            for c in range(k + 1, 3 * d + e):
+                total -= a[k, c] * whole[c]
+            whole[k] = total * a[k, k]
+        for c in range(d):
+            ends[0, c, lane] = ends[groups, c, lane - 1] = whole[2 * d + c] = whole[c]
+    link, known = np.empty((3 * d + e, LANES)), np.empty((width, LANES))
+    for c in range(d):
+        write(link[d + c], read(ends[0, c]))
+    for c in range(e):
+        write(link[3 * d + c], spread(common[c]))
+        write(known[inner + 2 * d + c], spread(common[c]))
+    for group in range(groups - 1, -1, -1):
+        if group:
+            for c in range(d):
+                write(link[2 * d + c], read(ends[group + 1, c]))
+            back_lanes(factors.chain[group - 1], d, of_chain[group - 1], link)
+            for c in range(d):
+                write(ends[group, c], read(link[c]))
+        for c in range(d):
+            write(known[inner + c], read(ends[group, c]))
+            write(known[inner + d + c], read(ends[group + 1, c]))
+        back_lanes(factors.inner[group], inner, of_inner[group], known)
+        for lane in range(LANES):
+            first = (lane * groups + group) * size
+            if lane * groups + group < N:
+                for c in range(d):
+                    out[first + c] = known[inner + c, lane]
+                for c in range(inner):
+                    out[first + d + c] = known[c, lane]
+
+
+@kernel(types.void(FACTORS, vector, matrix, matrix, f8, vector))
+def solve(factors, rhs, weights, small, closing, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` (N m d + e,) with the solution for a right side of all rows.
+
+    ``small`` (d + b, 2 d + e) are the reduced rows, those of ``factors.end`` first, ``weights``
+    (b, ...) what the borders lose over the pivot rows, and x_N is ``closing`` times x_0. The
+    solution of a singular system is not finite.
+    """
+    N, d, _ = factors.local.shape
+    size = factors.inner.shape[1]
+    rows, columns = small.shape[0], small.shape[1] - d
+    reduced, side, end = np.empty(weights.shape[1]), np.empty(rows), np.empty(d)
+    reduce_side(factors, rhs, reduced, side[:d])
+    for index in range(len(weights)):
+        total = rhs[N * size + index]
+        for k in range(len(reduced)):
+            total -= weights[index, k] * reduced[k]
+        side[d + index] = total
+    a, pivots = np.empty((rows, columns)), np.empty(rows, dtype=np.int64)
+    for i in range(rows):
+        for c in range(d):
+            a[i, c] = small[i, c] + closing * small[i, d + c]
+        for c in range(d, columns):
+            a[i, c] = small[i, d + c]
+    eliminate(a, rows, pivots)
+    forward(a, rows, pivots, side)
+    for k in range(rows - 1, -1, -1):
+        total = side[k]
+        for c in range(k + 1, rows):
+            total -= a[k, c] * side[c]
+        side[k] = total * a[k, k]
+    for c in range(d):
+        end[c] = closing * side[c]
+    for c in range(d, columns):
+        out[N * size + c - d] = side[c]
+    expand(factors, reduced, side[:d], end, side[d:], out[: N * size])

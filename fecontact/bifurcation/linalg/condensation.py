@@ -1,0 +1,225 @@
+"""Linear systems of collocation on intervals, solved in a time linear in their number.
+
+On each of N intervals m d equations link the m + 1 nodes of the interval, d unknowns each, and e
+unknowns common to all (period, parameters). Further rows, the borders, link everything:
+
+    local_j [x_j0 ... x_jm, p] = r_j,  x_jm = x_(j+1)0,  x_Nm = x_00         border [x, p] = s
+
+:func:`condense` eliminates the inner nodes of each interval; d equations A_j x_j + B_j x_(j+1) +
+E_j p = .. are left of it. These are chained by eliminating x_1, x_2, ... one after the other, with
+row interchanges between the neighbours, so that nothing grows however unstable the orbit is in
+time. What is left links x_0, x_N and p (Doedel's scheme).
+
+The intervals are dealt out to eight segments of G = ceil(N / 8) neighbours each, which are worked
+on side by side, one in each lane: interval l G + g is lane l of group g. Intervals beyond the last
+are filled up with those of no width. The chain is eliminated within each segment first, and then
+along the segments.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.linalg.lu import eliminate, eliminate_lanes
+from fecontact.core.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
+from fecontact.core.simd import LANES, gather, read, spread, write
+
+Array = NDArray[np.float64]
+
+_pivots = types.Array(i8, 2, "C")
+_orders = types.Array(i8, 3, "C")
+_groups = types.Array(f8, 4, "C")
+
+
+class Factors(NamedTuple):
+    """Factors of a collocation system of N intervals, m points each, d states, e common unknowns.
+
+    inner (G, m d, (m + 1) d + e, 8), columns: inner nodes, left end, right end, common unknowns;
+    chain (G - 1, 2 d, 3 d + e, 8) within segments, columns: x_j, the segment's first, x_(j+1),
+    common; top (S - 1, 2 d, 3 d + e), the same along the S segments that are not empty; end (d,
+    2 d + e), columns: x_0, x_N, common. Inverse pivots stand on the diagonals. The orders say which
+    row came to each place. local (N, d, 2 d + e), columns: left end, right end, common, are the
+    equations that are chained.
+    """
+
+    inner: NDArray[np.float64]
+    inner_order: NDArray[np.int64]
+    local: Array
+    chain: NDArray[np.float64]
+    chain_order: NDArray[np.int64]
+    top: Array
+    top_pivots: NDArray[np.int64]
+    end: Array
+
+
+FACTORS = types.NamedTuple([_groups, _orders, block, _groups, _orders, block, _pivots, matrix],
+                           Factors)
+
+
+def factors_for(intervals: int, points: int, states: int, common: int) -> Factors:
+    """Room for the factors of a system of this size."""
+    N, m, d, e = intervals, points, states, common
+    G = -(-N // LANES)
+    S = -(-N // G)
+    return Factors(
+        _aligned(G, m * d, (m + 1) * d + e), np.empty((G, m * d, LANES), dtype=np.int64),
+        np.empty((N, d, 2 * d + e)),
+        _aligned(G - 1, 2 * d, 3 * d + e), np.empty((G - 1, 2 * d, LANES), dtype=np.int64),
+        np.empty((S - 1, 2 * d, 3 * d + e)), np.empty((S - 1, d), dtype=np.int64),
+        np.empty((d, 2 * d + e)))
+
+
+def pivot_rows(factors: Factors) -> int:
+    """Number of rows by which unknowns are eliminated, those of empty lanes among them."""
+    groups, size, _, lanes = factors.inner.shape
+    d = len(factors.end)
+    return int((groups * (size - d) + (groups - 1) * d) * lanes + len(factors.top) * d)
+
+
+def _aligned(groups: int, rows: int, columns: int) -> Array:
+    """Room (groups, rows, columns, 8) of which no eight numbers lie across two cache lines."""
+    size = groups * rows * columns * LANES
+    room = np.empty(size + LANES)
+    first = -(room.__array_interface__["data"][0] // room.itemsize) % LANES
+    return room[first : first + size].reshape(groups, rows, columns, LANES)
+
+
+@helper
+def _take_links(local, group, groups, places, links):  # type: ignore[no-untyped-def]
+    """Fill links (d, 2 d + e, 8) with the equations of a group; x_j = x_(j+1) beyond the last."""
+    N, d, columns = local.shape
+    for lane in range(LANES):
+        places[lane] = min(lane * groups + group, N - 1) * d * columns
+    values = local.reshape(-1)
+    for i in range(d):
+        for c in range(columns):
+            write(links[i, c], gather(values, places, i * columns + c))
+    for lane in range(LANES):
+        if lane * groups + group >= N:
+            for i in range(d):
+                for c in range(columns):
+                    links[i, c, lane] = 1.0 if c == i else (-1.0 if c == d + i else 0.0)
+
+
+@helper
+def _chain_segments(local, chain, order, end):  # type: ignore[no-untyped-def]
+    """Eliminate all but the ends of each segment; ``end`` (d, 2 d + e, 8) links these."""
+    d, columns, _ = end.shape
+    e = columns - 2 * d
+    groups = len(chain) + 1
+    room, links, nothing = np.empty(LANES), np.empty((d, columns, LANES)), spread(0.0)
+    places = np.empty(LANES, dtype=np.int64)
+    _take_links(local, 0, groups, places, end)
+    for group in range(1, groups):
+        a = chain[group - 1]
+        _take_links(local, group, groups, places, links)
+        for i in range(d):
+            for c in range(d):
+                write(a[i, c], read(end[i, d + c]))
+                write(a[i, d + c], read(end[i, c]))
+                write(a[i, 2 * d + c], nothing)
+                write(a[d + i, c], read(links[i, c]))
+                write(a[d + i, d + c], nothing)
+                write(a[d + i, 2 * d + c], read(links[i, d + c]))
+            for c in range(e):
+                write(a[i, 3 * d + c], read(end[i, 2 * d + c]))
+                write(a[d + i, 3 * d + c], read(links[i, 2 * d + c]))
+        eliminate_lanes(a, d, order[group - 1], room)
+        for i in range(d):
+            for c in range(columns):
+                write(end[i, c], read(a[d + i, d + c]))
+
+
+@kernel(types.void(FACTORS))
+def chain_intervals(factors):  # type: ignore[no-untyped-def]
+    """Eliminate x_1, x_2, ... from the equations ``local`` of the intervals."""
+    factors = borrowed(factors)
+    top, end = factors.top, factors.end
+    d, columns = end.shape
+    e = columns - 2 * d
+    segments = np.empty((d, columns, LANES))
+    _chain_segments(factors.local, factors.chain, factors.chain_order, segments)
+    for i in range(d):
+        for c in range(columns):
+            end[i, c] = segments[i, c, 0]
+    for lane in range(1, len(top) + 1):
+        a = top[lane - 1]
+        for i in range(d):
+            for c in range(d):
+                a[i, c] = end[i, d + c]
+                a[i, d + c] = end[i, c]
+                a[i, 2 * d + c] = 0.0
+                a[d + i, c] = segments[i, c, lane]
+                a[d + i, d + c] = 0.0
+                a[d + i, 2 * d + c] = segments[i, d + c, lane]
+            for c in range(e):
+                a[i, 3 * d + c] = end[i, 2 * d + c]
+                a[d + i, 3 * d + c] = segments[i, 2 * d + c, lane]
+        eliminate(a, d, factors.top_pivots[lane - 1])
+        for i in range(d):
+            for c in range(columns):
+                end[i, c] = a[d + i, d + c]
+
+
+@kernel(types.void(block, matrix, block, vector, f8, matrix, matrix, i8, FACTORS))
+def condense(J, f, P, widths, T, values, slopes, with_period, factors):  # type: ignore[no-untyped-def]
+    """Factorise the system of x' = T f on intervals.
+
+    J (N m, d, d), f (N m, d) and P (N m, d, q) at the collocation points; values and slopes
+    (m, m + 1) of the basis there. Rows: sum_k slopes x_k - h T f. The common unknowns are T (if
+    ``with_period``) and q parameters.
+    """
+    J, f, P, factors = borrowed(J), borrowed(f), borrowed(P), borrowed(factors)
+    local = factors.local
+    groups = len(factors.inner)
+    N = len(widths)
+    m = len(values)
+    d = f.shape[1]
+    q = P.shape[2]
+    e = q + with_period
+    inner = (m - 1) * d
+    of_states, of_common, rates = J.reshape(-1), P.reshape(-1), f.reshape(-1)
+    room, step, width = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    # Of each lane: where its interval begins, in numbers of collocation points.
+    first_point, places = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
+    for group in range(groups):
+        a = factors.inner[group]
+        for lane in range(LANES):
+            j = lane * groups + group
+            first_point[lane] = min(j, N - 1) * m
+            width[lane] = -widths[j] if j < N else 0.0
+            step[lane] = width[lane] * T
+        for point in range(m):
+            for i in range(d):
+                row = point * d + i
+                for lane in range(LANES):
+                    places[lane] = ((first_point[lane] + point) * d + i) * d
+                for c in range(d):
+                    entry = read(step) * gather(of_states, places, c)
+                    own = 1.0 if c == i else 0.0
+                    for k in range(1, m):
+                        write(a[row, (k - 1) * d + c], spread(values[point, k]) * entry
+                              + spread(own * slopes[point, k]))
+                    write(a[row, inner + c], spread(values[point, 0]) * entry
+                          + spread(own * slopes[point, 0]))
+                    write(a[row, inner + d + c], spread(values[point, m]) * entry
+                          + spread(own * slopes[point, m]))
+                for lane in range(LANES):
+                    places[lane] = (first_point[lane] + point) * d + i
+                if with_period:
+                    write(a[row, inner + 2 * d], read(width) * gather(rates, places, 0))
+                for lane in range(LANES):
+                    places[lane] *= q
+                for c in range(q):
+                    write(a[row, inner + 2 * d + with_period + c],
+                          read(step) * gather(of_common, places, c))
+        eliminate_lanes(a, inner, factors.inner_order[group], room)
+        for lane in range(LANES):
+            j = lane * groups + group
+            if j < N:
+                for i in range(d):
+                    for c in range(2 * d + e):
+                        local[j, i, c] = a[inner + i, inner + c, lane]
+    chain_intervals(factors)

@@ -1,0 +1,184 @@
+"""Elimination with row interchanges of one small matrix, or of eight of the same size at once.
+
+A matrix a (rows, columns) is more wide than high; of it the first ``count`` columns are
+eliminated. In place of these stand the factors of the rows, and on the diagonal the inverse pivots.
+"""
+
+from fecontact.core.compiled import helper
+from fecontact.core.simd import LANES, magnitude, read, spread, where_larger, write
+
+
+@helper
+def eliminate(a, count, pivots):  # type: ignore[no-untyped-def]
+    """Eliminate the first columns of a (rows, columns) in place, with row interchanges."""
+    rows, columns = a.shape
+    for k in range(count):
+        row, largest = k, abs(a[k, k])
+        for i in range(k + 1, rows):
+            if abs(a[i, k]) > largest:
+                row, largest = i, abs(a[i, k])
+        pivots[k] = row
+        if row != k:
+            for c in range(columns):
+                a[k, c], a[row, c] = a[row, c], a[k, c]
+        inverse = 1.0 / a[k, k]
+        a[k, k] = inverse
+        i = k + 1
+        while i + 3 < rows:
+            f0, f1 = a[i, k] * inverse, a[i + 1, k] * inverse
+            f2, f3 = a[i + 2, k] * inverse, a[i + 3, k] * inverse
+            a[i, k], a[i + 1, k], a[i + 2, k], a[i + 3, k] = f0, f1, f2, f3
+            for c in range(k + 1, columns):
+                pivot = a[k, c]
+                a[i, c] -= f0 * pivot
+                a[i + 1, c] -= f1 * pivot
+                a[i + 2, c] -= f2 * pivot
+                a[i + 3, c] -= f3 * pivot
+            i += 4
+        while i < rows:
+            factor = a[i, k] * inverse
+            a[i, k] = factor
+            for c in range(k + 1, columns):
+                a[i, c] -= factor * a[k, c]
+            i += 1
+
+
+@helper
+def forward(a, count, pivots, r):  # type: ignore[no-untyped-def]
+    """Apply to a right side r (rows,) what :func:`eliminate` did to the rows."""
+    for k in range(count):
+        row = pivots[k]
+        r[k], r[row] = r[row], r[k]
+    for i in range(1, len(r)):
+        total = r[i]
+        for k in range(min(i, count)):
+            total -= a[i, k] * r[k]
+        r[i] = total
+
+
+@helper
+def _with_pivot(a, k, order, room):  # type: ignore[no-untyped-def]
+    """Bring the largest entry of column k to row k in each lane; its inverse, kept there."""
+    rows, columns, _ = a.shape
+    largest, place = magnitude(read(a[k, k])), spread(float(k))
+    for i in range(k + 1, rows):
+        size = magnitude(read(a[i, k]))
+        place = where_larger(size, largest, spread(float(i)), place)
+        largest = where_larger(size, largest, size, largest)
+    write(room, place)
+    row, same = int(room[0]), True
+    for lane in range(1, LANES):
+        same = same and room[lane] == room[0]
+    if same and row != k:
+        for c in range(columns):
+            above = read(a[k, c])
+            write(a[k, c], read(a[row, c]))
+            write(a[row, c], above)
+    for lane in range(LANES):
+        row = int(room[lane])
+        if row != k:
+            order[k, lane], order[row, lane] = order[row, lane], order[k, lane]
+            if not same:
+                for c in range(columns):
+                    a[k, c, lane], a[row, c, lane] = a[row, c, lane], a[k, c, lane]
+    inverse = spread(1.0) / read(a[k, k])
+    write(a[k, k], inverse)
+    return inverse
+
+
+@helper
+def eliminate_lanes(a, count, order, room):  # type: ignore[no-untyped-def]
+    """As :func:`eliminate` for a (rows, columns, 8); ``order`` (rows, 8) is filled.
+
+    Four columns are eliminated from the rows below at once: less is read and written.
+    """
+    rows, columns, _ = a.shape
+    for i in range(rows):
+        for lane in range(LANES):
+            order[i, lane] = i
+    for first in range(0, count, 4):
+        last = min(first + 4, count)
+        for k in range(first, last):
+            inverse = _with_pivot(a, k, order, room)
+            for i in range(k + 1, rows):
+                factor = read(a[i, k]) * inverse
+                write(a[i, k], factor)
+                for c in range(k + 1, last):
+                    write(a[i, c], read(a[i, c]) - factor * read(a[k, c]))
+        for k in range(first + 1, last):
+            for above in range(first, k):
+                factor = read(a[k, above])
+                for c in range(last, columns):
+                    write(a[k, c], read(a[k, c]) - factor * read(a[above, c]))
+        i = last
+        while last - first == 4 and i + 1 < rows:
+            k, low = first, i + 1
+            f0, f1, f2, f3 = (read(a[i, k]), read(a[i, k + 1]), read(a[i, k + 2]),
+                              read(a[i, k + 3]))
+            g0, g1, g2, g3 = (read(a[low, k]), read(a[low, k + 1]), read(a[low, k + 2]),
+                              read(a[low, k + 3]))
+            for c in range(last, columns):
+                p0, p1, p2, p3 = (read(a[k, c]), read(a[k + 1, c]), read(a[k + 2, c]),
+                                  read(a[k + 3, c]))
+                write(a[i, c], read(a[i, c]) - f0 * p0 - f1 * p1 - f2 * p2 - f3 * p3)
+                write(a[low, c], read(a[low, c]) - g0 * p0 - g1 * p1 - g2 * p2 - g3 * p3)
+            i += 2
+        while i < rows:
+            for k in range(first, last):
+                factor = read(a[i, k])
+                for c in range(last, columns):
+                    write(a[i, c], read(a[i, c]) - factor * read(a[k, c]))
+            i += 1
+
+
+@helper
+def reduce_row(a, count, row, weights):  # type: ignore[no-untyped-def]
+    """Eliminate the first entries of a further row (columns,); ``weights`` (count,) says how."""
+    columns = len(row)
+    for k in range(count):
+        factor = row[k] * a[k, k]
+        weights[k] = factor
+        for c in range(k + 1, columns):
+            row[c] -= factor * a[k, c]
+
+
+@helper
+def reduce_row_lanes(a, count, row, weights):  # type: ignore[no-untyped-def]
+    """As :func:`reduce_row`, for a row (columns, 8)."""
+    columns = len(row)
+    for k in range(count):
+        factor = read(row[k]) * read(a[k, k])
+        write(weights[k], factor)
+        for c in range(k + 1, columns):
+            write(row[c], read(row[c]) - factor * read(a[k, c]))
+
+
+@helper
+def forward_lanes(a, count, r):  # type: ignore[no-untyped-def]
+    """As :func:`forward`, for r (rows, 8) whose rows are in their order already."""
+    rows = len(r)
+    for k in range(count):
+        known = read(r[k])
+        for i in range(k + 1, rows):
+            write(r[i], read(r[i]) - read(a[i, k]) * known)
+
+
+@helper
+def back_lanes(a, count, r, known):  # type: ignore[no-untyped-def]
+    """Fill known[:count] (.., 8), the rest given, from the reduced right side r (count, 8)."""
+    width = len(known)
+    for i in range(count):
+        total, other = read(r[i]), spread(0.0)
+        c = count
+        while c + 1 < width:
+            total = total - read(a[i, c]) * read(known[c])
+            other = other - read(a[i, c + 1]) * read(known[c + 1])
+            c += 2
+        if c < width:
+            total = total - read(a[i, c]) * read(known[c])
+        write(known[i], total + other)
+    for k in range(count - 1, -1, -1):
+        found = read(known[k]) * read(a[k, k])
+        write(known[k], found)
+        for i in range(k):
+            write(known[i], read(known[i]) - read(a[i, k]) * found)

@@ -1,0 +1,93 @@
+"""Transitions of an orbit from one interval to the next."""
+
+import math
+
+import numpy as np
+from numba import types
+
+from fecontact.bifurcation.linalg.condensation import FACTORS
+from fecontact.core.compiled import block, borrowed, helper, kernel
+
+
+@helper
+def _solve(a, b, size):  # type: ignore[no-untyped-def]
+    """Replace b by a^-1 b, with row interchanges; a is used up."""
+    for k in range(size):
+        row = k
+        for i in range(k + 1, size):
+            if abs(a[i, k]) > abs(a[row, k]):
+                row = i
+        if row != k:
+            for c in range(size):
+                a[k, c], a[row, c] = a[row, c], a[k, c]
+                b[k, c], b[row, c] = b[row, c], b[k, c]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, size):
+            factor = a[i, k] * inverse
+            for c in range(k + 1, size):
+                a[i, c] -= factor * a[k, c]
+            for c in range(size):
+                b[i, c] -= factor * b[k, c]
+    for k in range(size - 1, -1, -1):
+        inverse = 1.0 / a[k, k]
+        for c in range(size):
+            total = b[k, c]
+            for i in range(k + 1, size):
+                total -= a[k, i] * b[i, c]
+            b[k, c] = total * inverse
+
+
+@kernel(types.void(FACTORS, block))
+def transitions(factors, out):  # type: ignore[no-untyped-def]
+    """Fill out (N, d, d) with M_j, x_(j+1) = M_j x_j, of the condensed intervals."""
+    factors, out = borrowed(factors), borrowed(out)
+    local = factors.local
+    N, d, _ = out.shape
+    a = np.empty((d, d))
+    for j in range(N):
+        for i in range(d):
+            for c in range(d):
+                a[i, c] = local[j, i, d + c]
+                out[j, i, c] = -local[j, i, c]
+        _solve(a, out[j], d)
+
+
+@kernel(types.i8(block))
+def merge(M):  # type: ignore[no-untyped-def]
+    """Multiply neighbours of M (N, d, d) in place as long as no digits are lost.
+
+    A product is closed before the bound of its condition number passes 100. Returns the number of
+    products.
+    """
+    M = borrowed(M)
+    N, d, _ = M.shape
+    a, inverse, total = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+    count, bound = 0, 1.0
+    for j in range(N):
+        square = 0.0
+        for i in range(d):
+            for c in range(d):
+                a[i, c] = M[j, i, c]
+                inverse[i, c] = 1.0 if i == c else 0.0
+                square += M[j, i, c] ** 2
+        _solve(a, inverse, d)
+        reverse = 0.0
+        for i in range(d):
+            for c in range(d):
+                reverse += inverse[i, c] ** 2
+        condition = math.sqrt(square * reverse) / d
+        bound *= condition
+        if count > 0 and bound < 100.0:
+            for i in range(d):
+                for c in range(d):
+                    value = 0.0
+                    for k in range(d):
+                        value += M[j, i, k] * M[count - 1, k, c]
+                    total[i, c] = value
+            M[count - 1] = total
+        else:
+            if j > count:
+                M[count] = M[j]
+            count += 1
+            bound = condition
+    return count

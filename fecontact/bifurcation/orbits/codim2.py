@@ -1,0 +1,249 @@
+"""Curves of folds, period doublings and torus bifurcations of orbits over two parameters."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, require_on_branch
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.problem import Problem, Settings
+from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.bifurcation.orbits.branches import restored
+from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.linearised import Linearised
+from fecontact.bifurcation.orbits.normal_forms import Expansion
+from fecontact.bifurcation.orbits.orbit_options import settings_of
+from fecontact.core.errors import InputError, require_finite, require_positive
+
+Array = NDArray[np.float64]
+
+_KINDS = ("fold", "period doubling", "Neimark-Sacker")
+_DIFFERENCE = 1e-5  # step of the differences of the test function, in the inner product
+_EXPANSION = 1e-3  # step of the differences of normal forms, in ranges of the states
+_CUSP = 1e-3  # both parameters change by less than this part of a step
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitCurve(Problem):
+    """Orbits with a test function at zero, two parameters free.
+
+    The test function is the product of mu + 1 over the multipliers at period doublings, of
+    mu_i mu_k - 1 over pairs at torus bifurcations. At folds it is the component of the first
+    parameter in the tangent that the orbits have while the second one rests.
+
+    The unknowns are those of the orbit, ``u = [nodes, T if it is unknown, second, first]``.
+
+    Attributes
+    ----------
+    orbit : Collocation
+        With a second free parameter.
+    kind : str
+        'fold', 'period doubling' or 'Neimark-Sacker'.
+    row : (n,) array
+        The tangent's direction is measured along it; for folds.
+    """
+
+    orbit: Collocation
+    kind: str
+    row: Array
+
+    def linearise(self, u: Array) -> "CurveLinearised":
+        """The equations about u."""
+        return CurveLinearised(self, u)
+
+    def weights(self) -> Array:
+        """Weights of the inner product, those of the orbit."""
+        return self.orbit.weights()
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[OrbitCurve, Array, Array]":
+        """The problem for the next step, on a new mesh."""
+        orbit, moved, turned = self.orbit.adapted(u, tangent)
+        result = replace(self, orbit=orbit)
+        if self.kind == "fold":
+            result = replace(result, row=orbit.weights() * result.rest(moved))
+        return result, moved, turned
+
+    def rest(self, u: Array) -> Array:
+        """Direction (n,) in which the orbits go while the second parameter rests."""
+        linearised = self.orbit.linearise(u)
+        bordered = linearised.with_rows([_unit(len(u), -2)])
+        _, _, vectors = np.linalg.svd(_even(bordered.matrix))
+        found = bordered.expand(vectors[-1])
+        return np.asarray(found / np.sqrt(self.orbit.weights() @ found**2))
+
+    def test(self, linearised: Linearised) -> float:
+        """The test function."""
+        if self.kind != "fold":
+            doubling, _, torus = linearised.floquet.products
+            return doubling if self.kind == "period doubling" else torus
+        n = len(linearised.u)
+        side = np.zeros(n)
+        side[-2] = 1.0
+        return float(linearised.with_rows([self.row, _unit(n, -2)]).solve(side)[-1]
+                     / self.orbit.scales[-1])
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Both parameters, and what a branch of orbits stores."""
+        names = list(self.orbit.field.parameters)
+        assert self.orbit.second is not None
+        return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
+                **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Points of codimension two."""
+        if self.kind == "fold":
+            along = self.rest(u)
+            return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}
+        if self.kind == "period doubling":
+            expansion = Expansion(self.orbit, u, linearisation.orbit)
+            return {"generalised period doubling": expansion.doubling(_EXPANSION)}
+        mean = _critical_mean(linearisation.orbit.floquet.others)
+        return {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
+                for order in (1, 2, 3, 4)}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """Nothing more is known of points of codimension two; at a cusp the curve turns as well."""
+        if kind != "fold":
+            return {}
+        both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
+        return {"kind": "turning point"} if both.max() > _CUSP else None
+
+
+class CurveLinearised:
+    """Residual of the curve's equations, and solutions of systems with their derivative."""
+
+    def __init__(self, problem: OrbitCurve, u: Array) -> None:
+        self.problem, self.u = problem, u
+        self.orbit = problem.orbit.linearise(u)
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual of the orbit, and the test function."""
+        return np.append(self.orbit.residual, self.problem.test(self.orbit))
+
+    @cached_property
+    def _plane(self) -> tuple[Any, list[Array], list[float]]:
+        """Bordered equations of the orbit, the two directions they leave, the test along them."""
+        weights = self.problem.weights()
+        bordered = self.orbit.with_rows([])
+        _, _, vectors = np.linalg.svd(_even(bordered.matrix))
+        directions: list[Array] = []
+        for vector in vectors[-2:]:
+            found = bordered.expand(vector)
+            for other in directions:
+                found = found - (weights * other @ found) * other
+            directions.append(found / np.sqrt(weights @ found**2))
+        whole = self.orbit.with_rows([weights * one for one in directions])
+        return whole, directions, [self.slope(one) for one in directions]
+
+    def slope(self, direction: Array) -> float:
+        """Derivative of the test function along a direction."""
+        size = float(np.sqrt(self.problem.weights() @ direction**2))
+        if size == 0.0:
+            return 0.0
+        h = _DIFFERENCE / size
+        up, down = (self.problem.test(self.problem.orbit.linearise(self.u + sign * direction))
+                    for sign in (h, -h))
+        return (up - down) / (2.0 * h)
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs."""
+        whole, directions, slopes = self._plane
+        part = whole.solve(np.concatenate([rhs[:-2], [0.0, 0.0]]))
+        matrix = np.array([slopes, [float(row @ one) for one in directions]])
+        side = np.array([rhs[-2] - self.slope(part), rhs[-1] - row @ part])
+        determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+        if determinant == 0.0:
+            return np.full_like(part, np.nan)
+        first, second = np.linalg.solve(matrix, side)
+        return np.asarray(part + first * directions[0] + second * directions[1])
+
+
+def orbit_curve(
+    field: VectorField, branch: Branch, point: BranchPoint, second: str, *,
+    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
+    width: float | None = None, direction: float = 1.0, both: bool = False,
+) -> Branch:
+    """The curve of a special point of orbits over two parameters.
+
+    Parameters
+    ----------
+    field : VectorField
+        The system, with both parameters.
+    branch, point : Branch, BranchPoint
+        A branch of orbits from :mod:`fecontact.bifurcation.orbits.branches`, and a special point of
+        the kind 'fold', 'period doubling' or 'Neimark-Sacker' on it.
+    second : str
+        The second parameter.
+    settings, bounds : optional
+        How the curve is followed; the bounds are those of the branch's parameter.
+    width : float, optional
+        Width of the diagram in the second parameter; by default its value.
+    direction, both
+        Sign of the first change of the branch's parameter; whether to go to both sides.
+
+    Returns
+    -------
+    Branch
+        Each point stores both parameters by their names, and what orbits store. Special points
+        are 'cusp' on curves of folds, 'generalised period doubling', where doublings turn from
+        super- to subcritical, and 'resonance 1:1' to 'resonance 1:4' on curves of tori, where
+        the multipliers pass 1, -1, or the angle 120 or 90 degrees; and 'turning point'.
+
+    Raises
+    ------
+    InputError
+        If the point is of another kind, or a parameter is unknown.
+    """
+    require_field(field)
+    require_on_branch("orbit_curve", branch, point)
+    require_finite("orbit_curve", direction=direction)
+    if point.kind not in _KINDS:
+        raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is "
+                         f"{point.kind or 'a regular point'!r}; curves start at "
+                         f"{', '.join(repr(kind) for kind in _KINDS)}.")
+    index = field.index(second)
+    if second == branch.name:
+        raise InputError(f"second = {second!r} is the parameter of the branch; name another one.")
+    problem, u, _ = restored(field, branch, point)
+    value = float(problem.values[index])
+    if width is None:
+        width = abs(value) or 1.0
+    require_positive("orbit_curve", width=width)
+    scales = np.insert(problem.scales, -1, width)
+    orbit = replace(problem, second=index, scales=scales)
+    start = np.insert(u, -1, value)
+    curve = OrbitCurve(orbit, point.kind, np.zeros(len(start)))
+    if point.kind == "fold":
+        curve = replace(curve, row=orbit.weights() * curve.rest(start))
+    attributes = {**branch.attributes, "second": second, "kind": point.kind}
+    unit = _unit(len(start), -1)
+    tangent = CurveLinearised(curve, start).solve(unit, unit)
+    if not np.isfinite(tangent).all():
+        tangent = CurveLinearised(curve, start).solve(_unit(len(start), -2), unit)
+    tangent = np.copysign(1.0, direction) * tangent
+    return follow(curve, start, settings_of(settings, bounds), name=branch.name, tangent=tangent,
+                  both=both, attributes=attributes)
+
+
+def _unit(size: int, place: int) -> Array:
+    row = np.zeros(size)
+    row[place] = 1.0
+    return row
+
+
+def _critical_mean(multipliers: NDArray[np.complex128]) -> float:
+    """Mean of the two multipliers whose product is nearest to one: the cosine of their angle."""
+    first, second = np.triu_indices(len(multipliers), 1)
+    nearest = np.argmin(np.abs(multipliers[first] * multipliers[second] - 1.0))
+    return float((multipliers[first] + multipliers[second])[nearest].real / 2.0)
+
+
+def _even(matrix: Array) -> Array:
+    """A matrix with rows of the same size."""
+    return np.asarray(matrix / np.abs(matrix).max(axis=1)[:, None])

@@ -1,0 +1,111 @@
+"""Compiled loops of collocation, over the intervals of a mesh and the Gauss points of each.
+
+Nodes are (N m, d), the last one of an interval being the first one of the next; basis values and
+slopes (m, m + 1).
+"""
+
+from numba import types
+
+from fecontact.core.compiled import borrowed, f8, kernel, matrix, vector
+
+
+@kernel(types.void(vector, vector, vector, vector, vector, vector))
+def fill_mesh(mesh, points, scales, widths, times, weights):  # type: ignore[no-untyped-def]
+    """Fill widths (N,), times (N m,) of the Gauss points, and weights of the inner product.
+
+    scales are those of the states, the first d, and of the unknowns at the end of the weights.
+    """
+    mesh, scales, widths = borrowed(mesh), borrowed(scales), borrowed(widths)
+    times, weights, points = borrowed(times), borrowed(weights), borrowed(points)
+    N, m = len(widths), len(points)
+    common = len(weights) % (N * m)
+    d = (len(weights) - common) // (N * m)
+    for j in range(N):
+        widths[j] = mesh[j + 1] - mesh[j]
+        for k in range(m):
+            times[j * m + k] = mesh[j] + widths[j] * points[k]
+            for i in range(d):
+                weights[(j * m + k) * d + i] = widths[j] / m / scales[i] ** 2
+    for k in range(1, common + 1):
+        weights[len(weights) - k] = 1.0 / scales[len(scales) - k] ** 2
+
+
+@kernel(types.void(matrix, vector, matrix, matrix, vector))
+def fill_phase_row(nodes, gauss_weights, values, slopes, row):  # type: ignore[no-untyped-def]
+    """Fill row with the nodes' weights (N m d,) in int <x, y'>, y with these nodes, then zeros."""
+    nodes, row = borrowed(nodes), borrowed(row)
+    values, slopes = borrowed(values), borrowed(slopes)
+    m = len(values)
+    total, d = nodes.shape
+    row[:] = 0.0
+    for j in range(total // m):
+        for point in range(m):
+            for i in range(d):
+                rate = 0.0
+                for k in range(m + 1):
+                    node = j * m + k if j * m + k < total else 0
+                    rate += slopes[point, k] * nodes[node, i]
+                rate *= gauss_weights[point]
+                for k in range(m + 1):
+                    node = j * m + k if j * m + k < total else 0
+                    row[node * d + i] += values[point, k] * rate
+
+
+@kernel(types.void(matrix, matrix, matrix, matrix, matrix))
+def at_points(nodes, values, slopes, x, rates):  # type: ignore[no-untyped-def]
+    """Fill x and rates (N m, d), values and interval-scaled slopes, from nodes (N m, d)."""
+    nodes, x, rates = borrowed(nodes), borrowed(x), borrowed(rates)
+    m = len(values)
+    total, d = nodes.shape
+    for j in range(total // m):
+        for point in range(m):
+            row = j * m + point
+            for i in range(d):
+                x[row, i] = 0.0
+                rates[row, i] = 0.0
+            for k in range(m + 1):
+                node = j * m + k
+                if node == total:
+                    node = 0
+                value, slope = values[point, k], slopes[point, k]
+                for i in range(d):
+                    x[row, i] += value * nodes[node, i]
+                    rates[row, i] += slope * nodes[node, i]
+
+
+@kernel(types.void(matrix, matrix, vector, f8, vector, vector, vector))
+def fill_residual(slopes, f, widths, T, phase_row, u, out):  # type: ignore[no-untyped-def]
+    """Fill out with slopes - h T f (N m d,) and, where there is room, the phase condition."""
+    slopes, f, out = borrowed(slopes), borrowed(f), borrowed(out)
+    phase_row, u = borrowed(phase_row), borrowed(u)
+    total, d = f.shape
+    m = total // len(widths)
+    for j in range(len(widths)):
+        step = widths[j] * T
+        for row in range(j * m, (j + 1) * m):
+            for i in range(d):
+                out[row * d + i] = slopes[row, i] - step * f[row, i]
+    if len(out) > total * d:
+        phase = 0.0
+        for k in range(total * d):
+            phase += phase_row[k] * u[k]
+        out[total * d] = phase
+
+
+@kernel(types.void(matrix, matrix, vector, matrix))
+def to_nodes(at_points, values, widths, out):  # type: ignore[no-untyped-def]
+    """Fill out (N m, d), the nodes' weights in sum_j h_j sum_c values_ck at_points_jc x_jk."""
+    at_points, out = borrowed(at_points), borrowed(out)
+    m = len(values)
+    total, d = out.shape
+    out[:] = 0.0
+    for j in range(total // m):
+        for point in range(m):
+            row = j * m + point
+            for k in range(m + 1):
+                node = j * m + k
+                if node == total:
+                    node = 0
+                weight = widths[j] * values[point, k]
+                for i in range(d):
+                    out[node, i] += weight * at_points[row, i]

@@ -1,0 +1,140 @@
+"""Floquet multipliers of a periodic orbit, and what they say of its stability."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.linalg.condensation import Factors
+from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
+from fecontact.bifurcation.linalg.transition_matrices import transitions
+from fecontact.bifurcation.orbits.multiplier_tests import FLAT, multiplier_tests
+from fecontact.core.errors import AnalysisError
+
+Array = NDArray[np.float64]
+
+# Distances from the unit circle at which a multiplier may lie on either side of it, at least and at
+# the most.
+_ROUNDING, _WORST = 1e-8, 0.1
+_NEAR = 1e-2  # distance of a critical multiplier from the circle, at a point located coarsely
+# Error of the trivial multiplier from which on the mesh is too coarse for any.
+_LOST = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Floquet:
+    """Stability of an orbit.
+
+    A disturbance of the orbit grows by the factor mu in one period for each multiplier.
+
+    Attributes
+    ----------
+    multipliers : (d,) complex array
+        By falling modulus, the trivial one too.
+    trivial : int or None
+        Place of the multiplier that is one because the orbit may be shifted in time; None for
+        forced systems.
+    """
+
+    multipliers: NDArray[np.complex128]
+    trivial: int | None
+
+    @property
+    def others(self) -> NDArray[np.complex128]:
+        """All multipliers but the trivial one."""
+        if self.trivial is None:
+            return self.multipliers
+        return np.delete(self.multipliers, self.trivial)
+
+    @property
+    def trivial_error(self) -> float:
+        """Distance of the trivial multiplier from one: a measure of the orbit's accuracy."""
+        if self.trivial is None:
+            return 0.0
+        return float(abs(self.multipliers[self.trivial] - 1.0))
+
+    @cached_property
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle."""
+        return sum(place != self.trivial and abs(multiplier) > 1.0
+                   for place, multiplier in enumerate(self.multipliers.tolist()))
+
+    @cached_property
+    def unstable_range(self) -> tuple[int, int]:
+        """Least and largest number of multipliers outside the unit circle, within their error.
+
+        That of the trivial one is known. Next to a fold, where another one is close to it, both
+        are off by as much.
+        """
+        error = min(max(_ROUNDING, 2.0 * self.trivial_error), _WORST)
+        sizes = [abs(multiplier) for place, multiplier in enumerate(self.multipliers.tolist())
+                 if place != self.trivial]
+        return sum(size > 1.0 + error for size in sizes), sum(size > 1.0 - error for size in sizes)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all disturbances die away."""
+        return self.unstable == 0
+
+    def tests(self, slope: float) -> dict[str, float]:
+        """Test functions of special points of a branch.
+
+        ``slope`` is that of the parameter along it, in widths of the diagram.
+        """
+        doubling, unit, torus = self.products
+        # At a fold a multiplier passes one as well, but there the parameter turns.
+        return {"period doubling": doubling, "torus": torus,
+                "branch point": -unit if slope <= -FLAT else unit}
+
+    @property
+    def products(self) -> tuple[float, float, float]:
+        """Functions that change sign where a multiplier passes -1, where one passes 1, and where
+        a pair passes the unit circle, or the product of two real ones passes one (neutral saddle).
+        """
+        out = np.empty(3)
+        multiplier_tests(self.multipliers, -1 if self.trivial is None else self.trivial, out)
+        return float(out[0]), float(out[1]), float(out[2])
+
+    def confirmed(self, kind: str) -> dict[str, Any] | None:
+        """What the multipliers say of a zero of a test function; None if it is no special point.
+
+        A torus bifurcation gets its name, Neimark-Sacker, and the angle of the pair.
+        """
+        mu = self.others
+        if kind in ("period doubling", "torus") and self.trivial_error > _LOST:
+            return None
+        if kind == "period doubling":
+            return {} if np.abs(mu + 1.0).min() <= _NEAR else None
+        if kind != "torus":
+            return {}
+        pairs = mu[mu.imag > 1e-6]
+        if not len(pairs) or np.abs(np.abs(pairs) - 1.0).min() > _NEAR:
+            return None
+        critical = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))]
+        return {"kind": "Neimark-Sacker", "angle": float(np.angle(critical))}
+
+
+def floquet_of(factors: Factors, autonomous: bool) -> Floquet:
+    """Floquet multipliers from the condensed equations of a periodic orbit.
+
+    They are the eigenvalues of the product of the transitions over the intervals, found without
+    multiplying these (see :mod:`fecontact.bifurcation.linalg.periodic_schur`): small and large ones
+    side by side are accurate.
+
+    Raises
+    ------
+    AnalysisError
+        If they cannot be found.
+    """
+    d = factors.end.shape[0]
+    M = np.empty((len(factors.local), d, d))
+    transitions(factors, M)
+    try:
+        multipliers = eigenvalues_of_product(M)
+    except ArithmeticError as error:
+        raise AnalysisError(f"The Floquet multipliers were not found ({error}); use more "
+                            f"intervals.") from None
+    trivial = int(np.argmin(np.abs(multipliers - 1.0))) if autonomous else None
+    return Floquet(multipliers, trivial)

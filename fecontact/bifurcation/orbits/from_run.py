@@ -1,0 +1,158 @@
+"""The periodic motion on which a run settles, as a start for branches of orbits."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.analysis.periodicity import count_periods
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, InputError, require_not_negative
+from fecontact.integrate.initial_state import Initial
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.forcing_period import common_period
+
+Array = NDArray[np.float64]
+
+_SAMPLES = 1000
+_TRANSIENT_PERIODS, _LARGEST = 200, 16
+# Part of its size by which a motion may miss its start after a period.
+_MISFIT = 1e-2
+
+
+class SettledMotion(NamedTuple):
+    """One period, at least, of a motion that has settled.
+
+    Attributes
+    ----------
+    times, states : (k,) and (k, d) array
+        [s]; y = [q, q', z].
+    period : float
+        Of the motion [s].
+    periods : int
+        Periods of the excitation in one of the motion; 1 where nothing excites it.
+    """
+
+    times: Array
+    states: Array
+    period: float
+    periods: int
+
+
+def settled_motion(
+    system: ContactSystem, *, initial: Initial = "rest", transient: float | None = None,
+    longest_period: float | None = None, rtol: float = 1e-8,
+) -> SettledMotion:
+    """Run a system until its motion repeats.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Excited with a common period, or not at all.
+    initial : any
+        Start; see :func:`fecontact.simulate`.
+    transient : float, optional
+        Time before the motion counts [s]; 200 periods of the excitation by default.
+    longest_period : float, optional
+        Time that the motion may take to repeat [s]; 16 periods of the excitation by default.
+    rtol : float
+        Relative tolerance.
+
+    Raises
+    ------
+    InputError
+        If nothing excites the system and the times are not given.
+    AnalysisError
+        If the motion does not repeat, or comes to rest.
+    """
+    require_kind("settled_motion", ContactSystem, system=system)
+    for name, value in (("transient", transient), ("longest_period", longest_period)):
+        if value is not None:
+            require_not_negative("settled_motion", **{name: value})
+    excitation = common_period(system)
+    if excitation is None:
+        if transient is None or longest_period is None:
+            raise InputError("Nothing excites the system with a period; give transient, the time "
+                             "until its motion settles, and longest_period, both in s.")
+        end = transient + 2.2 * longest_period
+        run = _run(system, initial, end, np.linspace(transient, end, 6 * _SAMPLES), rtol)
+        if _at_rest(run):
+            raise AnalysisError(f"The run comes to rest, or slides steadily, after {transient:g} "
+                                f"s; there is no periodic orbit to start from, so take another "
+                                f"start, or equilibria and their Hopf points.")
+        return SettledMotion(run.time, run.states, _period(run, longest_period), 1)
+    first = _TRANSIENT_PERIODS if transient is None else max(1, round(transient / excitation))
+    largest = _LARGEST if longest_period is None else max(1, round(longest_period / excitation))
+    checks = largest + max(2 * largest, 8)
+    instants: Array = excitation * np.arange(first, first + checks + 1, dtype=float)
+    run = _run(system, initial, float(instants[-1]), instants, rtol)
+    fine = _run(system, run.states[-1], float(instants[-1] + excitation * largest),
+                float(instants[-1]) + excitation * np.linspace(0.0, largest,
+                                                               largest * _SAMPLES + 1),
+                rtol, float(instants[-1]))
+    size = np.ptp(fine.states, axis=0)
+    size = np.maximum(size, 1e-9 * np.abs(fine.states).max(axis=0)) + 1e-300
+    found = count_periods(run.states, size, largest=largest)
+    if found.periods is None:
+        why = "does not repeat" if found.settled else "has not settled"
+        raise AnalysisError(f"The motion {why} within {largest} periods of the excitation after "
+                            f"{first * excitation:.4g} s (it misses by {found.misfit:.1e} of its "
+                            f"size); start at another value of the parameter, or run it longer.")
+    count = found.periods * _SAMPLES + 1
+    return SettledMotion(fine.time[:count], fine.states[:count], found.periods * excitation,
+                         found.periods)
+
+
+def _run(
+    system: ContactSystem, initial: Initial, end: float, outputs: Array, rtol: float,
+    begin: float = 0.0,
+) -> Trajectory:
+    """A run whose outputs are those asked for, without its start unless that is one of them."""
+    extra = outputs[0] > begin
+    times = np.append(begin, outputs) if extra else outputs
+    times[-1] = end
+    run = simulate(system, end, t_start=begin, initial=initial, outputs=times, rtol=rtol)
+    if run.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    if run.status is not Status.FINISHED:
+        raise AnalysisError(f"The run to the periodic motion did not reach its end: "
+                            f"{run.status.value}")
+    if not extra:
+        return run
+    from fecontact.analysis.window import window
+
+    return window(run, float(outputs[0]))
+
+
+def _period(run: Trajectory, longest: float) -> float:
+    """Time after which the modal displacement that moves most passes its middle as before [s].
+
+    Slip velocities hardly change during stick, so that states alone do not tell the time well.
+    """
+    t, states = run.time, run.states
+    # Displacements, velocities and internal variables, each by the largest of them.
+    size, m = np.ptp(states, axis=0), run.system.basis.modes
+    for group in (slice(0, m), slice(m, 2 * m), slice(2 * m, None)):
+        size[group] = size[group].max(initial=0.0) or 1.0
+    fastest = int(np.argmax(np.ptp(run.modal_coordinates, axis=0)))
+    x = states[:, fastest] - (states[:, fastest].max() + states[:, fastest].min()) / 2.0
+    rising = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
+    part = -x[rising] / (x[rising + 1] - x[rising])
+    passed = t[rising] + part * (t[rising + 1] - t[rising])
+    there = states[rising] + part[:, None] * (states[rising + 1] - states[rising])
+    for back in range(2, len(passed) + 1):
+        period = float(passed[-1] - passed[-back])
+        if period > longest:
+            break
+        if (np.abs(there[-1] - there[-back]) <= _MISFIT * size).all():
+            return period
+    raise AnalysisError(f"The motion does not repeat within {longest:g} s; run it longer until it "
+                        f"has settled, raise longest_period, or start at another value of the "
+                        f"parameter.")
+
+
+def _at_rest(run: Trajectory) -> bool:
+    size = float(np.ptp(run.modal_coordinates, axis=0).max())
+    return bool(size <= 1e-7 * np.abs(run.modal_coordinates).max())

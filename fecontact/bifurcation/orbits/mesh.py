@@ -1,0 +1,277 @@
+"""Piecewise polynomials of collocation: their values, slopes and monitor of error.
+
+On each interval of the mesh the solution is a polynomial of degree m, given at m + 1 equally
+spaced nodes, the ends among them; it meets the equation at the m Gauss points.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import borrowed, helper, i8, kernel, matrix, vector
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """Polynomials of degree m on [0, 1] and the Gauss points.
+
+    Attributes
+    ----------
+    points, weights : (m,) array
+        Gauss points and weights.
+    values, slopes : (m, m + 1) array
+        The basis polynomials and their derivatives there.
+    node_weights : (m + 1,) array
+        Integrals of the basis polynomials.
+    top : (m + 1,) array
+        Derivatives of order m of the basis polynomials.
+    fine : (k, m + 1) array
+        The basis polynomials at many places in order.
+    """
+
+    points: Array
+    weights: Array
+    values: Array
+    slopes: Array
+    node_weights: Array
+    top: Array
+    fine: Array
+
+
+@cache
+def rule(degree: int) -> Rule:
+    """The rule with m = ``degree`` Gauss points."""
+    roots, weights = np.polynomial.legendre.leggauss(degree)
+    points = (roots + 1.0) / 2.0
+    nodes = np.linspace(0.0, 1.0, degree + 1)
+    basis = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
+    basis = [p / p(node) for p, node in zip(basis, nodes, strict=True)]
+    return Rule(
+        points, weights / 2.0,
+        np.array([[p(x) for p in basis] for x in points]),
+        np.array([[p.deriv()(x) for p in basis] for x in points]),
+        np.array([p.integ()(1.0) - p.integ()(0.0) for p in basis]),
+        np.array([p.deriv(degree)(0.0) for p in basis]),
+        np.array([[p(x) for p in basis] for x in np.linspace(0.0, 1.0, 8 * degree + 1)]))
+
+
+@helper
+def _scales_of_basis(m):  # type: ignore[no-untyped-def]
+    """What each basis polynomial is divided by to be one at its own node."""
+    scales = np.ones(m + 1)
+    for k in range(m + 1):
+        for other in range(m + 1):
+            if other != k:
+                scales[k] /= k - other
+    return scales
+
+
+@helper
+def _basis_at(mesh, t, j, scales, weights):  # type: ignore[no-untyped-def]
+    """Fill weights (m + 1,) of the nodes of the interval of t; its index, looked for from j on."""
+    N, m = len(mesh) - 1, len(weights) - 1
+    while j > 0 and t < mesh[j]:
+        j -= 1
+    while j < N - 1 and t >= mesh[j + 1]:
+        j += 1
+    place = (t - mesh[j]) / (mesh[j + 1] - mesh[j]) * m
+    for k in range(m + 1):
+        weight = scales[k]
+        for other in range(m + 1):
+            if other != k:
+                weight *= place - other
+        weights[k] = weight
+    return j
+
+
+@helper
+def _combined(nodes, j, weights, out):  # type: ignore[no-untyped-def]
+    """Fill out (d,) with the weighted nodes of interval j."""
+    total, d = nodes.shape
+    m = len(weights) - 1
+    for i in range(d):
+        out[i] = 0.0
+    for k in range(m + 1):
+        node = j * m + k
+        if node == total:
+            node = 0
+        for i in range(d):
+            out[i] += weights[k] * nodes[node, i]
+
+
+@kernel(types.void(vector, matrix, vector, matrix))
+def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
+    """Fill out (k, d); the times need not be in order."""
+    mesh, nodes, times, out = borrowed(mesh), borrowed(nodes), borrowed(times), borrowed(out)
+    m = len(nodes) // (len(mesh) - 1)
+    weights, scales = np.empty(m + 1), _scales_of_basis(m)
+    j = 0
+    for row in range(len(times)):
+        j = _basis_at(mesh, times[row], j, scales, weights)
+        _combined(nodes, j, weights, out[row])
+
+
+@helper
+def _fill_other_mesh(mesh, renewed, given, weights, scales, out):  # type: ignore[no-untyped-def]
+    mesh, renewed, given, out = borrowed(mesh), borrowed(renewed), borrowed(given), borrowed(out)
+    weights, scales = borrowed(weights), borrowed(scales)
+    m = len(weights) - 1
+    total, renewed_total = (len(mesh) - 1) * m, (len(renewed) - 1) * m
+    d = given.shape[1] // total
+    common = given.shape[1] - total * d
+    j = 0
+    for node in range(renewed_total):
+        interval = node // m
+        width = renewed[interval + 1] - renewed[interval]
+        t = renewed[interval] + width * (node - interval * m) / m
+        j = _basis_at(mesh, t, j, scales, weights)
+        for index in range(len(given)):
+            for i in range(d):
+                value = 0.0
+                for k in range(m + 1):
+                    first = j * m + k if j * m + k < total else 0
+                    value += weights[k] * given[index, first * d + i]
+                out[index, node * d + i] = value
+    for index in range(len(given)):
+        for k in range(common):
+            out[index, renewed_total * d + k] = given[index, total * d + k]
+
+
+@kernel(types.void(vector, vector, i8, matrix, matrix))
+def carry_over(mesh, renewed, m, given, out):  # type: ignore[no-untyped-def]
+    """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
+
+    The e last entries of each, which are no nodes, are copied.
+    """
+    _fill_other_mesh(mesh, renewed, given, np.empty(m + 1), _scales_of_basis(m), out)
+
+
+def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
+    """Values (k, d) at times (k,) in [0, 1] of the periodic solution with nodes (N m, d)."""
+    result = np.empty((len(times), nodes.shape[1]))
+    _interpolate(mesh, nodes, times, result)
+    return result
+
+
+@kernel(types.void(matrix, matrix, vector, vector))
+def _extremes(nodes, fine, low, high):  # type: ignore[no-untyped-def]
+    """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k places."""
+    nodes, fine = borrowed(nodes), borrowed(fine)
+    total, d = nodes.shape
+    m = fine.shape[1] - 1
+    for i in range(d):
+        low[i], high[i] = nodes[0, i], nodes[0, i]
+    for node in range(total):
+        for i in range(d):
+            low[i] = min(low[i], nodes[node, i])
+            high[i] = max(high[i], nodes[node, i])
+    values = np.empty(len(fine))
+    for i in range(d):
+        # The top of a polynomial lies near the highest of its nodes: only those intervals count.
+        margin = 0.002 * (high[i] - low[i])
+        top, bottom = high[i], low[i]
+        for j in range(total // m):
+            near = False
+            for k in range(m + 1):
+                node = j * m + k
+                value = nodes[node if node < total else 0, i]
+                near = near or value > top - margin or value < bottom + margin
+            if not near:
+                continue
+            for row in range(len(fine)):
+                value = 0.0
+                for k in range(m + 1):
+                    node = j * m + k
+                    value += fine[row, k] * nodes[node if node < total else 0, i]
+                values[row] = value
+            for row in range(1, len(fine) - 1):
+                left, here, right = values[row - 1], values[row], values[row + 1]
+                bend = left - 2.0 * here + right
+                if (here - left) * (right - here) <= 0.0 and bend != 0.0:
+                    peak = here - (right - left) ** 2 / (8.0 * bend)
+                    high[i], low[i] = max(high[i], peak), min(low[i], peak)
+
+
+def extremes(nodes: Array, degree: int) -> tuple[Array, Array]:
+    """Smallest and largest value (d,) of each state over the orbit with nodes (N m, d)."""
+    low, high = np.empty(nodes.shape[1]), np.empty(nodes.shape[1])
+    _extremes(nodes, rule(degree).fine, low, high)
+    return low, high
+
+
+def node_times(mesh: Array, degree: int) -> Array:
+    """Times (N m,) of the nodes, without the last one."""
+    return (mesh[:-1, None] + np.diff(mesh)[:, None] * np.arange(degree) / degree).reshape(-1)
+
+
+@helper
+def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
+    """Fill share (N,) with h |x^(m+1)|^(1/(m+1)) of each interval."""
+    N = len(share)
+    total, d = nodes.shape
+    m = total // N
+    derivative, steep = np.empty(N), np.zeros(N)
+    for i in range(d):
+        low, high = nodes[0, i], nodes[0, i]
+        for node in range(total):
+            low, high = min(low, nodes[node, i]), max(high, nodes[node, i])
+        if high <= low:
+            continue
+        for j in range(N):
+            value = 0.0
+            for k in range(m + 1):
+                node = j * m + k
+                value += top[k] * nodes[node if node < total else 0, i]
+            derivative[j] = value / (mesh[j + 1] - mesh[j]) ** m
+        for j in range(N):
+            after = j + 1 if j + 1 < N else 0
+            spacing = (mesh[j + 1] - mesh[j] + mesh[after + 1] - mesh[after]) / 2.0
+            jump = abs(derivative[after] - derivative[j]) / (spacing * (high - low))
+            steep[j] += jump / 2.0
+            steep[after] += jump / 2.0
+    for j in range(N):
+        steep[j] = steep[j] ** (1.0 / (m + 1))
+    for j in range(N):
+        mean = (steep[j - 1] + 2.0 * steep[j] + steep[j + 1 if j + 1 < N else 0]) / 4.0
+        share[j] = mean * (mesh[j + 1] - mesh[j])
+
+
+@kernel(types.void(vector, matrix, vector, vector))
+def _equidistribute(mesh, nodes, top, renewed):  # type: ignore[no-untyped-def]
+    """Fill a mesh, see :func:`equidistributed`."""
+    mesh, nodes, top, renewed = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(renewed)
+    N, intervals = len(mesh) - 1, len(renewed) - 1
+    share = np.zeros(N)
+    _monitor(mesh, nodes, top, share)
+    total = share.sum()
+    uniform = not 0.0 < total < np.inf
+    # A part is spread evenly over time: no interval gets longer than ten times the mean.
+    before, after, j = 0.0, 0.0, -1
+    for row in range(1, intervals):
+        goal = 1.1 * row / intervals
+        while j < N - 1 and after < goal:
+            j += 1
+            before = after
+            after += share[j] / total + 0.1 * (mesh[j + 1] - mesh[j])
+        part = (goal - before) / (after - before)
+        renewed[row] = mesh[j] + min(part, 1.0) * (mesh[j + 1] - mesh[j])
+        if uniform:
+            renewed[row] = row / intervals
+    renewed[0], renewed[intervals] = 0.0, 1.0
+
+
+def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> Array:
+    """A mesh on which each interval has the same share of the error of interpolation.
+
+    The error on an interval of width h is h^(m+1) |x^(m+1)|; its root of order m + 1 is spread
+    evenly (de Boor). The derivative of order m + 1 comes from the jumps of that of order m.
+    Each state counts by its own range over the orbit.
+    """
+    result = np.empty(intervals + 1)
+    _equidistribute(mesh, nodes, rule(degree).top, result)
+    return result

@@ -1,0 +1,265 @@
+"""Normal forms of period doublings and Neimark-Sacker points: sub- or supercritical.
+
+On the centre manifold, with time in periods of the orbit and its phase moving with the flow,
+
+    period doubling   xi' = c xi^3           v antiperiodic, v' = A v
+    Neimark-Sacker    z' = i theta z + D z |z|^2        v' + i theta v = A v
+
+where A = T df/dx along the orbit. The doubled orbit, or the torus, is stable and lies beyond the
+point if c, or Re D, is negative (supercritical); else it is unstable and lies before it. The
+coefficients follow from the terms up to third order (Kuznetsov, Govaerts, Doedel and Dhooge, SIAM
+J. Numer. Anal. 43, 2005), as those that make the collocation equations solvable. The second and
+third derivatives of f are differences of its Jacobian along directions.
+"""
+
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.linalg.bordered import Border, Bordered
+from fecontact.bifurcation.linalg.condensation import condense, factors_for
+from fecontact.bifurcation.orbits.collocation_kernels import to_nodes
+from fecontact.bifurcation.orbits.linearised import Linearised
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.orbits.collocation import Collocation
+
+Array = NDArray[Any]
+
+# Steps of the differences, in ranges of the states over the orbit: the first two that agree count.
+_STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
+_AGREEMENT = 0.02
+# Error of a coefficient, in parts of it, up to which its sign counts.
+_SURE = 0.25
+
+
+def examined(
+    kind: str, problem: "Collocation", u: Array, linearised: Linearised, details: bool = True
+) -> dict[str, Any] | None:
+    """Details of a special point of a branch of orbits; None if it is none.
+
+    'coefficient' is c or Re D for eigenfunctions of mean square one in the scaled states,
+    'coefficient_error' by how much differences over two steps differ, 'criticality' the meaning of
+    both, see :func:`verdict`. Without ``details`` these are left out.
+    """
+    found = linearised.floquet.confirmed(kind)
+    if found is None or not details:
+        return found
+    if kind == "period doubling":
+        found |= _judged(Expansion(problem, u, linearised).doubling)
+    elif kind == "torus":
+        expansion = Expansion(problem, u, linearised)
+        found |= _judged(partial(expansion.torus, found["angle"]))
+    return found
+
+
+def verdict(coefficient: float, error: float) -> dict[str, Any]:
+    """A coefficient, its error, and 'supercritical', 'subcritical' or 'undecided'.
+
+    Undecided are those whose error is above a quarter of themselves, or unknown (NaN).
+    """
+    criticality = "undecided"
+    if error <= _SURE * abs(coefficient) and coefficient != 0.0:
+        criticality = "supercritical" if coefficient < 0.0 else "subcritical"
+    return {"coefficient": coefficient, "coefficient_error": error, "criticality": criticality}
+
+
+def _judged(coefficient: Any) -> dict[str, Any]:
+    """The coefficient from the first two steps that agree, or from those that agree best."""
+    values: list[float] = []
+    pairs: list[tuple[float, float]] = []
+    for step in _STEPS:
+        values.append(float(coefficient(step)))
+        if len(values) > 1:
+            pairs.append((abs(values[-1] - values[-2]), values[-1]))
+            if pairs[-1][0] <= _AGREEMENT * abs(values[-1]):
+                return verdict(values[-1], pairs[-1][0])
+    error, value = min(pairs)
+    return verdict(value, error)
+
+
+class Expansion:
+    """The flow about an orbit, to third order, on the points of collocation."""
+
+    def __init__(self, problem: "Collocation", u: Array, linearised: Linearised) -> None:
+        self._problem, self._T = problem, linearised.period
+        self._values = problem.parameters(u)
+        self._times = problem.times * self._T
+        nodes = problem.nodes(u)
+        self._x, slopes = problem.at_gauss_points(nodes)
+        self._scales = problem.scales[: nodes.shape[1]]
+        size = np.ptp(nodes, axis=0) / self._scales
+        self._range = np.maximum(size, 0.1 * size.max()) * self._scales
+        self._f, J, _ = linearised.derivatives
+        self._J = self._T * J
+        self._h = np.repeat(problem.widths, problem.degree)[:, None]
+        self._motion = slopes / self._h
+        self._last: tuple[Array, float, list[Array]] | None = None
+
+    def doubling(self, step: float) -> float:
+        """Coefficient c of a period doubling, with differences over ``step``."""
+        V = self._doubling_function
+        bend, cubic = self._second(V, V, step), self._third(V, V, V, step)
+        h2, drift = self._response(bend)
+        third = (cubic / 6.0 + self._second(h2, V, step) / 2.0
+                 - drift / 2.0 * self._along(V))
+        return float(self._share(self._J, V[:, :, None], V, third, -1.0)[0])
+
+    def torus(self, angle: float, step: float) -> float:
+        """Coefficient Re D of a Neimark-Sacker point with multipliers exp(+- i angle)."""
+        V = self._torus_function(angle)
+        W = V.conj()
+        h11, drift = self._response(self._second(V, W, step).real)
+        h20 = self._oscillating(2.0 * angle, self._second(V, V, step))
+        third = (self._third(V, V, W, step) / 2.0 + self._second(h11 + 0j, V, step)
+                 + self._second(h20, W, step) / 2.0
+                 - drift * (self._along(V) - 1j * angle * V))
+        columns = np.stack([_split(V), _split(1j * V)], axis=2)
+        return float(self._share(self._turned(angle), columns, _split(V), _split(third), 1.0)[0])
+
+    @cached_property
+    def _doubling_function(self) -> Array:
+        """Eigenfunction of the multiplier -1 at the points (N m, d)."""
+        system = self._bordered(self._J, np.zeros((*self._x.shape, 0)), [], -1.0)
+        return self._normalised(self._function(system, -1.0))
+
+    def _torus_function(self, angle: float) -> Array:
+        """Eigenfunction v of the multiplier exp(i angle) at the points, complex (N m, d)."""
+        turned = self._turned(angle)
+        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [], 1.0)
+        return self._normalised(_joined(self._function(system, 1.0)))
+
+    def _function(self, system: Bordered, closing: float) -> Array:
+        _, _, vectors = np.linalg.svd(system.matrix)
+        return self._at_points(system.expand(vectors[-1]), len(vectors[-1]), closing)
+
+    def _normalised(self, V: Array) -> Array:
+        weights = (np.tile(self._problem.rule.weights, self._problem.intervals)[:, None] * self._h)
+        return V / np.sqrt(np.sum(weights * np.abs(V / self._scales) ** 2))
+
+    def _response(self, bend: Array) -> tuple[Array, float]:
+        """Periodic h with h' - A h = bend - a x' at the points, and a: how the phase is sped up."""
+        system, rows = self._periodic
+        found = system.solve(np.append((self._h * bend).reshape(-1), np.zeros(rows)))
+        h = self._at_points(found[: self._x.size], self._x.shape[1], 1.0)
+        return h, float(found[-1]) if rows else 0.0
+
+    @cached_property
+    def _periodic(self) -> tuple[Bordered, int]:
+        """Equations of h' - A h + a x' with their phase, and how many rows fix that."""
+        motion = self._motion[:, :, None] if self._problem.autonomous else np.zeros(
+            (*self._x.shape, 0))
+        rows = [np.append(self._problem.phase_row, 0.0)] if self._problem.autonomous else []
+        return self._bordered(self._J, motion, rows, 1.0), len(rows)
+
+    def _oscillating(self, angle: float, bend: Array) -> Array:
+        """Periodic h with h' + i angle h - A h = bend at the points, complex."""
+        turned = self._turned(angle)
+        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [], 1.0)
+        found = system.solve(_split(self._h * bend).reshape(-1))
+        return _joined(self._at_points(found, turned.shape[1], 1.0))
+
+    def _share(self, A: Array, columns: Array, kernel: Array, g: Array, closing: float) -> Array:
+        """Coefficients c with which w' - A w = g - columns c has a solution.
+
+        The equations without the columns have the solution ``kernel``.
+        """
+        problem, D = self._problem, A.shape[1]
+        row = np.empty((len(A), D))
+        to_nodes(np.ascontiguousarray(kernel), problem.rule.weights[:, None] * problem.rule.values,
+                 problem.widths, row)
+        if closing < 0.0:
+            row[0] = 0.0
+        rows = [np.append(row.reshape(-1), np.zeros(columns.shape[2]))]
+        if columns.shape[2] == 2:
+            other = _split(1j * _joined(row))
+            rows.append(np.append(other.reshape(-1), np.zeros(2)))
+        system = self._bordered(A, columns, rows, closing)
+        side = np.append((self._h * g).reshape(-1), np.zeros(len(rows)))
+        return system.solve(side)[len(A) * D :]
+
+    def _bordered(self, A: Array, columns: Array, rows: list[Array], closing: float) -> Bordered:
+        """Equations of w' - A w + columns c, with further rows and w(1) = closing w(0)."""
+        problem = self._problem
+        N, m, (_, D, q) = problem.intervals, problem.degree, columns.shape
+        factors = factors_for(N, m, D, q)
+        condense(np.ascontiguousarray(A), np.zeros((N * m, D)), np.ascontiguousarray(-columns),
+                 problem.widths, 1.0, problem.rule.values, problem.rule.slopes, 0, factors)
+        return Bordered(factors, [Border(factors, row) for row in rows], closing)
+
+    def _turned(self, angle: float) -> Array:
+        """A - i angle as a real matrix of twice the size."""
+        n, d, _ = self._J.shape
+        result = np.zeros((n, 2 * d, 2 * d))
+        result[:, :d, :d] = result[:, d:, d:] = self._J
+        result[:, :d, d:] = angle * np.eye(d)
+        result[:, d:, :d] = -angle * np.eye(d)
+        return result
+
+    def _along(self, V: Array) -> Array:
+        return np.einsum("cij,cj->ci", self._J, V)
+
+    def _at_points(self, nodes: Array, D: int, closing: float) -> Array:
+        problem = self._problem
+        m = problem.degree
+        shaped = nodes[: len(self._x) * D].reshape(-1, D)
+        closed = np.concatenate([shaped, closing * shaped[:1]])
+        patches = closed[np.arange(problem.intervals)[:, None] * m + np.arange(m + 1)]
+        return np.einsum("ck,jkd->jcd", problem.rule.values, patches).reshape(shaped.shape)
+
+    def _jacobian(self, shift: Array) -> Array:
+        x = np.ascontiguousarray(self._x + shift)
+        _, J, _ = self._problem.field.derivatives(self._times, x, self._values, ())
+        return self._T * J
+
+    def _jacobians(self, a: Array, h: float) -> list[Array]:
+        """Jacobians at h, -h, 2 h and -2 h along a, shared by second and third derivatives."""
+        if self._last is None or self._last[1] != h or self._last[0] is not a:
+            self._last = a, h, [self._jacobian(part * h * a)
+                                      for part in (1.0, -1.0, 2.0, -2.0)]
+        return self._last[2]
+
+    def _scaled(self, direction: Array, step: float) -> float:
+        return float(step / np.max(np.abs(direction) / self._range))
+
+    def _second(self, a: Array, b: Array, step: float) -> Array:
+        """T f''(a, b), bilinear in complex a and b."""
+        if np.iscomplexobj(a):
+            return (self._second(a.real.copy(), b, step)
+                    + 1j * self._second(a.imag.copy(), b, step))
+        if not a.any():
+            return np.zeros_like(b)
+        h = self._scaled(a, step)
+        above, below, far_above, far_below = self._jacobians(a, h)
+        slope = (8.0 * (above - below) - far_above + far_below) / (12.0 * h)
+        return np.einsum("cij,cj->ci", slope, b)
+
+    def _third(self, a: Array, b: Array, c: Array, step: float) -> Array:
+        """T f'''(a, b, c), for a = b or a real and imaginary mixture of them."""
+        if not np.iscomplexobj(a):
+            return np.einsum("cij,cj->ci", self._curvature(a, step), c)
+        p, q = a.real.copy(), a.imag.copy()
+        mixed = (self._curvature(p + q, step) - self._curvature(p - q, step)) / 4.0
+        total = self._curvature(p, step) - self._curvature(q, step) + 2j * mixed
+        return np.einsum("cij,cj->ci", total, c)
+
+    def _curvature(self, a: Array, step: float) -> Array:
+        """Second derivative of the Jacobian along a real direction."""
+        if not a.any():
+            return np.zeros_like(self._J)
+        h = self._scaled(a, step)
+        above, below, far_above, far_below = self._jacobians(a, h)
+        return np.asarray((16.0 * (above + below) - (far_above + far_below) - 30.0 * self._J)
+                          / (12.0 * h * h))
+
+
+def _split(V: Array) -> Array:
+    """Real and imaginary parts side by side."""
+    return np.concatenate([V.real, V.imag], axis=-1)
+
+
+def _joined(V: Array) -> Array:
+    half = V.shape[-1] // 2
+    return V[..., :half] + 1j * V[..., half:]

@@ -1,0 +1,378 @@
+"""Periodic orbits of contact systems by multiple shooting with the compiled integrator."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.corrector_kernels import weighted_norm
+from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.linalg.bordered import Border, Bordered
+from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
+from fecontact.bifurcation.orbits.mesh import interpolate
+from fecontact.bifurcation.orbits.multiplier_tests import unresolved
+from fecontact.bifurcation.orbits.same_orbit import same_heading, started_in_phase
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.integrate.ensemble import ensemble
+from fecontact.integrate.sensitivity import Sensitivity, sensitivity
+from fecontact.integrate.trajectory import Status
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+# Times at which the states of a segment are kept, for their extremes.
+_SAMPLES = 33
+# A guess is not bent by more than this part of its step.
+_MOST_BENT = 0.2
+# Phase since the start of a segment that needs no run.
+_AT_START = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting(Problem):
+    """Equations of a periodic orbit of a contact system, one parameter free.
+
+    The period is cut into K segments; the run from the start x_j of each ends at the start of the
+    next. The integrator chooses its own steps, so that steep friction (k_s = 1e6 s/m) and many
+    states cost no more than in a run; collocation needs a mesh that resolves them. If nothing
+    depends on time, the period T is an unknown, and the phase is fixed by <f(y_0), x_0 - y_0> = 0
+    with the start y_0 of the orbit before; else T is ``periods`` times the period of the forcing.
+
+    The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. What is stored,
+    and the tests for special points, are those of
+    :class:`fecontact.bifurcation.orbits.collocation.Collocation`; minimum and maximum are those of
+    samples.
+
+    Attributes
+    ----------
+    field : ContactField
+    values : (k,) array
+        Parameters; the free one is taken from u.
+    free : int
+        Index of the free parameter.
+    mesh : (K + 1,) array
+        Ends of the segments, from 0 to 1.
+    reference : (d,) array
+        Start of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        What counts as one in the length of a step: of each state, the period, the parameter.
+    periods : int
+        Periods of the forcing in one of the orbit.
+    rtol : float
+        Relative tolerance of the runs.
+    derivative_rtol : float or None
+        That of their derivatives; see :func:`fecontact.sensitivity`.
+    precision : float
+        Part of a step to which special points are located on it. Beyond this, runs whose steps
+        differ decide, and each further trial costs a run with derivatives.
+    before, bend
+        The orbit before with the tangent there, and the tangent's derivative along the branch.
+    """
+
+    field: ContactField
+    values: Array
+    free: int
+    mesh: Array
+    reference: Array
+    scales: Array
+    periods: int = 1
+    rtol: float = 1e-9
+    derivative_rtol: float | None = None
+    precision: float = 1e-7
+    before: tuple[Array, Array] | None = None
+    bend: Array | None = None
+
+    keeps_matrix: ClassVar[bool] = True
+    event_precision: ClassVar[float] = 1e-9
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether the period is an unknown."""
+        return self.field.forcing_period(self.values) is None
+
+    @property
+    def common(self) -> int:
+        """Number of unknowns that all segments share."""
+        return 2 if self.autonomous else 1
+
+    def starts(self, u: Array) -> Array:
+        """Starts (K, d) of the segments."""
+        return np.ascontiguousarray(u[: -self.common].reshape(-1, self.field.dimension))
+
+    def period(self, u: Array) -> float:
+        """Period T [s] of the orbit."""
+        if self.autonomous:
+            return float(u[-2])
+        given = self.field.forcing_period(self.parameters(u))
+        assert given is not None
+        return self.periods * given
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[self.free] = u[-1]
+        return values
+
+    @cached_property
+    def phase_row(self) -> Array:
+        """Direction (d,) of the motion at the reference, of length one in the scaled states."""
+        f = self.field.rates(np.zeros(1), self.reference[None], self.values)[0]
+        row = f / self.scales[: len(f)] ** 2
+        return row / np.linalg.norm(row * self.scales[: len(f)])
+
+    def linearise(self, u: Array) -> "Shot":
+        """Residual and linearisation at u; what is not asked for is not computed."""
+        return Shot(self, u)
+
+    def weights(self) -> Array:
+        """Weights of the inner product: mean of the scaled starts, T, parameter."""
+        d = self.field.dimension
+        nodal = (np.diff(self.mesh)[:, None] / self.scales[:d] ** 2).reshape(-1)
+        return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
+
+    @property
+    def rounding(self) -> float:
+        """Newton steps that grow again for the errors of the runs."""
+        return max(1e-7, 10.0 * self.rtol)
+
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """Along the tangent, and bent like the step before."""
+        guess = u + step * tangent
+        if self.bend is None:
+            return guess
+        aside = 0.5 * step * step * self.bend
+        size = float(np.sqrt(self.weights() @ aside**2))
+        return guess if size > _MOST_BENT * step else guess + aside
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[Shooting, Array, Array]":
+        """The problem for the next step: the phase fixed by u."""
+        bend = None
+        if self.before is not None:
+            start, direction = self.before
+            length = float(self.weights() * direction @ (u - start))
+            bend = (tangent - direction) / length if length > 0.0 else None
+        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
+                       before=(u, tangent), bend=bend), u, tangent
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
+        return linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """See :func:`fecontact.bifurcation.orbits.multiplier_tests.unresolved`."""
+        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
+        return unresolved((first, last), values, tests)
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Period, stability, segments and the extremes of the states."""
+        stability = linearisation.floquet
+        states = linearisation.paths.reshape(-1, self.field.dimension)
+        return {"period": self.period(u), "multipliers": stability.multipliers,
+                "unstable": stability.unstable, "stable": stability.stable,
+                "trivial_error": stability.trivial_error, "mesh": self.mesh,
+                "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
+
+    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
+        """Multipliers as close to the unit circle as their error may lie on either side."""
+        found: tuple[int, int] = linearisation.floquet.unstable_range
+        return found
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """The kind of a torus bifurcation; None for a neutral saddle."""
+        return linearisation.floquet.confirmed(kind)
+
+    def met_again(
+        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,
+        within: float,
+    ) -> Array | None:
+        """See :meth:`Problem.met_again`: started in the phase of ``like``."""
+        weights = self.weights()
+        if len(u) != len(like) or not same_heading(weights, tangent, heading, self.common):
+            return None
+        # No shift in time changes period and parameter.
+        common = slice(-self.common, None)
+        if weighted_norm(weights[common], u[common] - like[common]) > within:
+            return None
+        try:
+            return started_in_phase(self, u, like)
+        except AnalysisError:
+            return None
+
+    def at_phases(self, u: Array, phases: Array) -> Array:
+        """States (k, d) of an orbit at phases (k,) in periods, each run from its segment's start.
+
+        Raises
+        ------
+        AnalysisError
+            If a run fails.
+        """
+        inside = np.mod(phases, 1.0)
+        segments = np.searchsorted(self.mesh, inside + _AT_START, side="right") - 1
+        since = inside - self.mesh[segments]
+        segments %= len(self.mesh) - 1
+        found = self.starts(u)[segments]
+        runs = np.flatnonzero(since > _AT_START)
+        if len(runs):
+            begin = self.mesh[segments[runs]]
+            times = self.period(u) * np.stack([begin, begin + since[runs]], axis=1)
+            found[runs] = run_from(self.field.system(self.parameters(u)), times, found[runs],
+                                   self.rtol)[:, -1]
+        return found
+
+
+def shooting_from(
+    problem: Collocation, u: Array, segments: int = 4, rtol: float = 1e-9,
+    derivative_rtol: float | None = None,
+) -> tuple[Shooting, Array]:
+    """The same orbit by shooting over so many segments of equal time, with its first guess.
+
+    Raises
+    ------
+    InputError
+        If the field is not that of a contact system, or the number of segments is not positive.
+    """
+    field = problem.field
+    if not isinstance(field, ContactField):
+        raise InputError("Shooting runs contact systems; make the field with contact_field, or "
+                         "stay with collocation.")
+    if not (isinstance(segments, int | np.integer) and segments >= 1):
+        raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
+    mesh = np.linspace(0.0, 1.0, segments + 1)
+    starts = interpolate(problem.mesh, problem.nodes(u), mesh[:-1])
+    result = Shooting(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
+                      problem.scales, problem.periods, rtol, derivative_rtol)
+    return result, np.concatenate([starts.reshape(-1), u[problem.size :]])
+
+
+def run_from(system: ContactSystem, times: Array, starts: Array, rtol: float) -> Array:
+    """States (K, k, d) at times (K, k) of runs from starts (K, d); AnalysisError if one fails."""
+    found = ensemble(system, times, initial=starts, rtol=rtol)
+    if not found.finished.all():
+        status = found.status[int(np.argmin(found.finished))]
+        if status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        raise AnalysisError(f"The run of a segment did not reach its end: {status.value}")
+    return found.states
+
+
+class Shot:
+    """Residual of the shooting equations at u, and solutions of systems with their derivative."""
+
+    def __init__(self, problem: Shooting, u: Array) -> None:
+        self.problem, self.u = problem, u
+        self._last: tuple[Array, Bordered] | None = None
+
+    @cached_property
+    def _system(self) -> Any:
+        return self.problem.field.system(self.problem.parameters(self.u))
+
+    @cached_property
+    def _times(self) -> Array:
+        T = self.problem.period(self.u)
+        if not T > 0.0:
+            raise AnalysisError("The period became negative.")
+        return self.problem.mesh * T
+
+    @cached_property
+    def runs(self) -> list[Sensitivity]:
+        """The segments, with derivatives to their starts and the parameter."""
+        problem = self.problem
+        values = problem.parameters(self.u)
+
+        @cache
+        def moved(value: float) -> ContactSystem:
+            beside = values.copy()
+            beside[problem.free] = value
+            return problem.field.system(beside)
+
+        def run(start: Array, begin: float, end: float) -> Sensitivity:
+            return sensitivity(self._system, float(end), t_start=float(begin), initial=start,
+                               parameter=(lambda _, value: moved(value), float(self.u[-1])),
+                               rtol=problem.rtol, derivative_rtol=problem.derivative_rtol)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return list(pool.map(run, problem.starts(self.u), self._times[:-1], self._times[1:]))
+
+    @cached_property
+    def paths(self) -> Array:
+        """States (K, samples, d) of the segments, from start to end."""
+        times = np.linspace(self._times[:-1], self._times[1:], _SAMPLES, axis=1)
+        return run_from(self._system, times, self.problem.starts(self.u), self.problem.rtol)
+
+    @cached_property
+    def _ends(self) -> Array:
+        if "runs" in self.__dict__:
+            return np.array([run.states[-1] for run in self.runs])
+        return self.paths[:, -1]
+
+    @cached_property
+    def residual(self) -> Array:
+        """Gaps (K d,) between the segments, and the phase condition if the period is unknown."""
+        problem = self.problem
+        starts = problem.starts(self.u)
+        gaps = (self._ends - np.roll(starts, -1, axis=0)).reshape(-1)
+        if not problem.autonomous:
+            return gaps
+        return np.append(gaps, problem.phase_row @ (starts[0] - problem.reference))
+
+    @cached_property
+    def factors(self) -> condensation.Factors:
+        """The chained equations."""
+        problem = self.problem
+        K, d = len(problem.mesh) - 1, problem.field.dimension
+        factors = condensation.factors_for(K, 1, d, problem.common)
+        values = problem.parameters(self.u)
+        slope = 0.0 if problem.autonomous else self._period_slope(values)
+        for j, run in enumerate(self.runs):
+            factors.local[j, :, :d] = run.monodromy
+            factors.local[j, :, d : 2 * d] = -np.eye(d)
+            factors.local[j, :, -1] = run.parameter_derivative
+            if problem.autonomous:
+                f = problem.field.rates(np.zeros(1), run.states[-1:].copy(), values)[0]
+                factors.local[j, :, -2] = (problem.mesh[j + 1] - problem.mesh[j]) * f
+            elif slope:
+                factors.local[j, :, -1] += slope * self._shifted(j, run, values)
+        condensation.chain_intervals(factors)
+        return factors
+
+    def _period_slope(self, values: Array) -> float:
+        """Rate dT/dp of the period of the forcing with the free parameter."""
+        problem, h = self.problem, 1e-4 * (abs(float(self.u[-1])) or 1.0)
+        above, below = values.copy(), values.copy()
+        above[problem.free] += h
+        below[problem.free] -= h
+        periods = [problem.field.forcing_period(each) or 0.0 for each in (above, below)]
+        return problem.periods * (periods[0] - periods[1]) / (2.0 * h)
+
+    def _shifted(self, j: int, run: Sensitivity, values: Array) -> Array:
+        """Derivative (d,) of the end of segment j with the period, as both its times move."""
+        problem, rates = self.problem, self.problem.field.rates
+        before, after = (rates(self._times[k : k + 1], state[None].copy(), values)[0]
+                         for k, state in ((j, run.states[0]), (j + 1, run.states[-1])))
+        moved = problem.mesh[j + 1] * after - problem.mesh[j] * (run.monodromy @ before)
+        return np.asarray(moved)
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        if self._last is None or self._last[0] is not row:
+            borders = [Border(self.factors, row)]
+            if self.problem.autonomous:
+                phase = np.zeros_like(row)
+                phase[: len(self.problem.phase_row)] = self.problem.phase_row
+                borders.insert(0, Border(self.factors, phase))
+            self._last = row, Bordered(self.factors, borders, 1.0)
+        return self._last[1].solve(rhs)
+
+    @cached_property
+    def floquet(self) -> Floquet:
+        """Multipliers and stability."""
+        return floquet_of(self.factors, self.problem.autonomous)

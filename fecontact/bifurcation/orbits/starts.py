@@ -1,0 +1,255 @@
+"""Where branches of periodic orbits begin: a Hopf point, a guess, another branch of orbits.
+
+A start is a problem, its unknowns u and the direction in which the branch leaves.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.orbits.collocation import Collocation, require_mesh
+from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
+from fecontact.core.errors import AnalysisError, InputError, require_positive
+
+Array = NDArray[np.float64]
+Start = tuple[Collocation, Array, Array]
+
+_CORRECTIONS = 25
+# First amplitudes of orbits at a Hopf point, tried one after the other. Where the friction law
+# bends strongly, orbits keep the shape of the eigenvector at the smallest ones only; where they lie
+# close to the Hopf point in the parameter, a larger one is told from it.
+AMPLITUDES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-2, 1e-7)
+
+
+def from_hopf(
+    field: VectorField, values: Array, free: int, state: Array, angular_frequency: float,
+    vector: ArrayLike, intervals: int, degree: int, scales: Array, amplitude: float = 1e-3,
+) -> Start:
+    """Orbits that are born at a Hopf point, x = state + eps Re(vector exp(i w t)).
+
+    Parameters
+    ----------
+    field, values, free
+        Parameter values (k,) at the Hopf point, and the index of the free one.
+    state : (d,) array
+        The equilibrium.
+    angular_frequency, vector
+        w and the complex eigenvector (d,) of the pair on the imaginary axis.
+    intervals, degree : int
+        Collocation at ``degree`` points on each of so many intervals.
+    scales : (d + 1,) array
+        What counts as one in the length of a step: for the states and the parameter.
+    amplitude : float
+        That of the first guess, in the problem's inner product.
+
+    Raises
+    ------
+    InputError
+        If the mesh cannot be used.
+    """
+    require_mesh(intervals, degree)
+    require_positive("from_hopf", angular_frequency=angular_frequency)
+    mesh = np.linspace(0.0, 1.0, intervals + 1)
+    phase = 2.0j * np.pi * node_times(mesh, degree)
+    shape = np.array((np.exp(phase)[:, None] * np.asarray(vector)).real, order="C")
+    period = 2.0 * np.pi / angular_frequency
+    problem = Collocation(field, values.copy(), free, mesh, degree, shape,
+                          _with_period(scales, period))
+    leaving = np.concatenate([shape.reshape(-1), [0.0, 0.0]])
+    leaving /= np.sqrt(problem.weights() @ leaving**2)
+    u = np.concatenate([np.tile(np.asarray(state, dtype=float), len(shape)),
+                        [period, values[free]]])
+    # At the Hopf point itself the period and the parameter have no effect on the orbit.
+    return problem, u + amplitude * leaving, leaving
+
+
+def from_samples(
+    field: VectorField, values: Array, free: int, times: ArrayLike, states: ArrayLike,
+    period: float | None, intervals: int, degree: int, periods: int, scales: Array,
+) -> tuple[Collocation, Array]:
+    """Problem and first guess from a nearly periodic motion.
+
+    Parameters
+    ----------
+    times, states : (k,) and (k, d) array
+        Samples over at least one period; the last period counts.
+    period : float or None
+        Period of the motion [s]; None is the last return to where the motion ends. Forced
+        systems take ``periods`` times the period of the forcing.
+
+    field, values, free, intervals, degree, periods, scales
+        See :func:`from_hopf`.
+
+    Raises
+    ------
+    InputError
+        If the samples do not cover a period, or show none.
+    """
+    require_mesh(intervals, degree)
+    t, x = np.asarray(times, dtype=float), np.asarray(states, dtype=float)
+    if t.ndim != 1 or x.shape != (len(t), field.dimension) or len(t) < 5:
+        raise InputError(f"An orbit of this field needs times (k,) and states (k, "
+                         f"{field.dimension}), k at least 5, not {t.shape} and {x.shape}.")
+    forcing = field.forcing_period(values)
+    if forcing is not None:
+        T = periods * forcing
+    else:
+        T = _return_time(t, x) if period is None else float(period)
+    require_positive("from_samples", period=T)
+    if t[-1] - t[0] < T * (1.0 - 1e-9):
+        raise InputError(f"The samples cover {t[-1] - t[0]:g} s, but the period is {T:g} s; give "
+                         f"at least one period.")
+    # The phase of forced systems counts from t = 0.
+    phases = node_times(np.linspace(0.0, 1.0, 4 * intervals + 1), degree)
+
+    def sampled(phases: Array) -> Array:
+        offset = 0.0 if forcing is not None else t[-1] / T
+        place = t[-1] - T * np.mod(t[-1] / T - offset - phases, 1.0)
+        return np.stack([np.interp(place, t, column) for column in x.T], axis=1)
+
+    mesh = equidistributed(np.linspace(0.0, 1.0, 4 * intervals + 1), sampled(phases), degree,
+                           intervals)
+    nodes = sampled(node_times(mesh, degree))
+    problem = Collocation(field, values.copy(), free, mesh, degree, nodes,
+                          _with_period(scales, T), periods)
+    return problem, np.concatenate([nodes.reshape(-1), [T] if forcing is None else [],
+                                    [values[free]]])
+
+
+def _with_period(scales: Array, period: float) -> Array:
+    return np.concatenate([scales[:-1], [period, scales[-1]]])
+
+
+def _return_time(t: Array, x: Array) -> float:
+    """Time since the motion was last where it ends, going the same way."""
+    scale = np.ptp(x, axis=0)
+    scaled = x / np.where(scale > 0.0, scale, 1.0)
+    away = np.linalg.norm(scaled - scaled[-1], axis=1)
+    far = np.flatnonzero(away > 0.5 * away.max())
+    before = np.arange(len(t)) < far[-1] if len(far) else np.zeros(len(t), dtype=bool)
+    near = np.flatnonzero(before & (away < 0.2 * away.max()))
+    if not len(near):
+        raise InputError("The samples do not come back to where they end; give more than one "
+                         "period, or the period.")
+    gaps = np.flatnonzero(np.diff(near) > 1)
+    first = near[gaps[-1] + 1] if len(gaps) else near[0]
+    best = first + int(np.argmin(away[first : near[-1] + 1]))
+    return float(t[-1] - t[best])
+
+
+def corrected(
+    problem: Collocation, u: Array, tolerance: float = 1e-10
+) -> tuple[Collocation, Array]:
+    """The orbit near u, with the parameter held, on a mesh that suits it.
+
+    Raises
+    ------
+    AnalysisError
+        If Newton's method does not converge, or falls onto an equilibrium.
+    """
+    for fresh in (False, True):
+        if fresh:
+            mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree,
+                                   problem.intervals)
+            problem, u, _ = problem.on_mesh(mesh, u, np.zeros_like(u))
+        u = _newton(problem, u, tolerance)
+        problem = replace(problem, reference=problem.nodes(u).copy(), age=0)
+    return problem, u
+
+
+def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
+    row = np.zeros_like(u)
+    row[-1] = 1.0
+    name = list(problem.field.parameters)[problem.free]
+    where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
+    size = float(np.linalg.norm(np.ptp(problem.nodes(u), axis=0)))
+    linearised = problem.linearise(u)
+    norm = float(np.linalg.norm(linearised.residual))
+    for _ in range(_CORRECTIONS):
+        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        if not np.isfinite(step).all():
+            break
+        factor = 1.0
+        while True:
+            trial = problem.linearise(u + factor * step)
+            found = float(np.linalg.norm(trial.residual)) if trial.period > 0.0 else np.inf
+            if found < (1.0 - 0.1 * factor) * norm or found < tolerance * (1.0 + size):
+                break
+            factor /= 2.0
+            if factor < 1e-3:
+                break
+        if factor < 1e-3 and not np.abs(step).max() < 1e-6 * (1.0 + np.abs(u).max()):
+            break
+        u, linearised, norm = u + factor * step, trial, found
+        if factor == 1.0 and np.abs(step).max() < tolerance * (1.0 + np.abs(u).max()):
+            if not _at_rest(problem, u, size):
+                return u
+            break
+    if _at_rest(problem, u, size):
+        raise AnalysisError(f"No periodic orbit was found {where}: the iteration ends without "
+                            f"any motion, as at an equilibrium; start from a motion of larger "
+                            f"amplitude.")
+    raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does not converge "
+                        f"(residual {norm:.3g}); start nearer to it, from a longer settled run, or "
+                        f"take more than {problem.intervals} intervals.")
+
+
+def _at_rest(problem: Collocation, u: Array, size: float) -> bool:
+    return float(np.linalg.norm(np.ptp(problem.nodes(u), axis=0))) <= 1e-4 * size
+
+
+def doubled(
+    problem: Collocation, u: Array, intervals: int | None = None
+) -> Start:
+    """Orbits of twice the period, born at the period doubling u.
+
+    The direction is the eigenfunction of the multiplier -1, which changes sign after one period.
+    ``intervals`` are those of the doubled orbit, twice as many by default.
+    """
+    linearised = problem.linearise(u)
+    row = np.zeros_like(u)
+    row[-1] = 1.0
+    bordered = linearised.bordered(row, -1.0)
+    d = problem.field.dimension
+    _, _, vectors = np.linalg.svd(bordered.matrix[:d, :d])
+    shape = bordered.expand(np.concatenate([vectors[-1], np.zeros(problem.common)]))
+    shape = shape[: problem.size].reshape(problem.reference.shape)
+    nodes = problem.nodes(u)
+    mesh = np.concatenate([problem.mesh[:-1] / 2.0, 0.5 + problem.mesh / 2.0])
+    common = u[problem.size :].copy()
+    periods = problem.periods
+    if problem.autonomous:
+        common[0] *= 2.0
+    else:
+        periods *= 2
+    twice = np.concatenate([nodes, nodes])
+    result = replace(problem, mesh=mesh, reference=twice, periods=periods, age=0)
+    start = np.concatenate([twice.reshape(-1), common])
+    leaving = np.concatenate([shape.reshape(-1), -shape.reshape(-1), np.zeros(problem.common)])
+    if intervals is None or intervals == result.intervals:
+        return result, start, leaving
+    require_mesh(intervals, problem.degree)
+    mesh = equidistributed(result.mesh, twice, problem.degree, intervals)
+    return result.on_mesh(mesh, start, leaving)
+
+
+def crossing(problem: Collocation, u: Array, incoming: Array) -> Start:
+    """The other branch of orbits through the branch point u.
+
+    ``incoming`` is the direction of the first branch nearby: at the point itself the equations
+    have two directions, and do not tell which is which.
+    """
+    row = problem.weights() * incoming
+    bordered = problem.linearise(u).bordered(row)
+    equations = bordered.matrix[:-1]
+    _, _, vectors = np.linalg.svd(equations / np.abs(equations).max(axis=1)[:, None])
+    first, second = (bordered.expand(vector) for vector in vectors[-2:])
+    other = (row @ second) * first - (row @ first) * second
+    return replace(problem, reference=problem.nodes(u).copy()), u, other
+
+
+def at_phase(problem: Collocation, u: Array, phases: Array) -> Array:
+    """States (k, d) of the orbit at phases (k,), in periods."""
+    return interpolate(problem.mesh, problem.nodes(u), np.mod(phases, 1.0))

@@ -1,0 +1,65 @@
+"""Commands about fecontact itself: ``doctor``, ``laws`` and ``demo``."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from fecontact.cli.printing import say, show
+
+
+def doctor() -> int:
+    """Check that all libraries are there and work; say what to install."""
+    from fecontact.cli.console import waiting
+    from fecontact.cli.doctor import examine
+    from fecontact.cli.tables import table
+
+    with waiting("Looking"):
+        found = examine()
+    rows = [(finding.what if finding.works else f"MISSING {finding.what}", finding.detail)
+            for finding in found]
+    show(table("", "", left=2, rows=rows))
+    remedies = dict.fromkeys(finding.remedy for finding in found if not finding.works)
+    for remedy in filter(None, remedies):
+        say(f"To repair: {remedy}")
+    if remedies:
+        return 1
+    say("All is well.")
+    return 0
+
+
+def laws(
+    name: Annotated[str | None, Parameter(help=(
+        "A law, for its formula and parameters; one of your own, FILE.py:CLASS, is checked too."))]
+    = None,
+    /,
+) -> None:
+    """List the laws of contact, friction, ground and drive, or explain one."""
+    from rich import print as show
+
+    from fecontact.cli.law_help import law_help, laws_table
+
+    if name is None:
+        show(laws_table())
+    else:
+        print(law_help(name))
+
+
+def keys(
+    section: Annotated[str | None, Parameter(help="A section, like ground.profile.")] = None, /,
+) -> None:
+    """Print the sections and keys of study files: types, defaults, units and meaning."""
+    from fecontact.cli.console import loading
+
+    with loading():
+        from fecontact.study.reference_page import study_keys
+    print(study_keys(section), end="")
+
+
+def demo(
+    folder: Annotated[Path, Parameter(help="Where the results go.")] = Path("demo-output"), /,
+) -> int:
+    """Make two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
+    from fecontact.cli.demo import run_demo
+
+    return run_demo(folder)

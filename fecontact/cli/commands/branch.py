@@ -1,0 +1,89 @@
+"""The command ``branch``: steady sliding and periodic orbits of a study over a parameter."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from fecontact.cli.options import Changes, Folder, StudyFile
+from fecontact.cli.printing import complain, say, say_written, show
+from fecontact.core.errors import InputError
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.diagram_options import BranchSettings
+
+
+def branch(
+    study: StudyFile,
+    parameter: Annotated[str | None, Parameter(
+        help="Dotted name of a number, `ground.speed`, in place of that of `[branch]`.")] = None,
+    /,
+    *,
+    start: Annotated[float | None, Parameter(
+        name="--from", help="Value at which it begins, in place of `[branch]`.")] = None,
+    end: Annotated[float | None, Parameter(
+        name="--to", help="Value at which it ends, in place of `[branch]`.")] = None,
+    set_: Changes = None,
+    output: Folder = None,
+) -> int:
+    """Follow steady sliding or periodic orbits over a parameter: folds, Hopf points, doublings.
+
+    The section [branch] of the study says what; without it, steady sliding. Writes all branches
+    (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, frequencies and growth rates of the
+    modes in steady sliding. Ctrl-C stops it; what was computed until then is written.
+    """
+    from fecontact.cli.console import INTERRUPTED, titled_bar, waiting
+    from fecontact.cli.run_files import read_study
+    from fecontact.core.folders import output_folder
+
+    described = read_study(study, set_)
+    wanted = _wanted(described.branch, parameter, start, end)
+    _ = wanted.name, wanted.bounds
+    from fecontact.bifurcation.diagram import follow_branches
+    from fecontact.cli.commands.branch_results import (
+        runs_beneath,
+        special_table,
+        write_branch_results,
+    )
+
+    with output_folder(output or described.results) as folder:
+        with waiting("Computing modes"):
+            system = described.system()
+        with titled_bar() as progress:
+            result = follow_branches(system, wanted, described.simulation.initial, progress)
+        beneath = None
+        if wanted.brute_force and not result.interrupted:
+            beneath = runs_beneath(system, wanted, described.simulation.initial)
+        with waiting("Writing"):
+            files = write_branch_results(result, wanted, folder, described.name, beneath)
+        for name, found in result.found.items():
+            say(f"\n{name}: {found.status.value}")
+            if found.message:
+                say(f"The last step failed: {found.message}")
+            show(special_table(found))
+        for note in result.notes:
+            say(f"note: {note}")
+        say_written(*map(Path, files))
+    if result.interrupted:
+        return INTERRUPTED
+    stalled = [name for name, found in result.found.items() if found.status.name == "STALLED"]
+    if stalled:
+        return complain(f"{', '.join(stalled)}: the steps became too small to go on; what was "
+                        f"computed is written.", 1)
+    return 1 if result.notes else 0
+
+
+def _wanted(
+    given: "BranchSettings", parameter: str | None, start: float | None, end: float | None
+) -> "BranchSettings":
+    """The section with what the command line says in its place."""
+    changed = given if parameter is None else replace(given, parameter=parameter)
+    if (start is None) != (end is None):
+        raise InputError("--from and --to belong together; give both ends of the range, or none "
+                         "of them.")
+    if start is None or end is None:
+        return changed
+    if start == end:
+        raise InputError(f"--from and --to are both {start:g}; give the two ends of a range.")
+    return replace(changed, range=(min(start, end), max(start, end)), start=start)

@@ -1,0 +1,112 @@
+"""Commands that work on a run: ``render``, ``plot`` and ``export``."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from fecontact.cli.options import RunFile, Trust
+from fecontact.cli.printing import note_age, say_written
+
+
+def render(
+    file: RunFile,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"],
+        help="NAME.mp4 for a movie; NAME.png or a folder for numbered pictures.")] = None,
+    frames: Annotated[int | None, Parameter(help="Number of pictures.")] = None,
+    fps: Annotated[float | None, Parameter(help="Pictures a second.")] = None,
+    size: Annotated[tuple[int, int] | None, Parameter(
+        help="Width and height in pixels, even.")] = None,
+    colour: Annotated[Literal["displacement", "von_mises"] | None, Parameter(
+        help="Quantity that colours the body.")] = None,
+    scale: Annotated[float | None, Parameter(
+        help="Factor by which displacements are drawn larger.")] = None,
+    start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
+    end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
+    trust: Trust = False,
+) -> None:
+    """Draw a run as a movie or as numbered pictures; [render] of the study holds the defaults."""
+    from dataclasses import replace
+
+    from fecontact.cli.run_files import movie, stored_run
+    from fecontact.core.folders import output_folder
+
+    changes: dict[str, Any] = {
+        "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
+        "start": start, "end": end}
+    stored = stored_run(file, trust)
+    from fecontact.core.tables import located
+
+    with located("render:", "RenderSettings"):
+        settings = replace(stored.settings,
+                           **{key: value for key, value in changes.items() if value is not None})
+    target = output or stored.path.with_suffix(".mp4")
+    with output_folder(target.parent):
+        say_written(movie(stored.trajectory, target, settings))
+    note_age(file, stored.current)
+
+
+def plot(
+    file: RunFile,
+    kind: Annotated[str, Parameter(
+        help="history, phase, contact, energies, modes, spectrum, density, spectrogram, poincare, "
+        "friction_work or receptance.")],
+    /,
+    *,
+    point: Annotated[list[str] | None, Parameter(
+        negative=(), show_default=False,
+        help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
+        "takes several.")] = None,
+    axis: Annotated[Literal["x", "y", "phi"] | None, Parameter(
+        help="Direction of the motion; that of the drive by default.")] = None,
+    quantity: Annotated[str, Parameter(
+        help="Of spectra: velocity, displacement, normal_force, ...")] = "velocity",
+    highest: Annotated[float | None, Parameter(help="End of the frequencies [Hz].")] = None,
+    start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
+    end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
+    trust: Trust = False,
+) -> None:
+    """Draw a plot of a run, again or of another kind."""
+    from fecontact.cli.console import waiting
+    from fecontact.cli.run_files import stored_run
+    from fecontact.core.folders import output_folder
+
+    stored = stored_run(file, trust)
+    from fecontact.cli.plot_kinds import Choice, point_of, redraw
+
+    choice = Choice(quantity, tuple(point_of(text) for text in point or ()), axis, highest)
+    target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
+    with output_folder(target.parent), waiting("Drawing"):
+        say_written(redraw(stored.trajectory, kind, target, choice, start=start, end=end))
+    note_age(file, stored.current)
+
+
+def export(
+    file: RunFile,
+    /,
+    *,
+    format_: Annotated[Literal["pvd", "csv", "mat", "netcdf"], Parameter(
+        name="--format", help="`pvd` with VTU files, for ParaView before 5.12; `csv` for "
+        "spreadsheets; `mat` for MATLAB and Octave; `netcdf` for xarray.")] = "pvd",
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"], help="The file, or for pvd a folder of its own.")] = None,
+    frames: Annotated[int, Parameter(help="Number of fields over the body, for pvd.")] = 200,
+    trust: Trust = False,
+) -> None:
+    """Write a run in another format."""
+    from fecontact.cli.console import waiting
+    from fecontact.cli.run_files import stored_run
+    from fecontact.core.folders import output_folder
+
+    stored = stored_run(file, trust)
+    from fecontact.output.files.export import export_run
+
+    with output_folder((output or stored.path).parent), waiting("Writing"):
+        written = export_run(stored.trajectory, stored.path, format_, output, frames)
+    say_written(written)
+    note_age(file, stored.current)

@@ -1,0 +1,139 @@
+"""Commands that work on a study: ``init``, ``mesh``, ``modes`` and ``run``."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from fecontact.cli.console import INTERRUPTED
+from fecontact.cli.options import Changes, Folder, StudyFile
+from fecontact.cli.printing import complain, say, say_written, show
+from fecontact.core.errors import InputError
+
+
+def init(
+    file: Annotated[Path, Parameter(help="The file to write.")] = Path("study.toml"),
+    /,
+    *,
+    shape: Annotated[Literal["beam", "pendulum", "block"], Parameter(
+        help="Beam on wavy ground, pendulum on a stop, or block on a moving belt.")] = "beam",
+    force: Annotated[bool, Parameter(negative=(), help="Replace the file if there is one.")]
+    = False,
+) -> None:
+    """Write a commented study file to start from."""
+    from fecontact.cli.templates import template
+    from fecontact.core.folders import write_text
+
+    if file.suffix.lower() != ".toml":
+        raise InputError(f"{file} must end in .toml.")
+    # Resolved, because none/../study.toml is there once the folder of the new file is made.
+    if file.resolve().exists() and not force:
+        raise InputError(f"{file} exists; choose another name, or replace it with --force.")
+    write_text(file, template(shape))
+    say(f"{file} is written; next: fecontact run {file}")
+
+
+def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
+    """Make the mesh of a study, and print its size and its groups."""
+    from fecontact.cli.run_files import read_study
+    from fecontact.cli.tables import mesh_table
+    from fecontact.core.folders import output_folder
+    from fecontact.fem.mesh_files import write_mesh
+
+    described = read_study(study, set_)
+    with output_folder(output or described.results) as folder:
+        made = described.mesh()
+        show(mesh_table(made))
+        target, source = folder / f"{described.name}.msh", getattr(described.geometry, "file", None)
+        if source is not None and target.exists() and target.samefile(described.folder / source):
+            raise InputError(f"{target} is the mesh that the study names; choose another folder "
+                             f"for what is read of it.")
+        write_mesh(made, target)
+        say_written(target)
+
+
+def modes(
+    study: StudyFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Folder = None,
+    converge: Annotated[bool, Parameter(negative=(), help=(
+        "Refine the mesh, and take more modes: what changes, as a table and a plot."))]
+    = False,
+) -> None:
+    """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
+    from fecontact.cli.console import progress_bar, waiting
+    from fecontact.cli.run_files import convergence_of, read_study
+    from fecontact.core.folders import output_folder
+    from fecontact.reduction.report import BasisReport
+
+    described = read_study(study, set_)
+    from fecontact.output.plots.run import plot_convergence, plot_modes
+
+    with output_folder(output or described.results) as folder:
+        with waiting("Computing modes"):
+            basis = described.basis()
+        say(str(BasisReport(basis)))
+        picture = folder / f"{described.name}-modes.png"
+        plot_modes(basis, picture)
+        say_written(picture)
+        if converge:
+            with progress_bar("Refining", 1.0) as progress:
+                result = convergence_of(described, progress)
+            say(f"\n{result}")
+            picture = folder / f"{described.name}-convergence.png"
+            plot_convergence(result, picture)
+            say_written(picture)
+
+
+def run(
+    study: StudyFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Folder = None,
+    resume: Annotated[bool, Parameter(
+        negative=(), help="Go on with a run that was interrupted.")] = False,
+) -> int:
+    """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
+
+    Ctrl-C stops the run, and so do SIGTERM and SIGHUP; what was computed until then is written, and
+    --resume goes on from there.
+    """
+    from fecontact.cli.console import progress_bar, waiting
+    from fecontact.cli.run_files import read_study, write_run
+    from fecontact.cli.tables import notes, run_table
+    from fecontact.core.folders import output_folder
+    from fecontact.core.locks import locked
+
+    described = read_study(study, set_)
+    t_end = described.t_end
+    with waiting("Compiling, once after an installation"):
+        pass
+    with (output_folder(output or described.results) as folder,
+          locked(folder / f".{described.name}.lock",
+                 f"Another run is writing {folder / described.name}.vtkhdf; wait for it, or choose "
+                 f"another folder with -o.")):
+        with waiting("Computing modes"):
+            described.system()
+        checkpoint = folder / f"{described.name}.checkpoint"
+        if not resume:
+            checkpoint.unlink(missing_ok=True)
+        elif not checkpoint.exists():
+            raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
+                             f"exist; run the study without --resume.")
+        with progress_bar("Running", t_end, described.simulation.t_start) as progress:
+            trajectory = described.run(progress, checkpoint)
+        with waiting("Writing"):
+            files = write_run(described, trajectory, folder)
+        ended = trajectory.status.name
+        if ended != "INTERRUPTED":
+            checkpoint.unlink(missing_ok=True)
+        show(run_table(trajectory))
+        for note in notes(trajectory):
+            say(f"note: {note}")
+        say_written(*files)
+    if ended not in ("FINISHED", "EVENT", "INTERRUPTED"):
+        return complain("the run did not reach its end; what was computed is written.", 1)
+    return INTERRUPTED if ended == "INTERRUPTED" else 0

@@ -1,0 +1,178 @@
+"""The command ``sweep``: many cases of a study."""
+
+import contextlib
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from fecontact.cli.options import Changes, StudyFile
+from fecontact.cli.printing import say, say_written, show
+from fecontact.core.errors import InputError
+
+if TYPE_CHECKING:
+    from fecontact.study.sweep_section import SweepSettings
+    from fecontact.sweep.table import SweepTable
+
+_SHOWN = 10  # reasons, and cases of each
+
+
+def sweep(
+    study: StudyFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"], help="Folder of the sweep, instead of NAME-sweep among the "
+                                      "results of the study.")] = None,
+    resume: Annotated[bool, Parameter(
+        negative=(), help="Go on with a sweep; what is finished is not computed again.")] = False,
+    retry: Annotated[bool, Parameter(
+        negative=(), help="With --resume: compute failed cases again.")] = False,
+    overwrite: Annotated[bool, Parameter(
+        negative=(), help="Remove the sweep that is there and begin anew.")] = False,
+    workers: Annotated[int | None, Parameter(
+        help="Processes on this machine; one a core by default.")] = None,
+    dask: Annotated[str | None, Parameter(
+        help="Address of a running Dask scheduler, `tcp://node1:8786`, whose workers compute.")]
+    = None,
+) -> int:
+    """Run many cases of a study on all cores or a cluster; write a table (index.csv) and plots.
+
+    Ctrl-C stops it; finished cases are kept, and --resume goes on from there.
+    """
+    from fecontact.cli.console import waiting
+    from fecontact.cli.run_files import read_study
+
+    described = read_study(study, set_)
+    if described.sweep is None:
+        raise InputError(f"{study} has no section [sweep]; add one with the parameters that change "
+                         f"in [sweep.axes].")
+    if dask is not None and workers is not None:
+        raise InputError("--workers is for processes on this machine; leave it out with --dask.")
+    from fecontact.cli.sweep_progress import sweep_bar
+    from fecontact.sweep.executors import dask_executor
+    from fecontact.sweep.sweep import sweep as run_sweep
+
+    with waiting("Compiling, once after an installation"):
+        pass
+    folder = output or described.results / f"{described.name}-sweep"
+    with contextlib.ExitStack() as stack:
+        executor = None if dask is None else stack.enter_context(dask_executor(dask))
+        progress = stack.enter_context(sweep_bar())
+        try:
+            table = run_sweep(described, executor=executor, folder=folder, resume=resume,
+                              overwrite=overwrite, retry=retry, workers=workers,
+                              progress=progress)
+        except KeyboardInterrupt:
+            print(f"Finished cases are kept in {folder}; go on with --resume.", file=sys.stderr)
+            raise
+    return _report(table, described.sweep, folder)
+
+
+def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int:
+    from fecontact.cli.console import waiting
+
+    failed = table.failed
+    say(f"{len(table)} cases, {len(failed)} failed")
+    if len(failed) < len(table):
+        show(_summary_table(table, settings.method))
+        if settings.method == "sensitivity":
+            for name in table.values:
+                with contextlib.suppress(InputError):  # too few base samples went well
+                    show(_sensitivity_table(table, name, settings.seed))
+    _complain(failed)
+    _warn({case: one for case, one in enumerate(table.warnings) if one})
+    with waiting("Drawing"):
+        pictures = _draw(table, settings, folder)
+    say_written(folder / "index.csv", *pictures)
+    return 1 if len(failed) == len(table) else 0
+
+
+def _complain(failed: Mapping[int, str]) -> None:
+    """One line for each reason, with the first of its cases."""
+    cases: dict[str, list[int]] = {}
+    for case, reason in failed.items():
+        cases.setdefault(reason, []).append(case)
+    for reason, numbers in list(cases.items())[:_SHOWN]:
+        few = ", ".join(f"{number}" for number in numbers[:_SHOWN])
+        more = ", ..." if len(numbers) > _SHOWN else ""
+        print(f"failed: case{'s' * (len(numbers) > 1)} {few}{more}: {reason}", file=sys.stderr)
+    if len(cases) > _SHOWN:
+        print(f"failed: for {len(cases) - _SHOWN} more reasons, see the table", file=sys.stderr)
+
+
+def _warn(warnings: Mapping[int, str]) -> None:
+    """One line on the cases that leave the limits of the model, with what the first says."""
+    if warnings:
+        first = min(warnings)
+        print(f"warning: {len(warnings)} of the cases leave the limits of the model, see the "
+              f"column 'warning' of the table; case {first}: {warnings[first]}", file=sys.stderr)
+
+
+def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
+    from fecontact.cli.tables import table as make_table
+    from fecontact.sweep.statistics import Estimate, sobol_indices
+
+    def shown(one: Estimate) -> tuple[str, str]:
+        return f"{one.value:.2f}", f"{one.low:.2f} ... {one.high:.2f}"
+
+    found = sobol_indices(table, name, seed=seed)
+    return make_table(f"variance of {name}", "alone", "95 %", "with others", "95 %", rows=[
+        (parameter, *shown(found.first[parameter]), *shown(found.total[parameter]))
+        for parameter in found.first])
+
+
+def _summary_table(table: "SweepTable", method: str) -> Any:
+    """Statistics of drawn samples; smallest and largest value of grids and lists."""
+    import numpy as np
+    from rich.markup import escape
+
+    from fecontact.cli.tables import table as make_table
+    from fecontact.sweep.statistics import statistics
+    from fecontact.sweep.summaries import unit_of
+
+    rows: list[tuple[str, ...]] = []
+    drawn = method not in ("grid", "list", "sensitivity")
+    for name, values in table.values.items():
+        known = values[np.isfinite(values)]
+        unit = unit_of(name)
+        title = escape(f"{name} [{unit}]" if unit else name)
+        if drawn and len(known) >= 3:
+            rows += [(title if key == "mean" else "", key, f"{one.value:.4g}",
+                      f"{one.low:.4g} ... {one.high:.4g}")
+                     for key, one in statistics(known).items()]
+        elif len(known):
+            rows.append((title, f"{known.min():.4g}", f"{np.median(known):.4g}",
+                         f"{known.max():.4g}"))
+    if drawn:
+        return make_table("", "", "value", "95 %", rows=rows, left=2)
+    return make_table("", "smallest", "median", "largest", rows=rows)
+
+
+def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[Path]:
+    from fecontact.sweep.plots import plot_sobol, plot_strobed, plot_sweep
+    from fecontact.sweep.statistics import sobol_indices
+
+    if len(set(table.keys)) < 2:
+        return []
+    names = [name for name, values in table.values.items() if (values == values).any()]
+    files = [plot_sweep(table, name, folder / f"{_file_name(name)}.png") for name in names]
+    if table.strobed is not None:
+        files += [plot_strobed(table, parameter, folder / f"strobed-{_file_name(parameter)}.png")
+                  for parameter, values in table.parameters.items() if len(set(values)) > 1]
+    if settings.method == "sensitivity" and names:
+        found = {}
+        for name in names:
+            with contextlib.suppress(InputError):  # too few base samples went well
+                found[name] = sobol_indices(table, name, seed=settings.seed)
+        if found:
+            files.append(plot_sobol(found, folder / "sensitivity.png"))
+    return files
+
+
+def _file_name(name: str) -> str:
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)
+

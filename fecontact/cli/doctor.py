@@ -1,0 +1,122 @@
+"""What this computer has of what fecontact needs, and how to get the rest.
+
+Libraries that may be missing or broken are tried in processes of their own: where graphics
+libraries are missing, VTK ends its process instead of raising.
+"""
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import metadata
+
+from fecontact.core import system_libraries
+
+_GMSH = """
+import gmsh
+gmsh.initialize(readConfigFiles=False, interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+gmsh.model.occ.synchronize()
+gmsh.model.mesh.generate(2)
+assert len(gmsh.model.mesh.getNodes()[0]) > 3
+"""
+_FFMPEG = """
+import subprocess, imageio_ffmpeg
+subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-version"], check=True, capture_output=True)
+"""
+_COMPILED = "import fecontact.system.contact_system"
+_RENDERING = """
+import sys
+from fecontact.output.render.offscreen import rendering_works
+reason = rendering_works()
+sys.exit(reason)
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes
+    ----------
+    what : str
+        Its name.
+    works : bool
+        Whether it is there and works.
+    detail : str
+        Its version, or why it does not work.
+    remedy : str
+        What to run or do; empty if it works.
+    """
+
+    what: str
+    works: bool
+    detail: str
+    remedy: str = ""
+
+
+def examine(report: Callable[[str], None] = lambda what: None) -> list[Finding]:
+    """Look at Python, the packages, the system's libraries and what they are needed for.
+
+    Parameters
+    ----------
+    report : callable
+        Called with the name of each thing before it is looked at.
+    """
+    found = [Finding("Python", True, sys.version.split()[0])]
+    found += _packages()
+    absent = system_libraries.missing()
+    for what, code in (("meshing (Gmsh)", _GMSH), ("compiled laws (numba)", _COMPILED),
+                       ("pictures (VTK)", _RENDERING), ("movies (ffmpeg)", _FFMPEG)):
+        report(what)
+        reason = _attempt(code)
+        remedy = ""
+        if reason is not None:
+            remedy = system_libraries.remedy(absent) if absent else _reinstall(found)
+        found.append(Finding(what, reason is None, reason or "works", remedy))
+    # Libraries of the system matter only where something that needs them fails.
+    needed = not all(finding.works for finding in found)
+    for library, package in system_libraries.PACKAGES.items():
+        there = library not in absent
+        detail = "found" if there else f"not found, package {package}"
+        found.append(Finding(library, there or not needed, detail,
+                             "" if there else system_libraries.remedy(absent)))
+    return found
+
+
+def _packages() -> list[Finding]:
+    """The packages that fecontact requires, with their versions."""
+    findings = []
+    for requirement in metadata.requires("fecontact") or []:
+        if "extra ==" in requirement:
+            continue
+        name = re.split(r"[\s<>=!~;\[(]", requirement, maxsplit=1)[0]
+        try:
+            findings.append(Finding(name, True, metadata.version(name)))
+        except metadata.PackageNotFoundError:
+            findings.append(Finding(name, False, "not installed",
+                                    f"{sys.executable} -m pip install '{requirement}'"))
+    return findings
+
+
+def _reinstall(found: list[Finding]) -> str:
+    lines = [finding.remedy for finding in found if finding.remedy]
+    return lines[0] if lines else (f"{sys.executable} -m pip install --force-reinstall --no-deps "
+                                   f"gmsh vtk pyvista imageio-ffmpeg numba llvmlite")
+
+
+def _attempt(code: str) -> str | None:
+    """Run Python code in a process of its own; why it fails, or None."""
+    try:
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
+                              timeout=180, check=False, stdin=subprocess.DEVNULL)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    if done.returncode == 0:
+        return None
+    if done.returncode < 0:
+        return f"the trial process ended by signal {-done.returncode}"
+    lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+    return lines[-1] if lines else f"exit code {done.returncode}"

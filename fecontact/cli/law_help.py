@@ -1,0 +1,89 @@
+"""What laws there are, for the terminal."""
+
+import inspect
+import json
+from dataclasses import MISSING, fields
+from typing import Any
+
+from fecontact.cli.tables import table
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.check import check_law
+from fecontact.laws.registry import law_names, own_law
+
+
+def laws_table() -> Any:
+    """Every law: its kind, its name in study files, and what it is."""
+    from rich.markup import escape
+
+    return table("kind", "law", "", left=3, rows=[
+        (_title(kind), name, escape(_summary(cls)))
+        for kind, names in law_names().items() for name, cls in names.items()])
+
+
+def law_help(name: str) -> str:
+    """The documentation of the laws of a name, and how they stand in a study file.
+
+    The name is that in study files or that of the class; capitals do not matter. A law of one's
+    own, ``FILE.py:CLASS``, is checked too, see :func:`fecontact.laws.check.check_law`.
+
+    Raises
+    ------
+    InputError
+        If there is no such law, with those that there are; if a law of one's own is wrong.
+    """
+    if ".py:" in name:
+        return _own(name)
+    laws = [(kind, law, cls) for kind, names in law_names().items() for law, cls in names.items()]
+    found = [(kind, law, cls) for kind, law, cls in laws
+             if name.lower() in (law, cls.__name__.lower())]
+    if not found:
+        known = {law for _, law, _ in laws}
+        raise InputError(f"There is no law '{name}'{nearest(name, known)}; there are: "
+                         f"{choices(known)}.")
+    return "\n\n".join(f"{inspect.getdoc(cls)}\n\nIn a study file:\n\n{_example(kind, law, cls)}"
+                       for kind, law, cls in found)
+
+
+def _own(name: str) -> str:
+    cls = own_law(tuple(law_names()), name, name)
+    kind = next(kind for kind in law_names() if issubclass(cls, kind))
+    text = f"{inspect.getdoc(cls)}\n\nIn a study file:\n\n{_example(kind, name, cls)}"
+    if not issubclass(cls, NormalLaw | FrictionLaw):
+        return text
+    if any(entry.default is MISSING and entry.default_factory is MISSING for entry in fields(cls)):
+        return f"{text}\n\nIt is not checked, because it has parameters without a default."
+    check_law(cls())
+    return f"{text}\n\nWith these values it keeps the contract of laws: derivatives, signs, energy."
+
+
+def _example(kind: type, name: str, cls: type) -> str:
+    lines = [f"    [{_SECTIONS[kind.__name__]}]", f'    law = "{name}"']
+    for entry in fields(cls):
+        default = entry.default_factory() if callable(entry.default_factory) else entry.default
+        if default is MISSING:
+            lines.append(f"    {entry.name} =")
+        elif default is None or default == ():
+            lines.append(f"    # {entry.name} = {_hint(str(entry.type))}")
+        else:
+            shown = list(default) if isinstance(default, tuple) else default
+            lines.append(f"    {entry.name} = {json.dumps(shown)}")
+    return "\n".join(lines)
+
+
+def _hint(annotation: str) -> str:
+    """What the value of an optional key looks like."""
+    return "[...]" if "tuple" in annotation else '"..."' if "str" in annotation else "..."
+
+
+def _title(kind: type) -> str:
+    return _TITLES.get(kind.__name__, _SECTIONS[kind.__name__])
+
+
+def _summary(cls: type) -> str:
+    return (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " ").rstrip(".")
+
+
+_SECTIONS = {"NormalLaw": "normal", "FrictionLaw": "friction", "Profile": "ground.profile",
+             "GroundMotion": "ground.motion", "Signal": "drive.motion_x"}
+_TITLES = {"Profile": "profile", "GroundMotion": "ground motion", "Signal": "signal"}

@@ -1,0 +1,146 @@
+"""Plots of stored runs by name, as ``fecontact plot`` draws them."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.analysis.frequency_response import Place, frequency_response
+from fecontact.analysis.histories import Point, usual_axis
+from fecontact.analysis.window import window
+from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.plots import analysis
+from fecontact.output.plots import run as plots
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is to be drawn of a run.
+
+    Attributes
+    ----------
+    quantity, axis : str
+        As for :func:`fecontact.analysis.histories.history`; the axis by default that of the drive.
+    points : tuple of points
+        Named points and contact nodes; all that a history shows, of which the other plots show
+        the first.
+    highest_hz : float or None
+        End of the frequencies.
+    """
+
+    quantity: str = "velocity"
+    points: tuple[Point, ...] = ()
+    axis: str | None = None
+    highest_hz: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.highest_hz is not None:
+            require_positive("plot", highest=self.highest_hz)
+
+    @property
+    def point(self) -> Point:
+        """The first point, or B."""
+        return self.points[0] if self.points else "B"
+
+
+    @property
+    def direction(self) -> str:
+        """The axis, x where none is chosen."""
+        return self.axis or "x"
+
+
+Draw = Callable[[Trajectory, Path, Choice], Path]
+
+
+def _receptance(run: Trajectory, path: Path, c: Choice) -> Path:
+    basis = run.system.basis
+    end = c.highest_hz or 1.2 * float(basis.frequencies_hz[-1] or 100.0)
+    f = np.linspace(end / 2000.0, end, 2000)
+    if not isinstance(c.point, str | int):
+        raise InputError(f"The receptance is one of named points and contact nodes, not of "
+                         f"{c.point!r}.")
+    place: list[Place] = [(c.point, c.direction)]
+    found = [frequency_response(run.system, f, place)]
+    labels = ["apart from the ground"]
+    # Without steady sliding, as on waves, there is nothing to linearise about.
+    with suppress(AnalysisError):
+        found.append(frequency_response(run.system, f, place, linearised_at="sliding"))
+        labels.append("steadily sliding")
+    return analysis.plot_response(found, path, labels)
+
+
+KINDS: dict[str, Draw] = {
+    "history": lambda run, path, c: plots.plot_history(run, path, c.points),
+    "phase": lambda run, path, c: plots.plot_phase(run, path, c.point, c.direction),
+    "contact": lambda run, path, c: plots.plot_contact_map(run, path),
+    "energies": lambda run, path, c: plots.plot_energies(run, path),
+    "modes": lambda run, path, c: plots.plot_modes(run.system.basis, path),
+    "spectrum": lambda run, path, c: analysis.plot_spectrum(
+        run, path, c.quantity, c.point, c.direction, highest_hz=c.highest_hz),
+    "density": lambda run, path, c: analysis.plot_spectrum(
+        run, path, c.quantity, c.point, c.direction, density=True, highest_hz=c.highest_hz),
+    "spectrogram": lambda run, path, c: analysis.plot_spectrogram(
+        run, path, c.quantity, c.point, c.direction, highest_hz=c.highest_hz),
+    "poincare": lambda run, path, c: analysis.plot_poincare(run, path, c.point, c.direction),
+    "friction_work": lambda run, path, c: analysis.plot_friction_work(run, path),
+    "receptance": _receptance,
+}
+
+
+def redraw(
+    trajectory: Trajectory,
+    kind: str,
+    path: Path,
+    choice: Choice | None = None,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+) -> Path:
+    """Draw a stored run once more; the file.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    kind : str
+        One of :data:`KINDS`.
+    path : Path
+        A .png, .pdf or .svg file.
+    choice : Choice, optional
+        What to draw.
+    start, end : float, optional
+        The part of the run [s].
+
+    Raises
+    ------
+    InputError
+        For another kind, and as the plots themselves.
+    """
+    if kind not in KINDS:
+        raise InputError(f"There is no plot '{kind}'{nearest(kind, KINDS)}; there are: "
+                         f"{choices(KINDS)}.")
+    part = trajectory if start is None and end is None else window(trajectory, start, end)
+    chosen = choice or Choice()
+    if chosen.axis is None:
+        chosen = replace(chosen, axis=usual_axis(part.system))
+    return KINDS[kind](part, path, chosen)
+
+
+def point_of(text: str) -> Point:
+    """A point from a command line: ``B``, ``3`` for a contact node, ``0.1,0.02`` for a place."""
+    if text.isdigit():
+        return int(text)
+    first, comma, second = text.partition(",")
+    if not comma:
+        return text
+    try:
+        place = float(first), float(second)
+        if np.isfinite(place).all():
+            return place
+        raise ValueError
+    except ValueError:
+        raise InputError(f"The point {text} must be a name, the number of a contact node, or a "
+                         f"place x,y in m.") from None

@@ -1,0 +1,120 @@
+"""What commands print of a mesh and of a run."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fecontact.core.units import count
+
+if TYPE_CHECKING:
+    from fecontact.fem.mesh import Mesh
+    from fecontact.integrate.events import Events
+    from fecontact.integrate.trajectory import Trajectory
+
+ROUGH_SLOPE = 0.3  # of the ground, above which a vertical normal force is a rough assumption
+
+
+def table(*headings: str, rows: Iterable[Iterable[str]], left: int = 1) -> Any:
+    """A table for the terminal; all columns but the first ``left`` ones are set flush right."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    result = Table(*headings, box=SIMPLE_HEAD, show_header=any(headings), pad_edge=False)
+    for column in result.columns[left:]:
+        column.justify = "right"
+    for row in rows:
+        result.add_row(*row)
+    return result
+
+
+def mesh_table(mesh: "Mesh") -> Any:
+    """Counts, size and groups of a mesh."""
+    kind = "triangles" if mesh.cells.shape[1] == 3 else "quadrilaterals"
+    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
+    groups = [(f"boundary {name}", count(len(edges), "edge"))
+              for name, edges in mesh.boundaries.items()]
+    points = [(f"point {name}", count(len(nodes), "node")) for name, nodes in mesh.points.items()]
+    return table("", "", rows=[
+        ("nodes", f"{len(mesh.nodes)}"), (kind, f"{len(mesh.cells)}"),
+        ("x", f"{low[0]:g} ... {high[0]:g} m"), ("y", f"{low[1]:g} ... {high[1]:g} m"),
+        ("area", f"{mesh.area:.4g} m²"), *groups, *points,
+    ])
+
+
+def run_table(trajectory: "Trajectory") -> Any:
+    """Summary of a run."""
+    from fecontact.core.units import quantity
+
+    size, place = largest_displacement(trajectory)
+    time, statistics = trajectory.time, trajectory.statistics
+    seconds = statistics.get("seconds", 0.0)
+    shares = contact_shares(trajectory)
+    rows = [
+        ("time", f"{quantity(float(time[0]), 's')} ... {quantity(float(time[-1]), 's')}"),
+        (("steps", f"{statistics['steps']} in {seconds:.1f} s") if "steps" in statistics else
+         ("computed", f"in {seconds:.1f} s")),
+        ("energy imbalance", f"{trajectory.energies.imbalance:.1e}"),
+        *(() if trajectory.events is None else (("events", _events(trajectory.events)),)),
+        ("largest displacement", f"{quantity(size, 'm')} at {place}"),
+        *((f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()),
+    ]
+    return table("", "", rows=rows)
+
+
+def _events(events: "Events") -> str:
+    """Numbers of events by kind."""
+    kinds = dict.fromkeys(events.kind)
+    return ", ".join(f"{events.kind.count(kind)} {kind}" for kind in kinds) or "none"
+
+
+def largest_displacement(trajectory: "Trajectory") -> tuple[float, str]:
+    """Largest displacement [m] of the body at all output times, and where it occurs."""
+    basis, q = trajectory.system.basis, trajectory.modal_coordinates
+    if basis.field is not None:
+        shapes, places = basis.field.shapes, basis.field.nodes
+    else:
+        used = np.abs(basis.T).any(axis=(1, 2))
+        shapes, places = basis.T[used, :2], basis.positions[used]
+    rows = shapes.reshape(-1, basis.modes).T
+    best, node = 0.0, 0
+    for block in np.array_split(q, max(1, q.shape[0] * rows.shape[1] // 2**21)):
+        motion = np.linalg.norm((block @ rows).reshape(len(block), -1, 2), axis=2).max(axis=0)
+        if motion.max() > best:
+            best, node = float(motion.max()), int(motion.argmax())
+    return best, f"x = {places[node, 0]:.4g} m, y = {places[node, 1]:.4g} m"
+
+
+def contact_shares(trajectory: "Trajectory") -> dict[str, float]:
+    """Parts of the run and of the contact face that are open, stick and slip."""
+    from fecontact.integrate.trajectory import ContactState
+
+    weight = trajectory.system.share
+    return {state.name.lower(): float(((trajectory.contact_state == state) @ weight).mean())
+            for state in ContactState}
+
+
+def notes(trajectory: "Trajectory") -> list[str]:
+    """Sentences on what limits the result."""
+    from fecontact.integrate.trajectory import Status
+
+    found = []
+    if trajectory.status is not Status.FINISHED:
+        message = trajectory.statistics.get("message")
+        found.append(trajectory.status.value + (f" {message}" if message else ""))
+    slope = trajectory.system.ground.steepest_slope
+    if slope > ROUGH_SLOPE:
+        found.append(f"The ground's slope reaches {slope:.2f}; above {ROUGH_SLOPE} it is a rough "
+                     f"assumption that the normal force is vertical.")
+    return found
+
+
+def file_size(path: Path) -> str:
+    """Size of a file for people."""
+    size = float(path.stat().st_size)
+    for unit in ("B", "kB", "MB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} GB"

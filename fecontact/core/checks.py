@@ -1,0 +1,83 @@
+"""Checks of arguments that several functions of the interface share."""
+
+import os
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, require_positive
+
+_SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
+_LARGEST = 1e12  # factor of displacements; they are drawn in single precision
+
+
+def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> None:
+    """Raise :class:`InputError` unless the named arguments are of a class.
+
+    Parameters
+    ----------
+    owner : str
+        The function or class, for the message.
+    kind : type or tuple of types
+        What they must be.
+    **values
+        Arguments by name.
+    """
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    for name, value in values.items():
+        if not isinstance(value, kinds):
+            wanted = " or ".join(_NAMES.get(one, f"a {one.__name__}") for one in kinds)
+            raise InputError(f"{owner}: {name} must be {wanted}, not {type(value).__name__}.")
+
+
+_NAMES: dict[type, str] = {Mapping: "a mapping of names", Sequence: "a sequence", str: "a text",
+                           int: "a whole number"}
+
+
+def as_path(path: Any, what: str) -> Path:
+    """A path; InputError if it is none, or has a zero character in it.
+
+    ``what`` says what lies there, for the message: 'a mesh'.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"The path of {what} must be a text or Path, not {type(path).__name__}.")
+    found = Path(path)
+    if "\0" in str(found):
+        raise InputError(f"The path of {what}, {str(found)!r}, holds a zero character, which no "
+                         f"name may have.")
+    return found
+
+
+def as_floats(values: Any, what: str) -> NDArray[np.float64]:
+    """An array of numbers; InputError if it is none. ``what`` is its name, for the message."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be numbers, not {type(values).__name__} of another "
+                         f"kind.") from None
+
+
+def as_integers(values: Any, what: str) -> NDArray[np.int64]:
+    """An array of whole numbers; InputError if it is none, or a number has a fraction."""
+    found = as_floats(values, what)
+    if not (np.isfinite(found) & (found == np.round(found))).all():
+        raise InputError(f"{what} must be whole numbers.")
+    return np.asarray(values).astype(np.int64)
+
+
+def require_frame_rate(owner: str, fps: float) -> None:
+    """Raise :class:`InputError` unless movies can have so many frames a second."""
+    if not (isinstance(fps, Real) and not isinstance(fps, bool) and _SLOWEST <= fps <= _FASTEST):
+        raise InputError(f"{owner}: fps = {fps!r} must be a number from {_SLOWEST:g} to "
+                         f"{_FASTEST:g} frames a second.")
+
+
+def require_scale(owner: str, scale: float) -> None:
+    """Raise :class:`InputError` unless displacements can be drawn larger by this factor."""
+    require_positive(owner, scale=scale)
+    if scale > _LARGEST:
+        raise InputError(f"{owner}: scale = {scale!r} must be at most {_LARGEST:g}.")

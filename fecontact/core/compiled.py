@@ -1,0 +1,265 @@
+"""Compiling: kernels and laws go through numba here, and only here.
+
+Laws reach a kernel as addresses of compiled functions. A kernel is then compiled once for all
+laws, now and in later processes, a call from a kernel costs a few nanoseconds, and no time is
+spent in converting function objects when the kernel is called from Python.
+"""
+
+import dis
+import hashlib
+import inspect
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+from numba import njit, types
+from numba.core import cgutils, sigutils
+from numba.core.caching import IndexDataCacheFile
+from numba.core.ccallback import CFunc
+from numba.core.errors import NumbaError
+from numba.extending import intrinsic
+
+from fecontact.core.errors import InputError
+
+f8 = types.float64
+i8 = types.int64
+vector = types.Array(f8, 1, "C")
+matrix = types.Array(f8, 2, "C")
+block = types.Array(f8, 3, "C")
+integers = types.Array(i8, 1, "C")
+
+
+_FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
+
+
+_PACKAGE = Path(__file__).parent
+_IMPORT = re.compile(r"^\s*(?:from|import)\s+(fecontact[\w.]*)"
+                     r"(?:\s+import\s+(\([^)]*\)|[^\n]*))?", re.MULTILINE)
+
+
+@cache
+def _imported(path: Path) -> frozenset[Path]:
+    """Files of the package that a file imports."""
+    found = set()
+    for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        place = _PACKAGE.joinpath(*module.split(".")[1:])
+        for part in (place, *(place / name for name in re.findall(r"\w+", names))):
+            found |= {file for file in (part.with_suffix(".py"), part / "__init__.py")
+                      if file.is_file()}
+    return frozenset(found)
+
+
+@cache
+def _source_stamp(path: Path) -> str:
+    """A mark that changes with any source of the package that a file's kernels may call."""
+    reached, ahead = set(), {path}
+    while ahead:
+        reached |= ahead
+        ahead = set().union(*(_imported(file) for file in ahead)) - reached
+    stamp = hashlib.sha256()
+    for file in sorted(reached):
+        info = file.stat()
+        stamp.update(f"{file.name}:{info.st_size}:{info.st_mtime_ns};".encode())
+    return stamp.hexdigest()
+
+
+class _StoredCode(IndexDataCacheFile):
+    """Compiled code on disk, made anew where it cannot be read.
+
+    Power cuts and full disks leave files that are cut short, and numba stops at them. Only such
+    files of this very function are removed. Code that cannot be stored is compiled again by the
+    next process.
+    """
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except OSError:
+            return {}
+        except Exception:  # unpickling damaged files fails in every way there is
+            _remove(self._index_path)
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        try:
+            return super()._load_data(name)
+        except OSError:
+            raise  # which numba takes as not stored
+        except Exception as error:
+            path = self._data_path(name)
+            _remove(path)
+            raise FileNotFoundError(path) from error
+
+    def save(self, key: Any, data: Any) -> None:
+        """Store code under a key, if that is possible."""
+        with suppress(OSError):
+            super().save(key, data)
+
+
+def _remove(path: str) -> None:
+    with suppress(OSError):
+        Path(path).unlink()
+
+
+def _stamp(compiled: Any, function: Callable[..., Any], module: str = "") -> None:
+    """Key stored code by the sources it is made from, and by the module name it refers to."""
+    stored: Any = getattr(compiled, "_cache", None)
+    if isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
+        stored._cache_file = _StoredCode(
+            stored.cache_path, stored._impl.filename_base,
+            (stored._impl.locator.get_source_stamp(),
+             _source_stamp(Path(inspect.getfile(function))), module))
+
+
+def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function for one signature and keep the result on disk.
+
+    Floating-point sums may be reordered (so that they vectorise), but NaN and infinity keep
+    their meaning. The stored code is renewed when the file of the function changes, or any that it
+    imports from the package: numba by itself looks only at the first.
+    """
+
+    def compile_(function: Callable[..., Any]) -> Any:
+        settings: dict[str, Any] = {
+            "cache": True, "error_model": "numpy",
+            "fastmath": _FASTMATH, **options,
+        }
+        dispatcher = njit(**settings)(function)
+        _stamp(dispatcher, function)
+        dispatcher.compile(signature)
+        dispatcher.disable_compile()
+        return dispatcher
+
+    return compile_
+
+
+def helper(function: Callable[..., Any]) -> Any:
+    """Compile a function that kernels share, and that becomes part of each of them."""
+    return njit(error_model="numpy", fastmath=_FASTMATH, forceinline=True)(function)
+
+
+@intrinsic
+def borrowed(typingctx: Any, array: Any) -> Any:
+    """The same array, or tuple of arrays, without reference counts.
+
+    Only for what the caller of the kernel holds: an array made inside it is freed after its last
+    use under its own name.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _without_owner(context, builder, signature.args[0], args[0])
+
+    return array(array), codegen
+
+
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.BaseTuple):
+        items = [_without_owner(context, builder, item,  # type: ignore[var-annotated]
+                                builder.extract_value(value, index))
+                 for index, item in enumerate(kind)]  # type: ignore[arg-type]
+        return context.make_tuple(builder, kind, items)
+    if not isinstance(kind, types.Array):
+        return value
+    array = context.make_array(kind)(context, builder, value)
+    array.meminfo = cgutils.get_null_value(array.meminfo.type)
+    array.parent = cgutils.get_null_value(array.parent.type)
+    return array._getvalue()
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledLaw:
+    """A scalar function that kernels call by its address; compiled when that is asked for.
+
+    Attributes
+    ----------
+    python : callable
+        The function as written, for other compilers and for tests.
+    form : str
+        Its arguments and results, for people.
+    """
+
+    python: Callable[..., Any]
+    form: str
+    _signature: Any
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled function; valid as long as this object lives.
+
+        Raises
+        ------
+        InputError
+            If the function takes or returns something else than its form says, uses what cannot
+            be compiled, or raises exceptions.
+        """
+        return int(self._compiled.address)
+
+    @cached_property
+    def _compiled(self) -> Any:
+        function = self.python
+        raising = _raising(function)
+        if raising is not None:
+            raise InputError(f"The law {function.__name__}({_arguments(function)}) has a raise or "
+                             f"assert statement{raising}, which a compiled law cannot have; check "
+                             f"parameters in __post_init__ of the law's class, and return a "
+                             f"finite value everywhere.")
+        law = CFunc(function, sigutils.normalize_signature(self._signature), {},
+                    {"error_model": "numpy"})
+        # Functions typed into a console have no file beside which they could be stored.
+        if Path(inspect.getfile(function)).is_file():
+            law.enable_caching()
+            _stamp(law, function, function.__module__)
+        try:
+            law.compile()
+        except (NumbaError, TypeError) as error:
+            lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+            raise InputError(f"The law {function.__name__}({_arguments(function)}) is not one of "
+                             f"the form {self.form}: "
+                             f"{lines[1] if len(lines) > 1 else lines[0]}") from None
+        return law
+
+
+def compile_law(signature: Any, form: str, function: Callable[..., Any]) -> CompiledLaw:
+    """A scalar law for the given signature; ``form`` is that signature for people."""
+    return CompiledLaw(function, form, signature)
+
+
+def _arguments(function: Callable[..., Any]) -> str:
+    return ", ".join(inspect.signature(function).parameters)
+
+
+def _raising(function: Callable[..., Any]) -> str | None:
+    """Where a function raises: "" for itself, " in NAME" for one that it calls, None for nowhere.
+
+    Behind an address exceptions are printed and lost, and the function returns zeros.
+    """
+    if any(step.opname == "RAISE_VARARGS" for step in dis.get_instructions(function)):
+        return ""
+    for name, value in inspect.getclosurevars(function).globals.items():
+        called = getattr(value, "py_func", None)
+        if called is not None and _raising(called) is not None:
+            return f" in {name}"
+    return None
+
+
+def function_at(signature: Any) -> Any:
+    """A function for kernels that turns an address into a callable of this signature."""
+    function_type = types.FunctionType(signature)
+
+    @intrinsic
+    def at(typingctx: Any, address: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            pointer = context.get_value_type(types.voidptr)
+            value = cgutils.create_struct_proxy(function_type)(context, builder)
+            value.c_addr = builder.inttoptr(args[0], pointer)
+            value.py_addr = cgutils.get_null_value(pointer)
+            value.jit_addr = cgutils.get_null_value(pointer)
+            return value._getvalue()
+
+        return function_type(types.int64), codegen
+
+    return at

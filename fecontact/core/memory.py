@@ -1,0 +1,94 @@
+"""What fits into memory: asked before large arrays are made, not found out by running out of it."""
+
+import os
+import sys
+from pathlib import Path
+
+from fecontact.core.errors import InputError
+
+_UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
+
+
+def available_memory() -> float:
+    """Memory that this process may still take [bytes]; infinite where that is not known.
+
+    The least of what the system has left, of what a container's limit leaves, and of the
+    process's own limit (``ulimit -v``).
+    """
+    found = [_system(), _container(Path("/sys/fs/cgroup")), _own_limit()]
+    return max(min(found), 0.0)
+
+
+def require_memory(name: str, count: float, each: float, remedy: str = "") -> None:
+    """Raise :class:`InputError` if a number of things does not fit into memory.
+
+    Parameters
+    ----------
+    name : str
+        The key, for the message.
+    count : float
+        Its value.
+    each : float
+        Memory for one of them [bytes].
+    remedy : str
+        What may be done besides taking fewer, for the end of the message.
+    """
+    free = available_memory()
+    if count * each <= free:
+        return
+    fits = int(float(f"{0.9 * free / each:.2g}"))
+    raise InputError(f"{name} = {shown_count(count)} would need {shown_memory(count * each)} of "
+                     f"memory, where {shown_memory(free)} are free; take at most "
+                     f"{fits}{remedy}.")
+
+
+def shown_memory(size: float) -> str:
+    """A size in bytes for people: ``1.6 GB``."""
+    for unit, symbol in _UNITS:
+        if size >= unit:
+            return f"{size / unit:.3g} {symbol}"
+    return f"{size / 1e3:.3g} kB"
+
+
+def shown_count(count: float) -> str:
+    """A number of things for people; the digits of very large ones are left out."""
+    return f"{count}" if abs(count) < 1e15 else f"{float(min(count, sys.float_info.max)):.3g}"
+
+
+def _system() -> float:
+    """What the operating system can give without swapping."""
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * float(line.split()[1])
+    except (OSError, ValueError):
+        pass
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
+
+
+def _container(folder: Path) -> float:
+    """What a memory limit of control groups (version 2) leaves; cached files can be dropped."""
+    try:
+        limit = float((folder / "memory.max").read_text(encoding="ascii"))
+        used = float((folder / "memory.current").read_text(encoding="ascii"))
+        stat = dict(line.split() for line in
+                    (folder / "memory.stat").read_text(encoding="ascii").splitlines())
+        return limit - used + float(stat.get("file", 0.0))
+    except (OSError, ValueError):  # "max" where there is no limit
+        return float("inf")
+
+
+def _own_limit() -> float:
+    try:
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit == resource.RLIM_INFINITY:
+            return float("inf")
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        return float(limit - pages * resource.getpagesize())
+    except (ImportError, OSError, ValueError):
+        return float("inf")

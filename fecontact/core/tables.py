@@ -1,0 +1,329 @@
+"""Tables of keys and values (TOML, HDF5) as dataclasses, and back."""
+
+import json
+import re
+import sys
+import tomllib
+import types
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import cache
+from numbers import Integral, Real
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from fecontact.core.errors import FecontactError, InputError, choices, nearest
+
+T = TypeVar("T")
+
+_COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """Classes whose subclasses are told apart in tables by the key ``law``.
+
+    Attributes
+    ----------
+    is_kind : function
+        Whether a type is one of these classes.
+    law_class : function
+        The subclass of such a class by its name, which may be None; the last argument is where
+        the name stands, for messages.
+    name_of : function
+        The name of an instance of a subclass; None for a default and for all other instances.
+    """
+
+    is_kind: Callable[[Any], bool]
+    law_class: Callable[[type, Any, str], type]
+    name_of: Callable[[Any], str | None]
+
+
+_kinds = Kinds(lambda hint: False, lambda kind, name, where: kind, lambda instance: None)
+
+
+def register_kinds(kinds: Kinds) -> None:
+    """Let tables hold the subclasses of these classes by name."""
+    global _kinds
+    _kinds = kinds
+
+
+_DEEPEST = 30  # tables and lists within each other; studies need less than ten
+
+
+def parsed(text: str, title: str) -> dict[str, Any]:
+    """The tables of a TOML text.
+
+    Raises
+    ------
+    InputError
+        If it is not TOML, or more than a reader can be asked to take.
+    """
+    try:
+        return tomllib.loads(text.removeprefix("\ufeff"))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{title} is not valid TOML: {error}.") from None
+    except RecursionError:
+        raise _too_deep(title) from None
+    except ValueError:  # Python refuses to read whole numbers of thousands of digits
+        raise InputError(f"{title} holds a whole number of more than "
+                         f"{sys.get_int_max_str_digits()} digits; write it as 1e300, and not "
+                         f"above 1.8e308.") from None
+
+
+def require_readable(tables: Any, title: str) -> None:
+    """Check what no key may have: too many levels, names that are no texts, zero characters.
+
+    Raises
+    ------
+    InputError
+        With the key in question.
+    """
+    ahead: list[tuple[str, Any, int]] = [("", tables, 0)]
+    while ahead:
+        name, value, depth = ahead.pop()
+        if depth > _DEEPEST:
+            raise _too_deep(title)
+        if isinstance(value, Mapping):
+            for key, item in value.items():
+                if not isinstance(key, str):
+                    raise InputError(f"{title}: the key {key!r} must be a text.")
+                _require_no_zero(key, f"a key{f' of {name}' if name else ''}", title)
+                ahead.append((f"{name}.{key}" if name else key, item, depth + 1))
+        elif isinstance(value, list | tuple):
+            ahead += [(name, item, depth + 1) for item in value]
+        elif isinstance(value, str):
+            _require_no_zero(value, name, title)
+
+
+def _require_no_zero(text: str, name: str, title: str) -> None:
+    if "\0" in text:
+        raise InputError(f"{title}: {name} = {shown(text)} holds the zero character \\u0000, which "
+                         f"no name and no text may have; remove it.")
+
+
+def _too_deep(title: str) -> InputError:
+    return InputError(f"{title} has tables or lists within each other more than {_DEEPEST} levels "
+                      f"deep; studies need less than ten.")
+
+
+def from_table(cls: type[T], table: Any, where: str) -> T:
+    """An instance of a dataclass from a table whose keys are its fields.
+
+    Parameters
+    ----------
+    cls : type
+        A dataclass; fields that are dataclasses take sub-tables. A kind of law: the key ``law``
+        names the law.
+    table : mapping
+        Keys and values; keys with defaults may be missing. Whole numbers serve as floats, lists
+        as tuples.
+    where : str
+        Where the table stands, for messages: ``study.toml: [ground]``.
+
+    Raises
+    ------
+    InputError
+        For an unknown key (with the nearest valid one), a value of the wrong type or out of
+        range, or a missing key.
+    """
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} must be a table of keys and values, not {shown(table)}.")
+    if _kinds.is_kind(cls):
+        chosen = _kinds.law_class(cls, table.get("law"), where)
+        parameters = {key: value for key, value in table.items() if key != "law"}
+        return cast(T, from_table(chosen, parameters, where))
+    hints = _hints(cast(Any, cls))
+    entries = {entry.name: entry for entry in fields(cls)}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for key, value in table.items():
+        require_known(key, entries, where)
+        values[key] = convert(value, hints[key], where, key)
+    missing = [name for name, entry in entries.items() if name not in values
+               and entry.default is MISSING and entry.default_factory is MISSING]
+    if missing:
+        raise InputError(f"{where} lacks {'the key' if len(missing) == 1 else 'the keys'} "
+                         f"{choices(missing)}.")
+    with located(f"{where}:", cls.__name__):
+        return cls(**values)
+
+
+@cache
+def _hints(cls: Any) -> dict[str, Any]:
+    return get_type_hints(cls)
+
+
+def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
+    """The fields of a dataclass as a table that TOML can hold.
+
+    Parameters
+    ----------
+    instance : Any
+        A dataclass instance.
+    defaults : bool
+        Whether fields that have their default value are in the table; those that are None never
+        are.
+    """
+    name = _kinds.name_of(instance)
+    table: dict[str, Any] = {} if name is None else {"law": name}
+    for entry in fields(instance):
+        value = getattr(instance, entry.name)
+        default = entry.default_factory() if callable(entry.default_factory) else entry.default
+        if value is not None and (defaults or default is MISSING or value != default):
+            table[entry.name] = plain(value)
+    return table
+
+
+def require_known(key: str, valid: Mapping[str, Any] | Sequence[str], where: str) -> None:
+    """Raise :class:`InputError` with the nearest valid key unless ``key`` is one of them."""
+    if key not in valid:
+        raise InputError(f"{where} has no key '{key}'{nearest(key, valid)}; "
+                         f"its keys are: {choices(valid)}.")
+
+
+def convert(value: Any, hint: Any, where: str, key: str) -> Any:
+    """A value of a table as the type that a field of a dataclass asks for.
+
+    Raises
+    ------
+    InputError
+        ``study.toml: [friction]: decay = "high" must be a number or a list of numbers.``
+    """
+    try:
+        return _converted(value, hint, f"{where[:-1]}.{key}]" if where.endswith("]")
+                          else f"{where}: [{key}]")
+    except _MismatchError:
+        raise InputError(f"{where}: {key} = {shown(value)} must be {described(hint)}.") from None
+    except OverflowError:
+        raise InputError(f"{where}: {key} = {shown(value)} is too large; numbers reach "
+                         f"1.8e308, whole numbers 9.2e18.") from None
+
+
+@contextmanager
+def located(where: str, *titles: str) -> Iterator[None]:
+    """Put the place before the message of an error, instead of the titles that it begins with."""
+    try:
+        yield
+    except FecontactError as error:
+        names = "|".join(re.escape(title) for title in titles) or "$"
+        message = re.sub(rf"^({names})[ \w]*: ", "", str(error))
+        if message.startswith(where):
+            raise
+        raise type(error)(f"{where} {message}") from error.__cause__
+
+
+def shown(value: Any) -> str:
+    """A value as it would stand in a file, cut to a length that fits into a sentence."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    try:
+        text = json.dumps(value, ensure_ascii=False)
+    except (TypeError, ValueError, RecursionError):
+        try:
+            text = repr(value)
+        except ValueError:  # whole numbers of thousands of digits
+            text = "a number of thousands of digits"
+        except RecursionError:
+            text = "[[...]]"
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def described(hint: Any, *, plural: bool = False) -> str:
+    """What a type is called in a message: ``a number or a list of numbers``."""
+    words = list(dict.fromkeys(
+        word for option in _options(hint) if option is not types.NoneType
+        for word in _words(option, plural)))
+    *most, last = words
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+class _MismatchError(Exception):
+    """A value is not of the type asked for."""
+
+
+def _converted(value: Any, hint: Any, where: str) -> Any:
+    options = _options(hint)
+    if isinstance(value, Mapping):
+        # Of several tables that may stand here, the one that shares the most keys is meant.
+        options = sorted(options, key=lambda option: -_shared_keys(option, value))
+    for option in options:
+        try:
+            return _converted_to(value, option, where)
+        except _MismatchError:
+            continue
+    raise _MismatchError
+
+
+def _converted_to(value: Any, hint: Any, where: str) -> Any:
+    origin, args = get_origin(hint), get_args(hint)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if hint is Any:
+        return value
+    if hint is float and isinstance(value, Real) and not isinstance(value, bool):
+        return float(value)
+    if hint is int and isinstance(value, Integral) and not isinstance(value, bool):
+        if abs(int(value)) >= 2**63:
+            raise OverflowError
+        return int(value)
+    if hint in (str, bool, types.NoneType) and isinstance(value, hint):
+        return value
+    if origin is Literal and isinstance(value, str | int) and value in args and not (
+            isinstance(value, bool)):
+        return value
+    if is_dataclass(hint):
+        if isinstance(value, hint):  # type: ignore[arg-type]
+            return value
+        if isinstance(value, Mapping):
+            return from_table(hint, value, where)  # type: ignore[arg-type]
+    if origin is tuple and isinstance(value, list | tuple):
+        if args[-1] is Ellipsis:
+            return tuple(_converted(item, args[0], where) for item in value)
+        if len(value) == len(args):
+            return tuple(_converted(item, kind, where)
+                         for item, kind in zip(value, args, strict=True))
+    if origin in (dict, Mapping) and isinstance(value, Mapping):
+        return {str(key): convert(item, args[1], where, str(key)) for key, item in value.items()}
+    raise _MismatchError
+
+
+def _shared_keys(hint: Any, table: Mapping[str, Any]) -> int:
+    return sum(entry.name in table for entry in fields(hint)) if is_dataclass(hint) else 0
+
+
+def _options(hint: Any) -> Sequence[Any]:
+    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+
+
+def _words(hint: Any, plural: bool) -> list[str]:
+    simple = {float: ("a number", "numbers"), int: ("a whole number", "whole numbers"),
+              str: ("a text in quotes", "texts in quotes"), bool: ("true or false",) * 2,
+              Any: ("a value", "values")}
+    origin, args = get_origin(hint), get_args(hint)
+    if hint in simple:
+        return [simple[hint][plural]]
+    if origin is Literal:
+        return [json.dumps(option) for option in args]
+    if origin is tuple:
+        number = "" if args[-1] is Ellipsis else f"{_COUNTS.get(len(args), len(args))} "
+        return [f"{'lists' if plural else 'a list'} of {number}{described(args[0], plural=True)}"]
+    content = ("a law and its parameters" if _kinds.is_kind(hint) else
+               ", ".join(entry.name for entry in fields(hint)) if is_dataclass(hint)
+               else f"names and {described(args[1], plural=True)}")
+    return [f"{'tables' if plural else 'a table'} of {content}"]
+
+
+def plain(value: Any) -> Any:
+    """A value as TOML can hold it: dataclasses and mappings as tables, sequences as lists."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return to_table(value)
+    if isinstance(value, Mapping):
+        return {key: plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, tuple | list):
+        return [plain(item) for item in value]
+    return value

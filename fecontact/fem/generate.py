@@ -1,0 +1,239 @@
+"""Meshing of plane bodies by Gmsh, with named boundaries and points."""
+
+import ctypes
+import math
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core import system_libraries
+from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.memory import available_memory
+from fecontact.fem.grids import Grid, grid_of, nearest_line
+from fecontact.fem.hole_rim import Rim
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.shapes import Beam, Block, Pendulum, Shape
+
+__all__ = ["MAX_CELLS", "Beam", "Block", "Pendulum", "Shape", "generate"]
+
+MAX_CELLS = 2_000_000
+_BYTES = 3000.0  # memory for a cell while Gmsh makes it
+
+_SIGACTION_BYTES = 512  # more than struct sigaction has on any system
+_GMSH_LOCK = threading.Lock()  # Gmsh has one global state
+_GMSH_OPTIONS: dict[str, float] = {
+    "General.Terminal": 0,
+    "Mesh.ElementOrder": 1,
+    "Mesh.MeshOnlyEmpty": 0,
+    "Mesh.MeshOnlyVisible": 0,
+    "Mesh.RecombineAll": 0,
+    "Mesh.SubdivisionAlgorithm": 0,
+}
+
+
+def generate(shape: Shape) -> Mesh:
+    """Mesh a body with Gmsh: rows and columns of rectangles, or of right-angled triangles.
+
+    Parameters
+    ----------
+    shape : Beam, Block or Pendulum
+        The body, with the size and kind of its elements.
+
+    Returns
+    -------
+    Mesh
+        With the boundaries and points that the shape names; its points are nodes exactly there.
+
+    Raises
+    ------
+    InputError
+        For another shape, or an element size that makes more than two million elements.
+    MissingLibraryError
+        If a library that Gmsh needs is not installed.
+
+    Notes
+    -----
+    May be called from any thread, and while Gmsh is in use: the caller's models, options and
+    signal handlers are left as they are.
+    """
+    if not isinstance(shape, Shape):
+        raise InputError(f"generate: {shape!r} is not a shape; give a Beam, a Block or a Pendulum.")
+    grid = grid_of(shape)
+    _require_few_cells(shape, grid)
+    gmsh = _import_gmsh()
+    with _GMSH_LOCK, _gmsh_session(gmsh):
+        return _mesh(gmsh, grid, shape)
+
+
+def _mesh(gmsh: Any, grid: Grid, shape: Shape) -> Mesh:
+    """Build the model, mesh it and collect nodes, cells and groups."""
+    geo = gmsh.model.geo
+    along_x, along_y = grid.divisions(shape.element_size)
+    corners: dict[tuple[int, int], int] = {}
+    curves: dict[tuple[str, int, int], int] = {}
+    names: dict[int, list[str]] = {}
+    surfaces = []
+
+    def corner(i: int, j: int) -> int:
+        if (i, j) not in corners:
+            corners[i, j] = geo.addPoint(grid.x[i], grid.y[j], 0.0)
+        return corners[i, j]
+
+    def curve(direction: str, i: int, j: int, name: str) -> int:
+        key = direction, i, j
+        if key not in curves:
+            end, count = ((i + 1, j), along_x[i]) if direction == "x" else ((i, j + 1), along_y[j])
+            curves[key] = geo.addLine(corner(i, j), corner(*end))
+            geo.mesh.setTransfiniteCurve(curves[key], int(count) + 1)
+        names.setdefault(curves[key], []).append(name)
+        return curves[key]
+
+    rim = None if grid.hole is None else Rim(geo, grid, grid.hole, shape.element_size, corner)
+    for i, j, part in grid.cells():
+        x = (grid.x[i] + grid.x[i + 1]) / 2
+        if rim is not None and rim.touches(i, j):
+            right, up = rim.side(i, j)
+            loops = rim.loops(
+                i, j,
+                curve("y", i + right, j, grid.side(part, "right" if right else "left", x)),
+                curve("x", i, j + up, grid.side(part, "top" if up else "bottom", x)),
+                (int(along_y[j]), int(along_x[i])),
+            )
+        else:
+            loops = [[
+                curve("x", i, j, grid.side(part, "bottom", x)),
+                curve("y", i + 1, j, grid.side(part, "right", x)),
+                -curve("x", i, j + 1, grid.side(part, "top", x)),
+                -curve("y", i, j, grid.side(part, "left", x)),
+            ]]
+        for curves_of_loop in loops:
+            surface = geo.addPlaneSurface([geo.addCurveLoop(curves_of_loop)])
+            geo.mesh.setTransfiniteSurface(surface, "AlternateLeft")
+            if shape.element == "quadrilateral":
+                geo.mesh.setRecombine(2, surface)
+            surfaces.append(surface)
+    geo.synchronize()
+    gmsh.model.mesh.generate(2)
+
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    cell_type, size = (3, 4) if shape.element == "quadrilateral" else (2, 3)
+    cells = np.concatenate([
+        gmsh.model.mesh.getElementsByType(cell_type, surface)[1] for surface in surfaces
+    ])
+    # The centre of a hole is a node of Gmsh's that no cell uses.
+    order = np.argsort(tags)
+    order = order[np.isin(tags[order], cells)]
+    tags = tags[order]
+    nodes = coordinates.reshape(-1, 3)[order, :2]
+    boundaries: dict[str, list[NDArray[Any]]] = {}
+    if rim is not None:
+        names |= {tag: [rim.hole.name] for tag in rim.arcs.values()}
+    for tag, owners in names.items():
+        if len(owners) == 1:
+            boundaries.setdefault(owners[0], []).append(
+                gmsh.model.mesh.getElementsByType(1, tag)[1])
+    points = {}
+    for name, place in grid.points.items():
+        key = nearest_line(grid.x, place[0]), nearest_line(grid.y, place[1])
+        points[name] = np.searchsorted(tags, gmsh.model.mesh.getNodes(0, corners[key])[0])
+    return Mesh(
+        nodes,
+        np.searchsorted(tags, cells).reshape(-1, size),
+        {name: np.searchsorted(tags, np.concatenate(parts)).reshape(-1, 2)
+         for name, parts in boundaries.items()},
+        points,
+    )
+
+
+@contextmanager
+def _signals_as_before() -> Iterator[None]:
+    """Leave signals as they are: Gmsh sets several back to their defaults as it starts.
+
+    A closed pipe would end the process without a word, and so would SIGTERM. By the C library,
+    since Python sets signals in the main thread alone.
+    """
+    action = None if os.name == "nt" else getattr(ctypes.CDLL(None), "sigaction", None)
+    if action is None:
+        yield
+        return
+    kept = {}
+    for number in signal.valid_signals():
+        kept[number] = ctypes.create_string_buffer(_SIGACTION_BYTES)
+        if action(int(number), None, kept[number]) != 0:
+            del kept[number]
+    try:
+        yield
+    finally:
+        for number, before in kept.items():
+            action(int(number), before, None)
+
+
+@contextmanager
+def _gmsh_session(gmsh: Any) -> Iterator[None]:
+    """An own, quiet Gmsh model that leaves nothing behind."""
+    mine = not gmsh.isInitialized()
+    if mine:
+        # Gmsh would take SIGINT away from Python, and only the main thread may set a handler.
+        with _signals_as_before():
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
+    options: dict[str, float] = {}
+    model = f"fecontact-{uuid4().hex}"
+    previous = gmsh.model.getCurrent()
+    try:
+        for name, value in _GMSH_OPTIONS.items():
+            options[name] = gmsh.option.getNumber(name)
+            gmsh.option.setNumber(name, value)
+        gmsh.model.add(model)
+        yield
+    finally:
+        if mine:
+            gmsh.finalize()
+        else:
+            if model in gmsh.model.list():
+                gmsh.model.setCurrent(model)
+                gmsh.model.remove()
+            gmsh.model.setCurrent(previous)
+            for name, value in options.items():
+                gmsh.option.setNumber(name, value)
+
+
+def _import_gmsh() -> Any:
+    try:
+        import gmsh
+    except ImportError:
+        raise MissingLibraryError(
+            "Gmsh, which makes the mesh, is not installed; install it with: pip install gmsh"
+        ) from None
+    except OSError as error:
+        raise MissingLibraryError(
+            f"Gmsh, which makes the mesh, lacks a library of the system ({error}); on Debian or "
+            f"Ubuntu install it with: "
+            f"apt-get install -y {' '.join(system_libraries.PACKAGES.values())}"
+        ) from None
+    return gmsh
+
+
+def _require_few_cells(shape: Shape, grid: Grid) -> None:
+    count = _count_cells(shape, grid, shape.element_size)
+    most = int(min(MAX_CELLS, available_memory() / _BYTES))
+    if count > most:
+        enough = shape.element_size * math.sqrt(count / most)
+        while _count_cells(shape, grid, enough) > most:
+            enough *= 1.1
+        raise InputError(
+            f"{type(shape).__name__}: element_size = {shape.element_size!r} makes {count:.3g} "
+            f"elements, more than {most}; take one of at least {1.1 * enough:.2g} m."
+        )
+
+
+def _count_cells(shape: Shape, grid: Grid, element_size: float) -> float:
+    along_x, along_y = grid.divisions(element_size)
+    per_rectangle = 2 if shape.element == "triangle" else 1
+    return per_rectangle * math.fsum(along_x[i] * along_y[j] for i, j, _ in grid.cells())

@@ -1,0 +1,263 @@
+"""Reading and writing of mesh files, and of fields on a mesh for ParaView."""
+
+import contextlib
+import io
+import re
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.atomic_write import replaced
+from fecontact.core.checks import as_path, require_kind
+from fecontact.core.errors import InputError, MeshError
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files.abaqus import read_inp
+from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
+from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_points
+from fecontact.fem.mesh_files.med import read_med
+from fecontact.fem.mesh_files.raw import Ints, RawMesh, plane_mesh
+
+
+def read_mesh(
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    boundaries: Mapping[str, str | Box] | None = None,
+    points: Mapping[str, str | tuple[float, float]] | None = None,
+) -> Mesh:
+    """A plane mesh with named boundaries and points from a file.
+
+    Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Nastran (.bdf, .nas, .fem), MED (.med), VTK
+    (.vtk, .vtu). Boundaries are Gmsh's physical curves, Abaqus' surfaces, sets of line elements
+    and node sets along the outline, MED's groups of edges and nodes likewise, and Nastran's line
+    elements by their property number. Points are physical points and sets of nodes; so are
+    groups of edges inside the body. VTK files have no groups. Second-order elements with
+    straight sides are reduced to first order, nodes that coincide become one, and nodes without
+    a cell are left out.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; its suffix says its format.
+    scale : float
+        Metres per unit of the file: 0.001 for millimetres.
+    boundaries : mapping of name to name or (x0, y0, x1, y1)
+        Boundaries to name: a group of the file gets the new name; a box [m] takes the edges of
+        the outline that lie in it.
+    points : mapping of name to name or (x, y)
+        Points to name: a group of the file (also the nodes of a boundary), or the node nearest
+        to a place [m] in the body.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, its suffix is not one of those above, scale is not above zero,
+        or a boundary or point is asked for in another way.
+    MeshError
+        If the file is not a plane mesh of first-order elements of one kind, or has no such group,
+        edges or node.
+    """
+    path = as_path(path, "a mesh")
+    if not (isinstance(scale, Real) and 0.0 < scale < np.inf):
+        raise InputError(f"{path}: scale = {scale!r} (metres per unit of the file) must be a "
+                         f"finite number above zero.")
+    reader, format_name = _reader(path)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file.")
+    try:
+        mesh, groups = plane_mesh(_read(reader, path, format_name), scale)
+        return Mesh(mesh.nodes, mesh.cells,
+                    named_boundaries(mesh, groups, boundaries or {}),
+                    named_points(mesh, groups, points or {}))
+    except (MeshError, InputError) as error:
+        raise type(error)(f"{path}: {error}") from None
+
+
+def write_mesh(mesh: Mesh, path: str | Path) -> None:
+    """Write a mesh as Gmsh 4.1 text, boundaries and points as physical groups.
+
+    Coordinates are written in full, so that :func:`read_mesh` gives the same mesh back. The file
+    is complete or not there.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in .msh, the file cannot be written, or a group's name holds a
+        quotation mark or a line break.
+    """
+    path = as_path(path, "a mesh")
+    require_kind("write_mesh", Mesh, mesh=mesh)
+    if path.suffix.lower() != ".msh":
+        raise InputError(f"{path}: meshes are written as Gmsh files; choose a name that ends in "
+                         f".msh.")
+    for name in (*mesh.boundaries, *mesh.points):
+        if not name.strip() or '"' in name or "\n" in name:
+            raise InputError(f"{path}: Gmsh cannot store a group named {name!r}; rename it.")
+    with replaced(path) as part, part.open("w", encoding="utf-8", newline="\n") as stream:
+        write_msh(mesh, stream)
+
+
+def write_fields(
+    path: str | Path,
+    points: ArrayLike,
+    cells: ArrayLike,
+    point_data: Mapping[str, ArrayLike] | None = None,
+) -> None:
+    """Write fields on a mesh as a compressed VTU file for ParaView.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, written whole or not at all.
+    points : (N, 2) or (N, 3) array
+        Coordinates [m]; z is zero where it is not given.
+    cells : (M, 3) or (M, 4) integer array
+        Corners of triangles or quadrilaterals.
+    point_data : mapping of name to (N,) or (N, k) array
+        Fields at the nodes; vectors of two components get a third one, zero.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in .vtu, a shape does not fit, or the file cannot be written.
+    """
+    from xml.sax.saxutils import escape
+
+    path = Path(path)
+    if path.suffix.lower() != ".vtu":
+        raise InputError(f"{path}: fields are written as VTU files; choose a name that ends in "
+                         f".vtu.")
+    xyz, corners = np.asarray(points, float), np.asarray(cells)
+    if xyz.ndim != 2 or xyz.shape[1] not in (2, 3):
+        raise InputError(f"{path}: points must have shape (N, 2) or (N, 3), not {xyz.shape}.")
+    if corners.ndim != 2 or corners.shape[1] not in (3, 4) or corners.dtype.kind not in "iu":
+        raise InputError(f"{path}: cells must be integers of shape (M, 3) or (M, 4), not "
+                         f"{corners.dtype} of shape {corners.shape}.")
+    data = {}
+    for name, values in (point_data or {}).items():
+        column = np.asarray(values)
+        if column.ndim not in (1, 2) or len(column) != len(xyz) or column.dtype.kind not in "biuf":
+            raise InputError(f"{path}: field '{name}' must hold real numbers of shape (N,) or "
+                             f"(N, k) with N = {len(xyz)} points, not {column.dtype} of shape "
+                             f"{column.shape}.")
+        if column.dtype.kind == "b" or column.dtype.itemsize not in (4, 8):
+            column = column.astype(np.int32 if column.dtype.kind in "biu" else np.float64)
+        data[escape(name, {'"': "&quot;"})] = _three(column) if column.ndim == 2 else column
+    kind = "triangle" if corners.shape[1] == 3 else "quad"
+    import meshio
+
+    with replaced(path) as part:
+        meshio.vtu.write(part, meshio.Mesh(_three(xyz), [(kind, corners.astype(np.int64))], data))
+
+
+def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
+    readers: dict[str, tuple[Callable[[Path], RawMesh], str]] = {
+        ".msh": (read_msh, "Gmsh"),
+        ".inp": (read_inp, "Abaqus"),
+        ".med": (read_med, "MED"),
+        ".vtk": (_read_vtk, "VTK"),
+        ".vtu": (_read_vtu, "VTU"),
+        **dict.fromkeys((".bdf", ".fem", ".nas"), (_read_nastran, "Nastran")),
+    }
+    if path.suffix.lower() not in readers:
+        raise InputError(f"{path}: files of this kind are not read; the suffixes that are: "
+                         f"{', '.join(sorted(readers))}.")
+    return readers[path.suffix.lower()]
+
+
+def _read(reader: Callable[[Path], RawMesh], path: Path, format_name: str) -> RawMesh:
+    try:
+        return reader(path)
+    except (MeshError, MemoryError):
+        raise
+    except OSError as error:
+        raise MeshError(f"The file cannot be opened ({error.strerror or error}).") from None
+    except Exception as error:
+        # Damaged files make readers fail in every way there is.
+        detail = " ".join(str(error).split()).rstrip(".")
+        if isinstance(error, KeyError):
+            detail = f"it lacks {detail}"
+        raise MeshError(f"The file cannot be read as {format_name}, it is damaged or of another "
+                        f"kind{f' ({detail[:200]})' * bool(detail)}.") from error
+
+
+def _read_vtk(path: Path) -> RawMesh:
+    # meshio fails on many types of data arrays, and they follow the mesh in the file.
+    mesh_alone = re.split(rb"\n(?:POINT_DATA|CELL_DATA) ", path.read_bytes(), maxsplit=1)[0]
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder, "mesh.vtk")
+        copy.write_bytes(mesh_alone + b"\n")
+        return _read_by_meshio("vtk", copy)
+
+
+def _read_vtu(path: Path) -> RawMesh:
+    content = path.read_bytes()
+    if b"vtkLZ4DataCompressor" in content:
+        raise MeshError("The file is compressed by LZ4, which meshio does not read; save it with "
+                        "ZLib or without compression.")
+    pieces = len(re.findall(rb"<Piece\b", content))
+    if pieces > 1:
+        raise MeshError(f"The file holds {pieces} pieces, of which meshio reads the last; merge "
+                        f"them into one.")
+    return _read_by_meshio("vtu", path)
+
+
+def _read_nastran(path: Path) -> RawMesh:
+    text = path.read_text(encoding="utf-8", errors="replace").upper()
+    if re.search(r"^C(?:TRIA|QUAD|TRAX)\w*\s*\*", text, re.MULTILINE):
+        raise MeshError("The file has elements in large fields (CQUAD4*), which are not read; "
+                        "write elements in small fields.")
+    if not re.search(r"^\s*BEGIN BULK", text, re.MULTILINE):
+        text = "BEGIN BULK\n" + text
+    if not re.search(r"^ENDDATA", text, re.MULTILINE):
+        raise MeshError("The file has no line ENDDATA, so it may be cut off; add one if it is "
+                        "complete.")
+    return _read_by_meshio("nastran", io.StringIO(text))
+
+
+def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
+    """A file read by meshio, with the groups of line elements that Nastran's have."""
+    import meshio
+
+    with _silence() as printed:
+        # meshio.read would end the process where the reader of a format raises.
+        found = meshio.read(source, format_name) if isinstance(source, io.StringIO) else \
+            getattr(meshio, format_name).read(source)
+    if "cannot handle" in printed.getvalue():
+        raise MeshError("The file holds elements of a kind that meshio leaves out; mesh with "
+                        "first-order triangles or quadrilaterals.")
+    if np.any(found.point_data.get("nastran:ref", 0)):
+        raise MeshError("The file gives nodes in local coordinate systems; export them in the "
+                        "basic one.")
+    edges: dict[str, list[Ints]] = {}
+    references = found.cell_data.get("nastran:ref", [])
+    for block, numbers in zip(found.cells, references, strict=False):
+        if block.type in ("line", "line3") and len(numbers) == len(block.data):
+            for number in np.unique(numbers):
+                edges.setdefault(str(number), []).append(block.data[numbers == number, :2])
+    return RawMesh(
+        found.points,
+        [(block.type, block.data) for block in found.cells if block.dim >= 2],
+        edges={name: np.concatenate(parts) for name, parts in edges.items()},
+    )
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[io.StringIO]:
+    """Keep warnings, and what meshio prints, from the terminal."""
+    printed = io.StringIO()
+    with (contextlib.redirect_stderr(printed), contextlib.redirect_stdout(printed),
+          warnings.catch_warnings()):
+        warnings.simplefilter("ignore")
+        yield printed
+
+
+def _three(columns: NDArray[Any]) -> NDArray[Any]:
+    """Vectors of two components with a third one, zero; others as they are."""
+    return np.pad(columns, ((0, 0), (0, 1))) if columns.shape[1] == 2 else columns

@@ -1,0 +1,222 @@
+"""Abaqus input files: one part with plane elements, its sets and surfaces.
+
+Unlike meshio this reads plane-strain and reduced-integration elements, several blocks of nodes,
+sets named on *ELEMENT, and surfaces.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.core.errors import MeshError
+from fecontact.fem.mesh_files.raw import NODES, RawMesh
+
+_PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
+_PLANE_KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+_LINE = re.compile(r"(?:T[23]D|R2D)([23])|B[23]([123])")
+_LINE_KINDS = {("2", None): "line", ("3", None): "line3",
+               (None, "1"): "line", (None, "2"): "line3", (None, "3"): "line"}
+_SOLID = re.compile(r"(?:C3D|DC3D|AC3D|SC)(\d+)")
+
+
+def read_inp(path: Path) -> RawMesh:
+    """Nodes, elements, node sets, sets of line elements and element surfaces of an Abaqus file.
+
+    Raises
+    ------
+    MeshError
+        If the file holds several parts or a moved one, or a line that is not understood.
+    """
+    part = _Part()
+    for keyword, options, rows in _blocks(path.read_text(encoding="utf-8", errors="replace")):
+        match keyword:
+            case "NODE":
+                part.add_nodes(options, rows)
+            case "ELEMENT":
+                part.add_elements(options, rows)
+            case "NSET":
+                part.add_set(part.node_sets, options["NSET"], options, rows)
+            case "ELSET":
+                part.add_set(part.element_sets, options["ELSET"], options, rows)
+            case "SURFACE" if options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
+                part.surfaces.setdefault(options["NAME"], []).extend(rows)
+            case "SYSTEM" if rows:
+                raise MeshError("The file gives nodes in a local coordinate system (*SYSTEM); "
+                                "export them in the global one.")
+            case "PART":
+                part.count += 1
+            case "ASSEMBLY":
+                part.in_assembly = True
+            case "INSTANCE" if any(float(word or 0) for row in rows for word in row):
+                raise MeshError("The file moves its part in *INSTANCE; export the part itself.")
+            case "INCLUDE":
+                raise MeshError("The file includes another one (*INCLUDE), which is not read; put "
+                                "everything into one file.")
+    if part.count > 1:
+        raise MeshError(f"The file holds {part.count} parts; export the elastic body alone.")
+    if not part.nodes or not part.elements:
+        raise MeshError("The file holds no *NODE or no *ELEMENT data.")
+    return part.raw_mesh()
+
+
+def _blocks(text: str) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
+    """Keyword, options and rows of data of each keyword block."""
+    keyword = ""
+    options: dict[str, str] = {}
+    rows: list[list[str]] = []
+    joined = re.sub(r"^(\*[^*\n].*,)[ \t\r]*\n(?!\*)", r"\1", text, flags=re.MULTILINE)
+    for line in joined.splitlines():
+        line = line.strip()
+        if not line or line.startswith("**"):
+            continue
+        if not line.startswith("*"):
+            rows.append([word.strip() for word in line.split(",")])
+            continue
+        yield keyword, options, rows
+        words = [word.strip() for word in line[1:].split(",")]
+        keyword, rows = words[0].upper(), []
+        pairs = [word.partition("=") for word in words[1:]]
+        options = {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
+    yield keyword, options, rows
+
+
+@dataclass
+class _Part:
+    """What has been read so far; sets hold Abaqus' numbers and names of other sets."""
+
+    nodes: dict[int, list[float]] = field(default_factory=dict)
+    elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    node_sets: dict[str, list[int | str]] = field(default_factory=dict)
+    element_sets: dict[str, list[int | str]] = field(default_factory=dict)
+    surfaces: dict[str, list[list[str]]] = field(default_factory=dict)
+    in_assembly: bool = False
+    count: int = 0
+
+    def add_nodes(self, options: dict[str, str], rows: list[list[str]]) -> None:
+        if self.in_assembly:
+            return  # reference points, in a numbering of their own
+        if options.get("SYSTEM", "R").upper() != "R":
+            raise MeshError("The file gives nodes in cylindrical or spherical coordinates; export "
+                            "Cartesian ones.")
+        for row in rows:
+            x, y, z = ([float(word or 0) for word in row[1:4]] + [0.0, 0.0])[:3]
+            self.nodes[int(row[0])] = [x, y, z]
+        if "NSET" in options:
+            self.node_sets.setdefault(options["NSET"], []).extend(int(row[0]) for row in rows)
+
+    def add_elements(self, options: dict[str, str], rows: list[list[str]]) -> None:
+        kind = _kind(options["TYPE"].upper())
+        if self.in_assembly or kind is None:
+            return
+        if kind == "solid":
+            self.elements[0] = kind, []
+            return
+        count = 1 + NODES[kind]
+        numbers = [int(word) for row in rows for word in row if word]
+        if len(numbers) % count:
+            raise MeshError(f"The file has elements {options['TYPE']} of another number of nodes "
+                            f"than {count - 1}.")
+        for at in range(0, len(numbers), count):
+            self.elements[numbers[at]] = kind, numbers[at + 1:at + count]
+        if "ELSET" in options:
+            self.element_sets.setdefault(options["ELSET"], []).extend(numbers[::count])
+
+    def add_set(
+        self, sets: dict[str, list[int | str]], name: str, options: dict[str, str],
+        rows: list[list[str]],
+    ) -> None:
+        if self.in_assembly and "INSTANCE" not in options:
+            return  # reference points
+        members = sets.setdefault(name, [])
+        if sets is self.node_sets and "ELSET" in options:
+            for number in self.resolve(self.element_sets, options["ELSET"]):
+                members.extend(self.elements[number][1] if number in self.elements else [])
+        for row in rows:
+            words = [word for word in row if word]
+            if "GENERATE" in options:
+                first, last, *step = (int(word) for word in words)
+                members.extend(range(first, last + 1, *step))
+            else:
+                members.extend(int(word) if word.isdigit() else word for word in words)
+
+    def resolve(self, sets: dict[str, list[int | str]], name: str) -> list[int]:
+        """The numbers in a set; names in it stand for sets defined before."""
+        by_name = {key.upper(): key for key in sets}
+        pending: list[int | str] = [name]
+        seen: set[str] = set()
+        numbers: list[int] = []
+        while pending:
+            member = pending.pop()
+            if isinstance(member, int):
+                numbers.append(member)
+            elif member.upper() not in by_name:
+                raise MeshError(f"The file refers to a set '{member}' that it does not hold.")
+            elif member.upper() not in seen:
+                seen.add(member.upper())
+                pending.extend(sets[by_name[member.upper()]])
+        return numbers
+
+    def surface(self, rows: list[list[str]]) -> list[list[int]]:
+        """Edges (pairs of Abaqus' node numbers) of ``set or element, S1`` rows."""
+        edges = []
+        for name, side, *_ in (row for row in rows if len(row) > 1):
+            if not re.fullmatch(r"[SE][1-4]", side.upper()):
+                continue
+            numbers = [int(name)] if name.isdigit() else self.resolve(self.element_sets, name)
+            for number in numbers:
+                if number not in self.elements:
+                    continue
+                kind, nodes = self.elements[number]
+                corners = 4 if kind.startswith("quad") else 3
+                first = int(side[1]) - 1
+                edges.append([nodes[first], nodes[(first + 1) % corners]])
+        return edges
+
+    def raw_mesh(self) -> RawMesh:
+        index = {number: k for k, number in enumerate(self.nodes)}
+        if not all(index.keys() >= set(nodes) for _, nodes in self.elements.values()):
+            raise MeshError("The elements name nodes that the file does not hold.")
+        blocks: dict[str, list[list[int]]] = {}
+        for kind, nodes in self.elements.values():
+            if not kind.startswith("line"):
+                blocks.setdefault(kind, []).append([index[number] for number in nodes])
+        edges = {name: found for name, rows in self.surfaces.items()
+                 if (found := self.surface(rows))}
+        for name in self.element_sets:
+            found = [self.elements[number][1][:2]
+                     for number in self.resolve(self.element_sets, name)
+                     if number in self.elements and self.elements[number][0].startswith("line")]
+            if found:
+                edges.setdefault(name, found)
+        return RawMesh(
+            np.array(list(self.nodes.values())),
+            [(kind, np.array(rows)) for kind, rows in blocks.items()],
+            edges={name: np.array([[index[first], index[second]] for first, second in pairs])
+                   for name, pairs in edges.items()},
+            nodes={name: np.array([index[number]
+                                   for number in self.resolve(self.node_sets, name)
+                                   if number in index], np.int64)
+                   for name in self.node_sets},
+            sets_are_boundaries=True,
+        )
+
+
+def _kind(name: str) -> str | None:
+    """Kind of an element type; None for masses, springs, rigid links and the like."""
+    if name == "CAX4P":
+        return "quad"  # what meshio calls every quadrilateral when it writes
+    if name.startswith(("CAX", "CGAX", "DCAX", "SAX", "MAX")):
+        raise MeshError(f"The file holds axisymmetric elements ({name}); fecontact's bodies are "
+                        f"plane.")
+    if _SOLID.match(name):
+        return "solid"
+    if match := _LINE.match(name):
+        return _LINE_KINDS[match[1], match[2]]
+    if match := _PLANE.match(name):
+        if name.startswith("STRI6"):
+            return "triangle6"
+        return _PLANE_KINDS.get(int(match[1]))
+    return None

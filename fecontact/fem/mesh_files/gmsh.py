@@ -1,0 +1,253 @@
+"""Gmsh meshes: reading of versions 2.2 and 4.1, text and binary, and writing of 4.1 as text.
+
+Unlike meshio this reads files saved with all elements, several physical groups on one curve,
+reversed curves, and groups of one name in two dimensions.
+"""
+
+import re
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import MeshError
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files.raw import NODES, Ints, RawMesh
+
+_KINDS = {15: "vertex", 1: "line", 8: "line3", 2: "triangle", 9: "triangle6",
+          3: "quad", 16: "quad8", 10: "quad9"}
+_SOLIDS = {4: 4, 5: 8, 6: 6, 7: 5, 11: 10, 12: 27, 13: 18, 14: 14, 17: 20, 18: 15, 19: 13}
+
+# Elements of one kind with the physical groups (2.2: one or none, 4.1: of their entity).
+_Block = tuple[str, Ints, list[int]]
+
+
+def read_msh(path: Path) -> RawMesh:
+    """Nodes, elements and physical groups (those without a name by their number) of a Gmsh file.
+
+    Raises
+    ------
+    MeshError
+        If the file is not complete, or of another version.
+    """
+    sections = {match[1].decode(): match[2] for match in re.finditer(
+        rb"^\$(\w+)[ \t\r]*\n(.*?)\$End\1", path.read_bytes(), re.DOTALL | re.MULTILINE)}
+    missing = [name for name in ("MeshFormat", "Nodes", "Elements") if name not in sections]
+    if missing:
+        raise MeshError(f"The file has no complete section ${missing[0]}; save it again from Gmsh.")
+    version, binary, size = sections["MeshFormat"].split()[:3]
+    if version not in (b"2", b"2.2", b"4.1"):
+        raise MeshError(f"The file is of Gmsh's mesh format {version.decode()}, but 2.2 and 4.1 "
+                        f"are read; save it again as 4.1.")
+    if binary == b"1" and b"\n\1\0\0\0" not in sections["MeshFormat"]:
+        raise MeshError("The file is binary and comes from a machine of another byte order; save "
+                        "it as text.")
+    if "PartitionedEntities" in sections:
+        raise MeshError("The mesh is partitioned; save it without partitions.")
+    numbers = {name: _Numbers(sections[name], binary == b"1")
+               for name in ("Entities", "Nodes", "Elements") if name in sections}
+    if version == b"4.1":
+        groups = _entity_groups(numbers["Entities"], int(size)) if "Entities" in numbers else {}
+        tags, points = _nodes_41(numbers["Nodes"], int(size))
+        blocks = _elements_41(numbers["Elements"], int(size), groups)
+    else:
+        tags, points = _nodes_22(numbers["Nodes"])
+        blocks = _elements_22(numbers["Elements"])
+    return _raw_mesh(tags, points, blocks, _names(sections.get("PhysicalNames", b"")))
+
+
+class _Numbers:
+    """The numbers of a section, taken one run after another."""
+
+    def __init__(self, data: bytes, binary: bool) -> None:
+        self.data: Any = data if binary else data.split()
+        self.binary = binary
+        self.at = 0
+
+    def take(self, dtype: str, count: int) -> NDArray[Any]:
+        if self.binary:
+            values = np.frombuffer(self.data, dtype, count, self.at)
+            self.at += values.nbytes
+            return values
+        words = self.data[self.at:self.at + count]
+        if len(words) < count:
+            raise MeshError("A section of the file is too short; save it again from Gmsh.")
+        self.at += count
+        try:
+            return np.array(words, dtype="S").astype(dtype)
+        except ValueError:
+            raise MeshError("A section of the file holds words in place of numbers; save it again "
+                            "from Gmsh.") from None
+
+    def one(self, dtype: str) -> int:
+        return int(self.take(dtype, 1)[0])
+
+
+def _names(section: bytes) -> dict[tuple[int, int], str]:
+    """Name of each physical group by dimension and number."""
+    return {(int(match[1]), int(match[2])): match[3].decode(errors="replace")
+            for match in re.finditer(rb'^\s*(\d+)\s+(\d+)\s+"(.*)"', section, re.MULTILINE)}
+
+
+def _entity_groups(numbers: _Numbers, size: int) -> dict[tuple[int, int], list[int]]:
+    """Physical groups of each entity, by its dimension and number."""
+    groups = {}
+    for dimension, count in enumerate(numbers.take(f"u{size}", 4)):
+        for _ in range(count):
+            tag = numbers.one("i4")
+            numbers.take("f8", 6 if dimension else 3)
+            physical = numbers.take("i4", numbers.one(f"u{size}"))
+            groups[dimension, tag] = np.abs(physical).tolist()  # a minus sign turns the entity
+            if dimension:
+                numbers.take("i4", numbers.one(f"u{size}"))
+    return groups
+
+
+def _nodes_41(numbers: _Numbers, size: int) -> tuple[Ints, NDArray[np.float64]]:
+    tags, points = [], []
+    for _ in range(numbers.take(f"u{size}", 4)[0]):
+        dimension, _, parametric = numbers.take("i4", 3)
+        count = numbers.one(f"u{size}")
+        tags.append(numbers.take(f"u{size}", count).astype(np.int64))
+        columns = 3 + (int(dimension) if parametric else 0)
+        points.append(numbers.take("f8", columns * count).reshape(count, columns)[:, :3])
+    return np.concatenate(tags), np.concatenate(points)
+
+
+def _elements_41(
+    numbers: _Numbers, size: int, groups: dict[tuple[int, int], list[int]]
+) -> list[_Block]:
+    blocks = []
+    for _ in range(numbers.take(f"u{size}", 4)[0]):
+        dimension, entity, code = (int(number) for number in numbers.take("i4", 3))
+        count = numbers.one(f"u{size}")
+        kind, nodes = _kind(code)
+        rows = numbers.take(f"u{size}", count * (1 + nodes)).astype(np.int64)
+        blocks.append((kind, rows.reshape(count, 1 + nodes)[:, 1:],
+                       groups.get((dimension, entity), [])))
+    return blocks
+
+
+def _nodes_22(numbers: _Numbers) -> tuple[Ints, NDArray[np.float64]]:
+    if numbers.binary:
+        count, rest = numbers.data.split(b"\n", 1)
+        rows = np.frombuffer(rest, [("tag", "i4"), ("xyz", "f8", 3)], int(count))
+        return rows["tag"].astype(np.int64), rows["xyz"]
+    table = numbers.take("f8", 4 * numbers.one("i8")).reshape(-1, 4)
+    return table[:, 0].astype(np.int64), table[:, 1:]
+
+
+def _elements_22(numbers: _Numbers) -> list[_Block]:
+    rows: dict[tuple[str, int], list[Ints]] = {}
+    if numbers.binary:
+        count, numbers.data = numbers.data.split(b"\n", 1)
+        left = int(count)
+        while left > 0:
+            code, following, tags = (int(number) for number in numbers.take("i4", 3))
+            kind, nodes = _kind(code)
+            table = numbers.take("i4", following * (1 + tags + nodes)).reshape(following, -1)
+            physical = np.abs(table[:, 1]) if tags else np.zeros(following, np.int64)
+            for group in np.unique(physical):
+                rows.setdefault((kind, int(group)), []).append(
+                    table[physical == group, 1 + tags:].astype(np.int64))
+            left -= following
+    else:
+        for _ in range(numbers.one("i8")):
+            _, code, tags = numbers.data[numbers.at:numbers.at + 3]
+            kind, nodes = _kind(int(code))
+            numbers.at += 3
+            labels = numbers.take("i8", int(tags) + nodes)
+            group = abs(int(labels[0])) if int(tags) else 0
+            rows.setdefault((kind, group), []).append(labels[int(tags):][None])
+    return [(kind, np.concatenate(parts), [group] if group else [])
+            for (kind, group), parts in rows.items()]
+
+
+def _kind(code: int) -> tuple[str, int]:
+    if code in _KINDS:
+        return _KINDS[code], NODES[_KINDS[code]]
+    if code in _SOLIDS:
+        return "solid", _SOLIDS[code]
+    raise MeshError(f"The mesh holds elements of Gmsh's type {code}, which are not read; mesh with "
+                    f"first-order triangles or quadrilaterals.")
+
+
+def _raw_mesh(
+    tags: Ints, points: NDArray[np.float64], blocks: list[_Block],
+    names: dict[tuple[int, int], str],
+) -> RawMesh:
+    order = np.argsort(tags, kind="stable")
+    tags, points = tags[order], points[order]
+    cells: list[tuple[str, Ints]] = []
+    groups: tuple[dict[str, list[Ints]], dict[str, list[Ints]]] = ({}, {})
+    for kind, block, physical in blocks:
+        index = np.searchsorted(tags, block)
+        if (tags[np.minimum(index, len(tags) - 1)] != block).any():
+            raise MeshError("The elements name nodes that the file does not hold.")
+        if kind not in ("vertex", "line", "line3"):
+            cells.append((kind, index))
+            continue
+        dimension = 0 if kind == "vertex" else 1
+        for number in physical:
+            name = names.get((dimension, number), str(number))
+            groups[dimension].setdefault(name, []).append(index[:, :2])
+    for (dimension, _), name in names.items():
+        if dimension < 2:
+            groups[dimension].setdefault(name, [np.empty((0, 1 + dimension), np.int64)])
+    return RawMesh(
+        points, cells,
+        edges={name: np.concatenate(parts) for name, parts in groups[1].items()},
+        nodes={name: np.concatenate(parts).ravel() for name, parts in groups[0].items()},
+    )
+
+
+def write_msh(mesh: Mesh, stream: TextIO) -> None:
+    """Write a mesh as Gmsh 4.1 text: groups are physical groups, the cells the group ``body``."""
+    group_names = sorted({*mesh.points, *mesh.boundaries})
+    number = {name: k for k, name in enumerate(group_names, start=1)}
+    vertices: dict[int, list[int]] = {}
+    for name, nodes in mesh.points.items():
+        for node in nodes.tolist():
+            vertices.setdefault(node, []).append(number[name])
+    edges: dict[tuple[int, int], list[int]] = {}
+    for name, pairs in mesh.boundaries.items():
+        for first, second in np.sort(pairs, axis=1).tolist():
+            edges.setdefault((first, second), []).append(number[name])
+    curves: dict[tuple[int, ...], list[tuple[int, int]]] = {}
+    for edge, owners in edges.items():
+        curves.setdefault(tuple(owners), []).append(edge)
+
+    def lines(rows: list[Any]) -> None:
+        stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows)
+
+    names = [(0, number[name], name) for name in mesh.points]
+    names += [(1, number[name], name) for name in mesh.boundaries]
+    names += [(2, 1, "body")]
+    stream.write(f"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n{len(names)}\n")
+    stream.writelines(f'{dimension} {tag} "{name}"\n' for dimension, tag, name in sorted(names))
+    stream.write("$EndPhysicalNames\n$Entities\n")
+    low, high = mesh.nodes.min(axis=0).tolist(), mesh.nodes.max(axis=0).tolist()
+    box = [*low, 0.0, *high, 0.0]
+    lines([(len(vertices), len(curves), 1, 0)])
+    lines([(tag, *mesh.nodes[node].tolist(), 0.0, len(owners), *owners)
+           for tag, (node, owners) in enumerate(vertices.items(), start=1)])
+    lines([(tag, *box, len(owners), *owners, 0) for tag, owners in enumerate(curves, start=1)])
+    lines([(1, *box, 1, 1, 0)])
+    count = len(mesh.nodes)
+    stream.write(f"$EndEntities\n$Nodes\n1 {count} 1 {count}\n2 1 0 {count}\n")
+    lines([(tag,) for tag in range(1, count + 1)])
+    lines([(x, y, 0.0) for x, y in mesh.nodes.tolist()])
+
+    blocks: list[tuple[int, int, int, list[Any]]] = [
+        (0, tag, 15, [(node,)]) for tag, node in enumerate(vertices, start=1)]
+    blocks += [(1, tag, 1, pairs) for tag, pairs in enumerate(curves.values(), start=1)]
+    blocks += [(2, 1, 2 if mesh.cells.shape[1] == 3 else 3, mesh.cells.tolist())]
+    total = sum(len(rows) for *_, rows in blocks)
+    stream.write(f"$EndNodes\n$Elements\n{len(blocks)} {total} 1 {total}\n")
+    tag = 0
+    for dimension, entity, code, rows in blocks:
+        lines([(dimension, entity, code, len(rows))])
+        lines([(tag + k, *(node + 1 for node in row)) for k, row in enumerate(rows, start=1)])
+        tag += len(rows)
+    stream.write("$EndElements\n")

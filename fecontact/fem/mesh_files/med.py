@@ -1,0 +1,96 @@
+"""MED files (Salome, Code_Aster): one plane mesh and its groups of nodes and elements.
+
+Unlike meshio this reads files in which a family has no group, or a kind of element no families.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.errors import MeshError
+from fecontact.core.stored import member, values
+from fecontact.fem.mesh_files.raw import Ints, RawMesh
+
+_KINDS = {"PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
+          "QU4": "quad", "QU8": "quad8", "QU9": "quad9"}
+
+
+def read_med(path: Path) -> RawMesh:
+    """Nodes, elements and groups of a MED file.
+
+    Raises
+    ------
+    MeshError
+        If the file is not HDF5, holds no mesh, several meshes or several time steps.
+    """
+    import h5py
+
+    try:
+        file = h5py.File(path, "r")
+    except OSError:
+        raise MeshError("The file is not HDF5, or is damaged.") from None
+    with file:
+        if "ENS_MAA" not in file or not len(file["ENS_MAA"]):
+            raise MeshError("The file is HDF5, but holds no MED mesh.")
+        if len(file["ENS_MAA"]) > 1:
+            raise MeshError(f"The file holds {len(file['ENS_MAA'])} meshes; save one alone.")
+        name, mesh = next(iter(file["ENS_MAA"].items()))
+        step = mesh
+        if "NOE" not in mesh:
+            if len(mesh) != 1:
+                raise MeshError(f"The mesh holds {len(mesh)} time steps; save one alone.")
+            step = next(iter(mesh.values()))
+        families = file.get(f"FAS/{name}", {})
+        return _raw_mesh(step, int(mesh.attrs["ESP"]), _families(families, "NOEUD"),
+                         _families(families, "ELEME"))
+
+
+def _families(families: Any, support: str) -> dict[int, list[str]]:
+    """Names of the groups that each family belongs to, by the number of the family."""
+    groups = {}
+    for family in families.get(support, {}).values():
+        rows = values(member(family, "GRO/NOM")) if "GRO" in family else []
+        groups[int(family.attrs["NUM"])] = [
+            np.asarray(row, np.int8).tobytes().split(b"\0")[0].decode(errors="replace").strip()
+            for row in rows
+        ]
+    return groups
+
+
+def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
+              of_cells: dict[int, list[str]]) -> RawMesh:
+    points = values(member(step, "NOE/COO")).reshape(dimension, -1).T
+    nodes: dict[str, list[Ints]] = {}
+    edges: dict[str, list[Ints]] = {}
+    cells: list[tuple[str, Ints]] = []
+
+    def collect(into: dict[str, list[Ints]], names: dict[int, list[str]], stored: Any,
+                members: Ints) -> None:
+        if "FAM" not in stored:
+            return
+        family = values(stored["FAM"])
+        for number in np.unique(family):
+            for name in names.get(int(number), []):
+                into.setdefault(name, []).append(members[family == number])
+
+    collect(nodes, of_nodes, step["NOE"], np.arange(len(points)))
+    for code, stored in step["MAI"].items():
+        kind = _KINDS.get(code, "solid")
+        if kind == "solid" and code.startswith(("TR", "QU", "PO")):
+            raise MeshError(f"The mesh holds elements {code}, which are not read; mesh with "
+                            f"first-order triangles or quadrilaterals.")
+        number = int(stored["NOD"].attrs["NBR"])
+        members = values(stored["NOD"]).reshape(-1, number).T.astype(np.int64) - 1
+        if kind == "vertex":
+            collect(nodes, of_cells, stored, members[:, 0])
+        elif kind.startswith("line"):
+            collect(edges, of_cells, stored, members[:, :2])
+        else:
+            cells.append((kind, members))
+    return RawMesh(
+        points, cells,
+        edges={name: np.concatenate(parts) for name, parts in edges.items()},
+        nodes={name: np.concatenate(parts) for name, parts in nodes.items()},
+        sets_are_boundaries=True,
+    )

@@ -1,0 +1,231 @@
+"""Points of interest: rows that give a point's displacement and rotation from the nodes'.
+
+Every function returns rows (3, 2 N), sparse: displacement x, y and rotation phi of the point
+from the displacements of the body's nodes. Transposed, they spread a force at the point over
+the nodes, so that both do the same virtual work.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, MeshError, choices, nearest, require_positive
+from fecontact.fem.elastic_body import ElasticBody
+
+Array = NDArray[np.float64]
+
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+
+@dataclass(frozen=True)
+class Patch:
+    """The part of the outline within a distance of a place; it moves as it does on average.
+
+    Parameters
+    ----------
+    at : str or (x, y)
+        Name of a point of the mesh, or a place [m].
+    radius : float
+        Distance, positive [m].
+    """
+
+    at: str | tuple[float, float]
+    radius: float
+
+    def __post_init__(self) -> None:
+        require_positive("Patch", radius=self.radius)
+
+
+Place = str | tuple[float, float] | Patch
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of one point: sparse (3, 2 N) matrix, and the point's reference place (2,) [m]."""
+
+    matrix: Any
+    position: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Parts of straight edges: nodes (k, degree + 1), from s = start to s = end in 0 ... 1."""
+
+    nodes: NDArray[np.int64]
+    start: Array
+    end: Array
+
+
+def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
+    """Rows of a place: a mesh point, a boundary, coordinates or a patch.
+
+    Raises
+    ------
+    MeshError, InputError
+        If the mesh has no such name, or the place lies outside the body.
+    """
+    mesh = body.mesh
+    if isinstance(place, Patch):
+        centre = _centre(body, place.at, name)
+        pieces = _within(body, centre, place.radius)
+        if not len(pieces.nodes):
+            raise InputError(f"Point {name}: no part of the outline lies within "
+                             f"{place.radius:g} m of ({centre[0]:g}, {centre[1]:g}); choose a "
+                             f"place on the outline or a larger radius.")
+        return patch_rows(body, pieces)
+    if isinstance(place, str):
+        if place in mesh.boundaries:
+            return patch_rows(body, whole(body.edge_nodes(mesh.boundaries[place])))
+        if place in mesh.points:
+            nodes = mesh.points[place]
+            return node_rows(body, int(nodes[0])) if len(nodes) == 1 else _node_set_rows(
+                body, nodes)
+        known = {*mesh.points, *mesh.boundaries}
+        raise MeshError(f"Point {name}: the mesh has no point or boundary '{place}'"
+                        f"{nearest(place, known)}; it has: {choices(known)}.")
+    centre = _centre(body, place, name)
+    distance = np.linalg.norm(body.nodes - centre, axis=1)
+    if distance.min() < 1e-9 * mesh.extent:
+        return node_rows(body, int(np.argmin(distance)))
+    return _inner_rows(body, centre, name)
+
+
+def node_rows(body: ElasticBody, node: int) -> Rows:
+    """Rows of a displacement node; its rotation is that of the adjoining elements there."""
+    return Rows(node_matrix(body, np.array([node])), body.nodes[node])
+
+
+def node_matrix(body: ElasticBody, nodes: NDArray[np.int64]) -> Any:
+    """Rows (3 k, 2 N) of k displacement nodes, one after the other."""
+    import scipy.sparse as sp
+
+    dx, dy = body.gradients
+    chosen = sp.csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), nodes)),
+                          shape=(len(nodes), len(body.nodes)))
+    parts = [(chosen, [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]),
+             (0.5 * dx[nodes], [[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]),
+             (-0.5 * dy[nodes], [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])]
+    return sp.csr_array(sum(sp.kron(matrix, pattern) for matrix, pattern in parts))
+
+
+def patch_rows(body: ElasticBody, pieces: Pieces) -> Rows:
+    """Rows of a patch of the outline: its length-weighted best-fitting rigid motion.
+
+    The displacement is the mean over the patch, the rotation the mean moment of the
+    displacements about the patch's centroid over its polar second moment. A force on the point
+    is a uniform traction.
+    """
+    import scipy.sparse as sp
+
+    nodes, values, lengths = _sampled(pieces, body.nodes)
+    places = np.einsum("kgn,knx->kgx", values, body.nodes[nodes])
+    total = lengths.sum()
+    centre = np.einsum("kg,kgx->x", lengths, places) / total
+    arm = places - centre
+    second_moment = np.einsum("kg,kgx->", lengths, arm**2)
+    weights = {
+        (0, 0): np.einsum("kg,kgn->kn", lengths, values) / total,
+        (2, 0): -np.einsum("kg,kgn,kg->kn", lengths, values, arm[..., 1]) / second_moment,
+        (2, 1): np.einsum("kg,kgn,kg->kn", lengths, values, arm[..., 0]) / second_moment,
+    }
+    weights[1, 1] = weights[0, 0]
+    entries = [(weight.ravel(), np.full(nodes.size, row), 2 * nodes.ravel() + axis)
+               for (row, axis), weight in weights.items()]
+    data, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
+    shape = (3, 2 * len(body.nodes))
+    return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), centre)
+
+
+def whole(nodes: NDArray[np.int64]) -> Pieces:
+    """Whole edges as pieces."""
+    return Pieces(nodes, np.zeros(len(nodes)), np.ones(len(nodes)))
+
+
+def edge_weights(body: ElasticBody, nodes: NDArray[np.int64]) -> Array:
+    """Integrals (k, degree + 1) of the shape functions over whole edges [m]."""
+    _, values, lengths = _sampled(whole(nodes), body.nodes)
+    return np.einsum("kg,kgn->kn", lengths, values)
+
+
+def _sampled(
+    pieces: Pieces, places: Array
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Nodes (k, n), shape functions (k, g, n) and weights (k, g) [m] at Gauss points."""
+    half = 0.5 * (pieces.end - pieces.start)
+    s = pieces.start[:, None] + half[:, None] * (1.0 + _GAUSS)
+    if pieces.nodes.shape[1] == 2:
+        values = np.stack([1.0 - s, s], axis=-1)
+    else:
+        values = np.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)],
+                          axis=-1)
+    length = np.linalg.norm(places[pieces.nodes[:, -1]] - places[pieces.nodes[:, 0]], axis=1)
+    return pieces.nodes, values, (length * half)[:, None] * _WEIGHTS
+
+
+def _within(body: ElasticBody, centre: Array, radius: float) -> Pieces:
+    nodes = body.edge_nodes(body.mesh.outline)
+    begin = body.nodes[nodes[:, 0]] - centre
+    along = body.nodes[nodes[:, -1]] - centre - begin
+    # |begin + s along| = radius
+    a = (along**2).sum(axis=1)
+    b = (begin * along).sum(axis=1)
+    root = b**2 - a * ((begin**2).sum(axis=1) - radius**2)
+    crosses = root > 0.0
+    root = np.sqrt(np.where(crosses, root, 0.0))
+    start = np.clip((-b - root) / a, 0.0, 1.0)
+    end = np.clip((-b + root) / a, 0.0, 1.0)
+    kept = crosses & (end > start)
+    return Pieces(nodes[kept], start[kept], end[kept])
+
+
+def _centre(body: ElasticBody, at: str | tuple[float, float], name: str) -> Array:
+    if isinstance(at, str):
+        if at not in body.mesh.points:
+            raise MeshError(f"Point {name}: the mesh has no point '{at}'"
+                            f"{nearest(at, body.mesh.points)}; its points are: "
+                            f"{choices(body.mesh.points)}.")
+        return np.asarray(body.mesh.nodes[body.mesh.points[at]].mean(axis=0))
+    centre = np.asarray(at, dtype=float)
+    if centre.shape != (2,) or not np.isfinite(centre).all():
+        raise InputError(f"Point {name}: {at!r} must be a pair of coordinates x, y [m].")
+    return centre
+
+
+def _node_set_rows(body: ElasticBody, nodes: NDArray[np.int64]) -> Rows:
+    """Rows of several nodes: their best-fitting rigid motion, all weighted alike."""
+    import scipy.sparse as sp
+
+    centre = body.nodes[nodes].mean(axis=0)
+    arm = (body.nodes[nodes] - centre) / ((body.nodes[nodes] - centre) ** 2).sum()
+    count = len(nodes)
+    data = np.concatenate([np.full(2 * count, 1.0 / count), -arm[:, 1], arm[:, 0]])
+    row = np.repeat([0, 1, 2, 2], count)
+    column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
+    shape = (3, 2 * len(body.nodes))
+    return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), centre)
+
+
+def _inner_rows(body: ElasticBody, place: Array, name: str) -> Rows:
+    import scipy.sparse as sp
+
+    basis = body.basis
+    try:
+        cell = int(basis.mesh.element_finder(mapping=basis.mapping)(place[:1], place[1:])[0])
+    except ValueError:
+        raise InputError(f"Point {name}: ({place[0]:g}, {place[1]:g}) lies outside the body, which "
+                         f"spans x = {body.nodes[:, 0].min():g} ... {body.nodes[:, 0].max():g}, "
+                         f"y = {body.nodes[:, 1].min():g} ... {body.nodes[:, 1].max():g}."
+                         ) from None
+    local = basis.mapping.invF(place[:, None, None], tind=np.array([cell]))[:, 0]
+    dofs = basis.element_dofs[:, cell]
+    functions = [basis.elem.gbasis(basis.mapping, local, i, tind=np.array([cell]))[0]
+                 for i in range(len(dofs))]
+    value = np.array([float(f[0, 0]) for f in functions])
+    slope = np.array([f.grad[:, 0, 0] for f in functions])
+    data = np.concatenate([value, value, -0.5 * slope[:, 1], 0.5 * slope[:, 0]])
+    row = np.repeat([0, 1, 2, 2], len(dofs))
+    column = np.concatenate([2 * dofs, 2 * dofs + 1, 2 * dofs, 2 * dofs + 1])
+    shape = (3, 2 * len(body.nodes))
+    return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), place)

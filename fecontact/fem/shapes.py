@@ -1,0 +1,188 @@
+"""Plane bodies made of rectangles, described by their dimensions.
+
+The contact face is the bottom of the body, at y = 0; the ground lies below it.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from fecontact.core.errors import InputError, choices, require_not_negative, require_positive
+
+Element = Literal["quadrilateral", "triangle"]
+
+SAME = 1e-9  # lengths that differ by less than this part of the body's size are equal
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A rectangle [0, length] x [0, height] that lies on the ground with its whole bottom.
+
+    Boundaries ``contact`` (bottom), ``left``, ``right``, ``top``; points ``B`` (left end,
+    mid-height) and ``C`` (top, mid-span).
+
+    Parameters
+    ----------
+    length, height : float
+        Sides along x and y [m].
+    element_size : float
+        Longest side of a quadrilateral, and of the legs of a (right-angled) triangle [m].
+    element : "quadrilateral" or "triangle"
+
+    Raises
+    ------
+    InputError
+        For a value that is not a finite number above zero, or another element.
+    """
+
+    length: float = 0.2
+    height: float = 0.02
+    element_size: float = 0.005
+    element: Element = "quadrilateral"
+
+    def __post_init__(self) -> None:
+        require_positive("Beam", length=self.length, height=self.height,
+                         element_size=self.element_size)
+        _require_element("Beam", self.element)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A rectangle [0, width] x [0, height] that touches the ground with a part of its bottom.
+
+    Boundaries ``contact`` (centred part of the bottom), ``bottom`` (the rest of it, if any),
+    ``left``, ``right``, ``top``; points ``B`` (left side, at ``drive_height``) and ``C`` (top,
+    middle). The default with a thickness of 0.1 m and steel has the mass of the friction
+    oscillator, 5.6 kg. A dragged block tips over when ``contact_length`` is below twice the
+    friction coefficient times ``drive_height``.
+
+    Parameters
+    ----------
+    width, height : float
+        Sides along x and y [m].
+    contact_length : float or None
+        Length of the contact face [m]; None for the whole bottom.
+    drive_height : float or None
+        Height of B above the ground [m]; None for mid-height.
+    element_size : float
+        Longest side of a quadrilateral, and of the legs of a (right-angled) triangle [m].
+    element : "quadrilateral" or "triangle"
+
+    Raises
+    ------
+    InputError
+        For a value that is not a finite number above zero, a contact face longer than the
+        block, a drive above its top, or another element.
+    """
+
+    width: float = 0.12
+    height: float = 0.06
+    contact_length: float | None = None
+    drive_height: float | None = None
+    element_size: float = 0.005
+    element: Element = "quadrilateral"
+
+    def __post_init__(self) -> None:
+        require_positive("Block", width=self.width, height=self.height,
+                         element_size=self.element_size)
+        if self.contact_length is not None:
+            require_positive("Block", contact_length=self.contact_length)
+            _require_at_most("Block", "contact_length", self.contact_length, "width", self.width)
+        if self.drive_height is not None:
+            require_not_negative("Block", drive_height=self.drive_height)
+            _require_at_most("Block", "drive_height", self.drive_height, "height", self.height)
+        _require_element("Block", self.element)
+
+
+@dataclass(frozen=True)
+class Pendulum:
+    """A horizontal arm, hinged at its left end, with a rectangular bob at the other.
+
+    The arm runs along x from the hinge at x = 0; the bob is centred on the arm's end,
+    x = ``arm_length``, and reaches from y = 0 to ``bob_height``, equally far above and below the
+    arm. The arm's mid-line is at y = ``bob_height`` / 2.
+
+    Boundaries ``contact`` (bottom of the bob), ``bob_top``, ``bob_left`` (above and below the
+    arm), ``bob_right``, ``arm_top``, ``arm_bottom``, ``arm_left``; points ``pivot`` (the hinge),
+    ``B`` (on the mid-line, ``drive_distance`` from the hinge) and ``C`` (top of the bob, middle).
+    With a ``hinge_radius`` the arm reaches half its height beyond the hinge, and ``pivot`` is the
+    boundary of a hole, to be held as a 'hinge'. With a ``contact_length`` the rest of the bob's
+    bottom is ``bob_bottom``.
+
+    The default is the aluminium pendulum of the impact oscillator: an arm of 0.30 m x 7.7 mm,
+    which weighs 0.122 kg at a thickness of 19.6 mm and 2700 kg/m^3. The bob is a square whose
+    area in excess of the arm's end, bob_width bob_height - bob_width arm_height / 2, is that of
+    0.051 kg, so that the mass reduced to the contact is 0.122 kg / 3 + 0.051 kg = 0.092 kg.
+
+    Parameters
+    ----------
+    arm_length, arm_height : float
+        Distance from the hinge to the middle of the bob, and depth of the arm [m].
+    bob_width, bob_height : float
+        Sides of the bob along x and y [m].
+    drive_distance : float or None
+        Distance of B from the hinge [m]; None for ``arm_length``.
+    hinge_radius : float
+        Radius of the hole at the hinge, below half of ``arm_height``; zero for none [m].
+    contact_length : float or None
+        Length of the middle part of the bob's bottom that can touch the ground [m]; None for all
+        of it.
+    element_size : float
+        Longest side of a quadrilateral, and of the legs of a (right-angled) triangle [m].
+    element : "quadrilateral" or "triangle"
+
+    Raises
+    ------
+    InputError
+        For a value that is not a finite number above zero, a bob that is not higher than the
+        arm or reaches the hinge, a drive beyond the bob, a contact longer than it, or another
+        element.
+    """
+
+    arm_length: float = 0.3
+    arm_height: float = 0.0077
+    bob_width: float = 0.033
+    bob_height: float = 0.033
+    drive_distance: float | None = None
+    hinge_radius: float = 0.0
+    contact_length: float | None = None
+    element_size: float = 0.004
+    element: Element = "quadrilateral"
+
+    def __post_init__(self) -> None:
+        require_positive("Pendulum", arm_length=self.arm_length, arm_height=self.arm_height,
+                         bob_width=self.bob_width, bob_height=self.bob_height,
+                         element_size=self.element_size)
+        require_not_negative("Pendulum", hinge_radius=self.hinge_radius)
+        if self.hinge_radius >= 0.5 * self.arm_height * (1 - SAME):
+            raise InputError(f"Pendulum: hinge_radius = {self.hinge_radius!r} must be below half "
+                             f"of arm_height = {self.arm_height!r}.")
+        if self.bob_height <= self.arm_height * (1 + SAME):
+            raise InputError(f"Pendulum: bob_height = {self.bob_height!r} must be above arm_height "
+                             f"= {self.arm_height!r}.")
+        if self.bob_width >= 2 * self.arm_length * (1 - SAME):
+            raise InputError(f"Pendulum: bob_width = {self.bob_width!r} must be below twice "
+                             f"arm_length = {self.arm_length!r}, or the bob reaches the hinge.")
+        if self.contact_length is not None:
+            require_positive("Pendulum", contact_length=self.contact_length)
+            _require_at_most("Pendulum", "contact_length", self.contact_length, "bob_width",
+                             self.bob_width)
+        if self.drive_distance is not None:
+            require_positive("Pendulum", drive_distance=self.drive_distance)
+            _require_at_most("Pendulum", "drive_distance", self.drive_distance,
+                             "arm_length + bob_width / 2", self.arm_length + self.bob_width / 2)
+        _require_element("Pendulum", self.element)
+
+
+Shape = Beam | Block | Pendulum
+
+
+def _require_element(owner: str, element: str) -> None:
+    allowed = ("quadrilateral", "triangle")
+    if element not in allowed:
+        raise InputError(f"{owner}: element = {element!r} must be one of "
+                         f"{choices(allowed)}.")
+
+
+def _require_at_most(owner: str, name: str, value: float, limit_name: str, limit: float) -> None:
+    if value > limit * (1 + SAME):
+        raise InputError(f"{owner}: {name} = {value!r} must not be above {limit_name} = {limit!r}.")

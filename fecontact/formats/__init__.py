@@ -1,1 +1,0 @@
-"""Mesh file formats that are read without meshio, and what all readers hand on."""

@@ -1,0 +1,110 @@
+"""Where a run starts."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.statics import equilibrium
+from fecontact.system.steady_memory import settled
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RigidStart:
+    """Start from a rigid displacement and velocity of the body.
+
+    Parameters
+    ----------
+    displacement : (x, y, phi)
+        Of the origin of coordinates [m, m, rad]; phi counter-clockwise.
+    velocity : (x, y, phi)
+        Of the origin of coordinates [m/s, m/s, rad/s].
+    """
+
+    displacement: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+Initial = Literal["rest", "sliding"] | RigidStart | Trajectory | NDArray[np.float64]
+
+
+def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array:
+    """State y = [q, q', z] (2 m + n s,) for the start of a run.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        The system that will run.
+    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
+        At rest on the ground, with the normal forces in equilibrium and no friction; steady
+        sliding; a rigid displacement and velocity; the end of another run; a state. The internal
+        variables of friction with memory are zero, and in steady sliding those that belong to it.
+    time : float
+        Start of the run [s].
+
+    Raises
+    ------
+    InputError
+        For anything else, a state of another size or with NaN, or a rigid motion that the
+        supports do not allow.
+    AnalysisError
+        If there is no equilibrium to start from.
+    """
+    m = system.basis.modes
+    if isinstance(initial, str):
+        if initial not in ("rest", "sliding"):
+            names = ("rest", "sliding")
+            raise InputError(f"initial = '{initial}' must be one of {choices(names)}"
+                             f"{nearest(initial, names)}, or a rigid displacement and velocity.")
+        q = equilibrium(system, initial == "sliding", time)
+        state = np.concatenate([q, np.zeros(system.size - m)])
+        return settled(time, state, system.arrays) if initial == "sliding" else state
+    if isinstance(initial, RigidStart):
+        return np.concatenate([_rigid(system.basis, initial.displacement, "displacement"),
+                               _rigid(system.basis, initial.velocity, "velocity"),
+                               np.zeros(system.size - 2 * m)])
+    given = initial.states[-1] if isinstance(initial, Trajectory) else initial
+    try:
+        state = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"initial = {initial!r} must be 'rest', 'sliding', a RigidStart, a "
+                         f"Trajectory or an array of numbers.") from None
+    if state.shape != (system.size,):
+        raise InputError(f"The initial state must have {system.size} values [q, q', z], not shape "
+                         f"{state.shape}.")
+    if not np.isfinite(state).all():
+        raise InputError("The initial state holds values that are not finite.")
+    return state
+
+
+def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> Array:
+    q = np.zeros(basis.modes)
+    try:
+        wanted = np.asarray(motion, dtype=float)
+    except (TypeError, ValueError):
+        wanted = np.zeros(0)
+    if wanted.shape != (3,) or not np.isfinite(wanted).all():
+        raise InputError(f"initial: {what} = {motion!r} must be three finite numbers x, y, phi.")
+    if not wanted.any():
+        return q
+    x, y = basis.positions.T
+    target = np.stack([wanted[0] - wanted[2] * y, wanted[1] + wanted[2] * x,
+                       np.full(len(x), wanted[2])], axis=1)
+    # Points without rows (a B or C that is not there) and unused components say nothing.
+    rows = basis.T.reshape(-1, basis.modes)[:, : basis.rigid_modes]
+    used = np.abs(basis.T.reshape(-1, basis.modes)).any(axis=1)
+    wanted_rows = target.reshape(-1)[used]
+    if basis.rigid_modes:
+        q[: basis.rigid_modes] = np.linalg.lstsq(rows[used], wanted_rows, rcond=None)[0]
+    missed = np.abs(basis.T.reshape(-1, basis.modes)[used] @ q - wanted_rows).max()
+    if missed > 1e-6 * np.abs(wanted_rows).max():
+        raise InputError(f"initial: {what} = {tuple(motion)} is not a motion that the body is free "
+                         f"to make; it has {basis.rigid_modes} rigid modes.")
+    return q

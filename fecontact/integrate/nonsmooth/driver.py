@@ -1,0 +1,307 @@
+"""Runs with set-valued friction and rigid stops: the limit of infinite smoothing slope."""
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.integrate.nonsmooth import problem as kinds
+from fecontact.integrate.nonsmooth.equations import compiled_derivative
+from fecontact.integrate.reference.scipy import longest_step
+from fecontact.integrate.trajectory import Status
+from fecontact.laws.base import FrictionLaw
+from fecontact.system.contact_energy import POWERS
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+SCHEMES = ("auto", "events", "stepping")
+
+# Largest number of independent slip velocities that run from event to event unless asked to.
+_FEW = 8
+_STEPS_PER_CALL = 2000
+# Errors of velocities count relative to this part of what drive and loads bring about.
+_DRIVEN = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class SetValuedRun:
+    """Motion with set-valued contact at N output times.
+
+    The friction force of a sticking node and the normal force of a closed rigid stop hold it in
+    place; they are not functions of the state and are kept here.
+
+    Attributes
+    ----------
+    time : (N,) array
+        [s].
+    states : (N, 2 m) array
+        [q, q'].
+    work : (N, 8) array
+        Integrals of the powers :data:`fecontact.system.contact_energy.POWERS` from the first time
+        [J]. What impacts on rigid stops take is with ``contact_damping``.
+    node_friction_work : (N, n) array
+        Energy that friction at each node has taken since the first time [J].
+    friction_force, normal_force : (N, n) arrays
+        R and F of each node [N]; F without the impulses of rigid stops.
+    status : Status
+        How the run ended.
+    statistics : mapping
+        Scheme, counts of steps, rejected steps, events and impacts, seconds.
+    """
+
+    time: Array
+    states: Array
+    work: Array
+    node_friction_work: Array
+    friction_force: Array
+    normal_force: Array
+    status: Status
+    statistics: dict[str, Any]
+
+
+def integrate_set_valued(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float = 1e-6,
+    scheme: str = "auto",
+    restitution: float | None = None,
+    static_coefficient: float | Sequence[float] | None = None,
+    longest: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> SetValuedRun:
+    r"""Integrate with friction whose smoothing slope k_s is infinite.
+
+    .. math::
+
+        |R_j| \le \mu(0^+) F_j \ \text{ where } v_j = 0, \qquad
+        R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
+
+    with the normal force F_j of the normal law, slip velocity v_j and the coefficient mu of the
+    friction law, unsmoothed.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        With friction laws that have a ``smoothing_slope``.
+    state : (2 m,) array
+        Its state [q, q'] at the first time.
+    times : (N,) array
+        Output times, ascending [s].
+    rtol : float
+        Relative tolerance.
+    scheme : 'auto', 'events' or 'stepping'
+        From event to event with steps of order 8: for nodes whose slip velocities, equal ones
+        counted once, are independent. Or by implicit steps of order 3, for any number of nodes.
+    restitution : float, optional
+        Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and Newton's
+        coefficient e, from 0 to below 1, gives their rebound ``u'+ = -e u'-``. Nodes that move
+        along the ground have to be free of friction. Penetration at the start is taken away.
+    static_coefficient : float or (n,) sequence, optional
+        Limit of \|R\|/F in stick, at least the law's mu(0+) [-]; default is that.
+    longest : float, optional
+        Longest step [s]; default from the run, the excitation and the ground.
+    progress : callable, optional
+        Called with the time reached [s] now and then.
+
+    Returns
+    -------
+    SetValuedRun
+        Also of a run that ended early.
+
+    Raises
+    ------
+    InputError
+        For values out of range, friction that cannot be unsmoothed, or a scheme that cannot run
+        the system.
+
+    References
+    ----------
+    R. I. Leine, N. van de Wouw, Stability and Convergence of Mechanical Systems with Unilateral
+    Constraints, Springer 2008. V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical
+    Systems, Springer 2008.
+    """
+    times = np.ascontiguousarray(times, dtype=float)
+    longest = longest_step(system, times) if longest is None else longest
+    problem = _problem(system, restitution, static_coefficient, longest)
+    scheme = _chosen(problem, scheme)
+    begin = clock.perf_counter()
+    n, m = system.basis.contact_nodes, system.basis.modes
+    efforts = len(POWERS)
+    Y = np.concatenate([state, np.zeros(efforts + n)])
+    room: tuple[Any, ...] = (kinds.workspace_for(problem),)
+    if scheme == "events":
+        from fecontact.integrate.nonsmooth.event_driven import run_events as run
+        from fecontact.integrate.nonsmooth.event_search import room_for
+        room = *room, room_for(problem, len(Y))
+    else:
+        from fecontact.integrate.nonsmooth.time_stepping import run_steps as run
+    states = np.empty((len(times), len(Y)))
+    friction, normal = np.empty((len(times), n)), np.empty((len(times), n))
+    status = np.where(np.any(problem.rows != 0.0, axis=1), kinds.OPEN, kinds.FIXED)
+    closed, counts = np.zeros(n, dtype=np.int64), np.zeros(6, dtype=np.int64)
+    reached = np.array([times[0], 0.01 * longest])
+    carried = np.zeros(3 + n)
+    floor = _floor(system, state, times, longest)
+    stops = np.array(system.breakpoints(float(times[0]), float(times[-1])))
+    outcome, ended = 0, Status.FINISHED
+    try:
+        while outcome == 0:
+            outcome = run(reached, times, stops, problem, rtol, longest, floor, Y, status, closed,
+                          counts, carried, _STEPS_PER_CALL, states, friction, normal, *room)
+            if progress is not None:
+                progress(float(reached[0]))
+    except KeyboardInterrupt:
+        if not counts[4]:  # nothing was computed that could be kept
+            raise
+        ended = Status.INTERRUPTED
+    statistics: dict[str, Any] = {
+        "method": "set-valued", "scheme": scheme, "rtol": rtol, "steps": int(counts[0]),
+        "rejected": int(counts[1]), "events": int(counts[2]), "impacts": int(counts[3]),
+        "seconds": clock.perf_counter() - begin}
+    if outcome > 1:
+        ended = Status.MINIMUM_STEP if outcome == kinds.STUCK else Status.NOT_FINITE
+    done = int(counts[4])
+    time, states = times[:done], states[:done]
+    friction, normal = friction[:done], normal[:done]
+    if ended is not Status.FINISHED and done and reached[0] > time[-1] and np.isfinite(Y).all():
+        time, states = np.append(time, reached[0]), np.vstack([states, Y])
+        friction = np.vstack([friction, friction[-1:]])
+        normal = np.vstack([normal, normal[-1:]])
+    end = 2 * m + efforts
+    return SetValuedRun(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(),
+                        states[:, end:].copy(), friction, normal, ended, statistics)
+
+
+def _problem(
+    system: ContactSystem,
+    restitution: float | None,
+    static_coefficient: float | Sequence[float] | None,
+    longest: float,
+) -> kinds.Problem:
+    n = system.basis.contact_nodes
+    if restitution is not None and not (isinstance(restitution, Real) and 0.0 <= restitution < 1.0):
+        raise InputError(f"restitution = {restitution!r} must be a number from 0 to below 1.")
+    groups = [(_unsmoothed(law), share) for _, share, law in system.law_groups("friction")]
+    tables = [law.table(share) for law, share in groups]
+    width = max(table.shape[1] for table in tables)
+    arrays = system.arrays._replace(friction_parameters=np.vstack(
+        [np.pad(table, ((0, 0), (0, width - table.shape[1]))) for table in tables]))
+    cluster, rows = _clusters(arrays.Tx)
+    ground = system.ground
+    wave = ground.shortest_wavelength if ground.wavy else None
+    problem = kinds.Problem(arrays, _static(static_coefficient, n), cluster, rows,
+                            1e-4 * longest, -1.0 if restitution is None else float(restitution),
+                            np.array([*ground.height_range, np.inf if wave is None else wave]),
+                            int(ground.motion is None), compiled_derivative.address)
+    if restitution is not None:
+        _require_free_stops(system, groups, problem)
+    return problem
+
+
+def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
+    if law.memory or "smoothing_slope" not in (entry.name for entry in fields(law)):
+        raise InputError(f"{type(law).__name__} has no smoothing_slope that could become infinite; "
+                         f"set-valued friction needs a law with one, without memory.")
+    steep: dict[str, Any] = {"smoothing_slope": kinds.STEEP}
+    return replace(law, **steep)
+
+
+def _clusters(Tx: Array) -> tuple[NDArray[np.int64], Array]:
+    """Cluster (n,) of each node and row (k, m) of each cluster."""
+    scale = np.abs(Tx).max(initial=0.0)
+    rows: list[Array] = []
+    cluster = np.empty(len(Tx), dtype=np.int64)
+    for j, row in enumerate(Tx):
+        row = np.where(np.abs(row) > 1e-13 * scale, row, 0.0)
+        for c, other in enumerate(rows):
+            if np.abs(row - other).max() <= 1e-11 * scale:
+                cluster[j] = c
+                break
+        else:
+            cluster[j] = len(rows)
+            rows.append(row)
+    return cluster, np.array(rows)
+
+
+def _static(given: Any, n: int) -> Array:
+    if given is None:
+        return np.full(n, -1.0)
+    try:
+        values = np.asarray(given, dtype=float)
+        values = np.broadcast_to(values, (n,)).copy()
+    except (TypeError, ValueError):
+        values = np.array([np.nan])
+    if not (np.isfinite(values).all() and (values >= 0.0).all()):
+        raise InputError(f"static_coefficient = {given!r} must be a number, zero or above, or one "
+                         f"for each of the {n} contact nodes.")
+    return values
+
+
+def _require_free_stops(
+    system: ContactSystem, groups: list[tuple[FrictionLaw, Array]], problem: kinds.Problem
+) -> None:
+    limits = np.concatenate([
+        [law.kernel.python(kinds.CREEP, 1.0, row)[0] for row in law.table(share)]
+        for law, share in groups])
+    rubbing = np.any(problem.system.Tx != 0.0, axis=1) & (
+        (limits != 0.0) | (problem.static > 0.0))
+    if rubbing.any():
+        raise InputError(f"Rigid stops are without friction, but contact node "
+                         f"{int(np.argmax(rubbing))} moves along the ground with friction; give "
+                         f"it the friction coefficient zero.")
+    Ty = problem.system.Ty
+    if np.linalg.matrix_rank(Ty, tol=1e-9 * np.abs(Ty).max(initial=1e-300)) < len(Ty):
+        raise InputError(f"The motion of the {len(Ty)} contact nodes is not independent, so that "
+                         f"forces on rigid stops cannot be told apart; use fewer nodes, or more "
+                         f"modes.")
+
+
+def _chosen(problem: kinds.Problem, scheme: str) -> str:
+    if scheme not in SCHEMES:
+        raise InputError(f"scheme = {scheme!r} must be one of {choices(SCHEMES)}"
+                         f"{nearest(str(scheme), SCHEMES)}.")
+    if problem.restitution >= 0.0:
+        if scheme == "stepping":
+            raise InputError("scheme = 'stepping' has no rigid stops; use 'events'.")
+        return "events"
+    moving = problem.rows[np.any(problem.rows != 0.0, axis=1)]
+    scale = np.abs(moving).max(initial=0.0)
+    independent = not len(moving) or np.linalg.matrix_rank(moving, tol=1e-6 * scale) == len(moving)
+    if scheme == "auto":
+        return "events" if independent and len(moving) <= _FEW else "stepping"
+    if scheme == "events" and not independent:
+        raise InputError(f"scheme = 'events' needs independent slip velocities, but the "
+                         f"{len(moving)} different ones depend on fewer modes; use 'stepping'.")
+    return scheme
+
+
+def _floor(system: ContactSystem, state: Array, times: Array, longest: float) -> Array:
+    """Values (2 m + 8 + n,) below which the error is not measured relative to the state."""
+    m, n = system.basis.modes, system.basis.contact_nodes
+    arrays, drive = system.arrays, system.drive
+    largest = np.abs(system.basis.T[:, :2]).max(axis=(0, 1))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    depth = system.penetration_scale
+    speed = max(0.01 * system.ground.largest_speed(float(times[0]), float(times[-1])),
+                depth / longest)
+    # Velocities that drive and loads bring about in each mode, within a step where it is slow.
+    pushes = [(arrays.drive_shapes, [motion.largest for motion in drive.motions]),
+              (arrays.load_shapes, [force.signal.largest for force in system.load.forces])]
+    push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
+    driven = push / np.maximum(np.sqrt(np.diag(arrays.stiffness)), 1.0 / longest)
+    energy = (0.5 * state[m : 2 * m] @ state[m : 2 * m]
+              + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
+              + abs(system.load.normal) * depth
+              + sum(0.5 * c * motion.largest**2 for c, motion in zip(
+                  (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
+              + 0.5 * driven @ driven)
+    return np.concatenate([depth / largest, np.maximum(speed / largest, _DRIVEN * driven),
+                           np.full(len(POWERS) + n, energy or 0.5 * speed**2)])

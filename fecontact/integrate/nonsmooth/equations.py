@@ -1,0 +1,271 @@
+"""Compiled equations of motion with set-valued friction or rigid stops.
+
+Nodes whose rows along the ground are equal have one slip velocity and form a cluster c. With the
+friction force ``R_c``, the sum over the nodes, and the relative acceleration
+``a_c = Tx_c q'' - V'``, where ``Tx`` is mass-normalised,
+
+    a_c = a0_c - sum_d W_cd R_d,    W = Tx Tx^T
+
+Sticking clusters have ``a_c = 0``, which gives their ``R_c``; each node takes a part of it in
+proportion to its limit. The state of these kernels is Y = [q, q', work, friction work per node].
+"""
+
+from numba import types
+
+from fecontact.core.compiled import (
+    borrowed,
+    compile_law,
+    f8,
+    function_at,
+    helper,
+    integers,
+    vector,
+)
+from fecontact.integrate.nonsmooth.problem import (
+    CREEP,
+    CURVED,
+    EFFORTS,
+    FIXED,
+    FORCE,
+    GROUND_RATE,
+    LIMIT,
+    OPEN,
+    PENETRATION,
+    PRESSING,
+    PROBLEM,
+    RATE,
+    SLIP,
+    SLOPE,
+    STICK,
+    WORKSPACE,
+)
+from fecontact.laws.signatures import friction_at, ground_at, normal_at, signal_at
+from fecontact.system.body_powers import body_powers
+from fecontact.system.kernels import node_motion
+
+# Y' is evaluated in many places; behind an address its code is not copied into each of them.
+DERIVATIVE = types.void(f8, vector, PROBLEM, integers, integers, WORKSPACE, vector)
+_derivative_at = function_at(DERIVATIVE)
+
+
+@helper
+def derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
+    """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
+    _derivative_at(p.derivative)(t, Y, p, status, closed, w, out)
+
+
+@helper
+def solve(A, b, size):  # type: ignore[no-untyped-def]
+    """Solve A x = b of the given size in place, with row exchanges; x is in b."""
+    for k in range(size):
+        pivot = k
+        for i in range(k + 1, size):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
+        if pivot != k:
+            for i in range(k, size):
+                A[k, i], A[pivot, i] = A[pivot, i], A[k, i]
+            b[k], b[pivot] = b[pivot], b[k]
+        for i in range(k + 1, size):
+            factor = A[i, k] / A[k, k]
+            if factor != 0.0:
+                for j in range(k + 1, size):
+                    A[i, j] -= factor * A[k, j]
+                b[i] -= factor * b[k]
+    for k in range(size - 1, -1, -1):
+        for j in range(k + 1, size):
+            b[k] -= A[k, j] * b[j]
+        b[k] /= A[k, k]
+
+
+@helper
+def speed_rate(t, p):  # type: ignore[no-untyped-def]
+    """Acceleration of the ground, from its speed."""
+    s, d = p.system, p.tick
+    near = (signal_at(s.ground_motion)(t + d, s.ground_motion_parameters)[1]
+            - signal_at(s.ground_motion)(t - d, s.ground_motion_parameters)[1])
+    far = (signal_at(s.ground_motion)(t + 2.0 * d, s.ground_motion_parameters)[1]
+           - signal_at(s.ground_motion)(t - 2.0 * d, s.ground_motion_parameters)[1])
+    return (8.0 * near - far) / (12.0 * d)
+
+
+@helper
+def free_acceleration(t, Y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out (m,) with q'' without contact."""
+    m = s.Tx.shape[1]
+    drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
+    drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]
+    for i in range(m):
+        total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
+                 + drive_y * s.drive_shapes[1, i])
+        for k in range(m):
+            total -= s.stiffness[i, k] * Y[k] + s.damping[i, k] * Y[m + k]
+        out[i] = total
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
+        for i in range(m):
+            out[i] += value * s.load_shapes[k, i]
+
+
+@helper
+def contact_powers(t, s, nodes, friction, elastic, out):  # type: ignore[no-untyped-def]
+    """Add the powers at the nodes to out (8,) and put those of friction behind them (n,).
+
+    ``elastic`` says whether the normal forces come from the normal laws.
+    """
+    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
+    for j in range(len(nodes)):
+        force, R = nodes[j, FORCE], friction[j]
+        out[1] += force * nodes[j, GROUND_RATE]
+        out[2] -= R * speed
+        if elastic and force != 0.0:
+            stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
+            out[6] += (force - stored) * nodes[j, RATE]
+        out[EFFORTS + j] = R * nodes[j, SLIP]
+        out[7] += out[EFFORTS + j]
+
+
+@helper
+def observe(t, Y, p, nodes):  # type: ignore[no-untyped-def]
+    """Fill ``nodes`` from the positions and velocities in Y; rigid stops have no force yet."""
+    s = p.system
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    for j in range(len(nodes)):
+        x, height, x_rate, height_rate = node_motion(j, Y, s)
+        xi = s.abscissa[j] + x - travel
+        ground, slope, curvature = ground_at(s.profile)(xi, s.profile_parameters)
+        slip = x_rate - speed
+        u, v = ground - height - s.gap[j], slope * slip - height_rate
+        force = 0.0
+        if p.restitution < 0.0:
+            force = normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+        pressing = abs(force)
+        if s.friction_scale != 0 and force != 0.0:
+            pressing *= ground_at(s.friction_scale)(xi, s.friction_scale_parameters)[0]
+        limit = 0.0
+        if pressing > 0.0:
+            if p.static[j] >= 0.0:
+                limit = p.static[j] * pressing
+            else:
+                limit = friction_at(s.friction[j])(CREEP, pressing, s.friction_parameters[j])[0]
+        nodes[j, FORCE], nodes[j, PRESSING], nodes[j, LIMIT] = force, pressing, limit
+        nodes[j, PENETRATION], nodes[j, RATE], nodes[j, SLIP] = u, v, slip
+        nodes[j, GROUND_RATE], nodes[j, SLOPE] = slope * slip, slope
+        nodes[j, CURVED] = curvature * slip * slip
+
+
+@helper
+def slipping_force(j, slip, sign, pressing, s):  # type: ignore[no-untyped-def]
+    """R of node j that slips with the given sign, also where its slip velocity is still zero."""
+    v = sign * max(sign * slip, CREEP)
+    return friction_at(s.friction[j])(v, pressing, s.friction_parameters[j])[0]
+
+
+@helper
+def hold_stops(t, p, closed, w, acceleration):  # type: ignore[no-untyped-def]
+    """Normal forces of closed rigid stops, from u'' = 0, put into w.nodes and ``acceleration``."""
+    s = p.system
+    n, m = s.Tx.shape
+    count = 0
+    for j in range(n):
+        if closed[j]:
+            w.indices[count] = j
+            count += 1
+    if count == 0:
+        return
+    ground = speed_rate(t, p)
+    for a in range(count):
+        j = w.indices[a]
+        slope = w.nodes[j, SLOPE]
+        w.right[a] = w.nodes[j, CURVED] - slope * ground
+        for i in range(m):
+            w.right[a] -= (s.Ty[j, i] - slope * s.Tx[j, i]) * acceleration[i]
+        for b in range(count):
+            total = 0.0
+            for i in range(m):
+                total += (s.Ty[j, i] - slope * s.Tx[j, i]) * s.Ty[w.indices[b], i]
+            w.matrix[a, b] = total
+    solve(w.matrix, w.right, count)
+    for a in range(count):
+        j = w.indices[a]
+        w.nodes[j, FORCE] = w.right[a]
+        for i in range(m):
+            acceleration[i] += s.Ty[j, i] * w.right[a]
+
+
+@helper
+def hold_clusters(t, p, status, w, acceleration):  # type: ignore[no-untyped-def]
+    """Friction forces of sticking clusters, from a = 0, put into w.total and ``acceleration``."""
+    clusters, m = p.rows.shape
+    count = 0
+    for c in range(clusters):
+        if status[c] == STICK:
+            w.indices[count] = c
+            count += 1
+    if count == 0:
+        return
+    ground = speed_rate(t, p)
+    for a in range(count):
+        c = w.indices[a]
+        w.right[a] = -ground
+        for i in range(m):
+            w.right[a] += p.rows[c, i] * acceleration[i]
+        for b in range(count):
+            total = 0.0
+            for i in range(m):
+                total += p.rows[c, i] * p.rows[w.indices[b], i]
+            w.matrix[a, b] = total
+    solve(w.matrix, w.right, count)
+    for a in range(count):
+        c = w.indices[a]
+        w.total[c] = w.right[a]
+        for i in range(m):
+            acceleration[i] -= p.rows[c, i] * w.right[a]
+
+
+def _derivative(  # type: ignore[no-untyped-def]
+    t, held_Y, held_p, held_status, held_closed, held_w, held_out,
+):
+    """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
+    Y, p, w, out = borrowed(held_Y), borrowed(held_p), borrowed(held_w), borrowed(held_out)
+    status, closed = borrowed(held_status), borrowed(held_closed)
+    s = p.system
+    n, m = s.Tx.shape
+    for i in range(m):
+        out[i] = Y[m + i]
+    acceleration = out[m : 2 * m]
+    free_acceleration(t, Y, s, acceleration)
+    observe(t, Y, p, w.nodes)
+    w.total[:] = 0.0
+    w.limit[:] = 0.0
+    w.pressing[:] = 0.0
+    w.friction[:] = 0.0
+    if p.restitution >= 0.0:
+        hold_stops(t, p, closed, w, acceleration)
+    else:
+        for j in range(n):
+            c = p.cluster[j]
+            slip, pressing = w.nodes[j, SLIP], w.nodes[j, PRESSING]
+            w.slip[c] = slip
+            w.pressing[c] += pressing
+            w.limit[c] += w.nodes[j, LIMIT]
+            state = status[c]
+            if state == FIXED:
+                state = 1 if slip > 0.0 else (-1 if slip < 0.0 else OPEN)
+            if pressing > 0.0 and (state == 1 or state == -1):
+                w.friction[j] = slipping_force(j, slip, float(state), pressing, s)
+                w.total[c] += w.friction[j]
+            force = w.nodes[j, FORCE]
+            for i in range(m):
+                acceleration[i] += s.Ty[j, i] * force - s.Tx[j, i] * w.friction[j]
+        hold_clusters(t, p, status, w, acceleration)
+        for j in range(n):
+            c = p.cluster[j]
+            if status[c] == STICK and w.limit[c] > 0.0:
+                w.friction[j] = w.total[c] * w.nodes[j, LIMIT] / w.limit[c]
+    body_powers(t, Y, s, out[2 * m :])
+    contact_powers(t, s, w.nodes, w.friction, p.restitution < 0.0, out[2 * m :])
+
+
+compiled_derivative = compile_law(DERIVATIVE, "derivative(t, Y, p, status, closed, w, out)",
+                                  _derivative)

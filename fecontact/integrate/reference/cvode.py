@@ -1,0 +1,88 @@
+"""Time integration by CVODE of SUNDIALS, as a reference."""
+
+import time as clock
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.integrate.reference import scipy
+from fecontact.integrate.trajectory import Status
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+
+def integrate(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float,
+    progress: Callable[[float], None] | None,
+    max_step: float | None = None,
+) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
+    """Integrate with CVODE's backward differentiation formulas, from break to break.
+
+    See :func:`fecontact.integrate.reference.scipy.integrate`, whose equations these are.
+
+    Raises
+    ------
+    InputError
+        If scikit-sundae is not installed.
+    """
+    try:
+        from sksundae.cvode import CVODE  # type: ignore[import-untyped]
+    except ImportError:
+        raise InputError("method = 'CVODE' needs scikit-sundae: pip install "
+                         "'fecontact[cvode]'.") from None
+    begin = clock.perf_counter()
+    rate, derivative, tolerance, counts = scipy.with_work(system, state, rtol)
+
+    # CVODE's own arrays are read-only, for which the compiled functions are not made.
+    def rhs(t: float, y: Array, out: Array) -> None:
+        out[:] = rate(min(t, latest), y.copy())
+
+    def jacobian(t: float, y: Array, out: Array, into: Array) -> None:
+        into[:] = derivative(t, y.copy())
+
+    t, y = float(times[0]), np.concatenate([state, np.zeros(len(tolerance) - len(state))])
+    result = np.empty((len(times), len(y)))
+    result[0] = y
+    done, status = 1, Status.FINISHED
+    longest = scipy.longest_step(system, times, max_step)
+    latest = t
+    try:
+        for end in [*system.breakpoints(t, float(times[-1])), float(times[-1])]:
+            solver = CVODE(rhs, jacfn=jacobian, method="BDF", rtol=rtol, atol=tolerance,
+                           max_step=longest, max_num_steps=100_000)
+            latest = scipy.before_break(t, end)
+            solver.init_step(t, y)
+            while t < end and status is Status.FINISHED:
+                target = min(float(times[done]), end)
+                try:
+                    step = solver.step(target, tstop=end)
+                except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
+                    status, counts["message"] = Status.FAILED, str(error)
+                    break
+                if not step.success or not np.isfinite(step.y).all():
+                    status, counts["message"] = Status.FAILED, str(step.message)
+                    break
+                t, y = target, np.array(step.y, dtype=float)
+                if t == times[done]:
+                    result[done] = y
+                    done += 1
+                if progress is not None:
+                    progress(t)
+            if t == end and done < len(times):
+                y = scipy.jumped(system, float(np.nextafter(t, times[0])), t, y)
+                if times[done - 1] == t:
+                    result[done - 1] = y
+    except KeyboardInterrupt:
+        status = Status.INTERRUPTED
+    statistics = {"method": "CVODE", "rtol": rtol, **counts,
+                  "seconds": clock.perf_counter() - begin}
+    size = len(state)
+    return times[:done], result[:done, :size], result[:done, size:], status, statistics

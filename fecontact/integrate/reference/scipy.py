@@ -1,0 +1,190 @@
+"""Time integration by scipy's stiff solvers, with the compiled right-hand side and Jacobian."""
+
+import time as clock
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.integrate.trajectory import Status
+from fecontact.system.contact_energy import POWERS, powers
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import right_hand_side
+
+Array = NDArray[np.float64]
+
+METHODS = ("Radau", "BDF", "LSODA")
+
+
+def integrate(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    method: str,
+    rtol: float,
+    progress: Callable[[float], None] | None,
+    max_step: float | None = None,
+) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
+    """Integrate from ``times[0]`` to ``times[-1]``.
+
+    The powers of drive, ground, belt, damping and friction are integrated along with the state;
+    their error is controlled too, so that the energy balance closes to the tolerance.
+
+    Returns
+    -------
+    times (k,), states (k, 2 m + n s), work (k, 8), status, statistics
+        If the run ended early, those until then, and the last state that was reached.
+    """
+    import scipy.integrate
+
+    begin = clock.perf_counter()
+    size, extra = len(state), len(POWERS)
+    rhs, jacobian, tolerance, counts = with_work(system, state, rtol)
+    ends = [*system.breakpoints(float(times[0]), float(times[-1])), float(times[-1])]
+
+    def started(t: float, y: Array) -> Any:
+        end = ends.pop(0)
+        latest = before_break(t, end)
+        return getattr(scipy.integrate, method)(
+            lambda t, y: rhs(min(t, latest), y), t, y, end, jac=jacobian, rtol=rtol,
+            atol=tolerance, max_step=longest_step(system, times, max_step))
+
+    solver = started(float(times[0]), np.concatenate([state, np.zeros(extra)]))
+    result = np.empty((len(times), size + extra))
+    result[0] = solver.y
+    done, steps, stalled = 1, 0, 0
+    status = Status.FINISHED
+    try:
+        while done < len(times):
+            before = solver.t
+            message = _step(solver)
+            # LSODA repeats steps that do not move the time, for ever.
+            stalled = stalled + 1 if solver.t == before else 0
+            if stalled == 100:
+                message = "Required step size is less than spacing between numbers."
+            if message is not None:
+                status = Status.FAILED
+                counts["message"] = message
+                break
+            steps += 1
+            reached = done + int(np.searchsorted(times[done:], solver.t, side="right"))
+            if solver.status == "finished" and not ends:
+                reached = len(times)
+            if reached > done:
+                result[done:reached] = solver.dense_output()(times[done:reached]).T
+                done = reached
+            if solver.status == "finished" and ends:
+                solver = started(solver.t, jumped(system, solver.t_old, solver.t, solver.y))
+                if times[done - 1] == solver.t:
+                    result[done - 1] = solver.y
+            if progress is not None:
+                progress(float(solver.t))
+    except KeyboardInterrupt:
+        status = Status.INTERRUPTED
+    statistics = {"method": method, "rtol": rtol, "steps": steps, **counts,
+                  "seconds": clock.perf_counter() - begin}
+    times, result = times[:done], result[:done]
+    if status is not Status.FINISHED and solver.t > times[-1] and np.isfinite(solver.y).all():
+        times, result = np.append(times, solver.t), np.vstack([result, solver.y])
+    return times, result[:, :size], result[:, size:], status, statistics
+
+
+def with_work(
+    system: ContactSystem, state: Array, rtol: float,
+) -> tuple[Callable[[float, Array], Array], Callable[[float, Array], Array], Array, dict[str, Any]]:
+    """Right-hand side and Jacobian of state and work, their absolute tolerances, and counts.
+
+    The error of the work counts a hundredth of that of the energies, so that the balance closes.
+    """
+    size, extra = len(state), len(POWERS)
+    arrays = system.arrays
+    friction = np.empty(system.basis.contact_nodes)
+    counts: dict[str, Any] = {"right_hand_sides": 0, "jacobians": 0}
+
+    def rhs(t: float, y: Array) -> Array:
+        counts["right_hand_sides"] += 1
+        out = np.empty(size + extra)
+        state = np.ascontiguousarray(y[:size])
+        right_hand_side(t, state, arrays, out[:size])
+        powers(t, state, arrays, out[size:], friction)
+        return out
+
+    def jacobian(t: float, y: Array) -> Array:
+        counts["jacobians"] += 1
+        out = np.zeros((size + extra, size + extra))
+        out[:size, :size] = system.jacobian(t, y[:size])
+        return out
+
+    energy = 0.01 * rtol * energy_scale(system, state)
+    tolerance = np.concatenate([absolute_tolerances(system, rtol), np.full(extra, energy)])
+    return rhs, jacobian, tolerance, counts
+
+
+def before_break(t: float, end: float) -> float:
+    """The last moment before a break at ``end`` of a step from t: signals may jump there."""
+    return float(np.nextafter(end, t))
+
+
+def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
+    """State and work behind a break at ``end``: the drive's work counts where its motion jumps."""
+    y, m = y.copy(), system.basis.modes
+    for motion, stiffness, shape in zip(system.drive.motions, system.arrays.drive_stiffness,
+                                        system.arrays.drive_shapes, strict=True):
+        old, new = motion.history([before_break(t, end), end])[:, 0]
+        y[system.size] += (0.5 * stiffness * (old + new) - shape @ y[:m]) * (new - old)
+    return y
+
+
+def _step(solver: Any) -> str | None:
+    """One step; a sentence that says why if it failed."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            message = solver.step()
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+        # What scipy's linear algebra says to values that are not finite.
+        return "The motion grew beyond all numbers."
+    if solver.status == "failed":
+        return str(message)
+    return None if np.isfinite(solver.y).all() else "The motion grew beyond all numbers."
+
+
+def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
+    """Absolute tolerances (2 m + n s,) of the state.
+
+    ``rtol`` times the smallest penetration scale for displacements; for velocities a tenth of the
+    smallest velocity scale of friction, or less for a finer ``rtol``: steps that do not resolve
+    it lose the contact's stick. Both are divided by the mode's largest motion at any point.
+    Internal variables: ``rtol`` times their scales.
+    """
+    T = system.basis.T[:, :2]
+    largest = np.abs(T).max(axis=(0, 1))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    velocity = min(0.1, 1e5 * rtol) * system.velocity_scale
+    return np.concatenate([rtol * system.penetration_scale / largest, velocity / largest,
+                           rtol * system.memory_scales])
+
+
+def energy_scale(system: ContactSystem, state: Array) -> float:
+    """Energy at the start, of the drive's springs and of the load over the roughness [J]."""
+    m, drive = system.basis.modes, system.drive
+    q, rate = state[:m], state[m : 2 * m]
+    start = 0.5 * (rate @ rate + q @ system.arrays.stiffness @ q)
+    springs = 0.5 * sum(
+        c * motion.largest**2
+        for c, motion in zip((drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
+    pressed = abs(system.load.normal) * system.penetration_scale
+    return float(start + springs + pressed) or np.inf
+
+
+def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
+    """A fiftieth of the run, a twentieth of the shortest period of drive, loads and waves [s].
+
+    Or the given limit, if that is shorter.
+
+    Longer steps could jump over an excitation that starts from rest.
+    """
+    start, end = float(times[0]), float(times[-1])
+    longest = min((end - start) / 50.0, system.shortest_period(start, end) / 20.0)
+    return longest if max_step is None else min(longest, float(max_step))

@@ -1,0 +1,243 @@
+"""Running the compiled integrator: tolerances, pieces of a run, interrupts, checkpoints."""
+
+import time as clock
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.integrate.events import Events, Watched
+from fecontact.integrate.reference.scipy import energy_scale
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p import step_loop
+from fecontact.integrate.rodas5p.checkpoint import Checkpoint
+from fecontact.integrate.rodas5p.event_arrays import watch_for
+from fecontact.integrate.rodas5p.run import Run, Vary
+from fecontact.integrate.rodas5p.state import Control, progress_for, room_for
+from fecontact.integrate.rodas5p.unfelt import first_unfelt
+from fecontact.integrate.rodas5p.variational import variation_for
+from fecontact.integrate.trajectory import Status
+from fecontact.system.contact_energy import POWERS
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+# Slip velocities are resolved to this part of their distance from stick. Where friction falls
+# with slip velocity, what is left undetermined there decides when a contact breaks away.
+_SLIP_PART = 0.01
+# Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
+_SLOW = 20.0
+# Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
+# or of this part of the largest that it has been.
+_LOOSER, _FADED = 10.0, 1e-3
+# Steps of a piece of a run: at first, at least and at most.
+_FEWEST, _MOST_STEPS = 200, 10_000_000
+
+
+def start(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float,
+    max_step: float | None = None,
+    work: bool = True,
+    vary: bool | tuple[ContactSystem, ContactSystem, float] = False,
+    vary_rtol: float | None = None,
+    events: Sequence[Watched] = (),
+) -> Run:
+    """A run from ``times[0]``, before its first step.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        What moves.
+    state : (2 m + n s,) array
+        y = [q, q', z] at the start.
+    times : (N,) array
+        Output times, ascending [s].
+    rtol : float
+        Error of one step: of each modal displacement relative to its largest value so far, or to
+        the penetration scale of the normal laws where that is more; of modal velocities relative
+        to the largest so far; of internal variables relative to their scale. At nodes with
+        friction without memory slip velocities are resolved to a hundredth of their distance
+        from rest, or of the width of the smoothing.
+    max_step : float, optional
+        Longest step [s]; shorter ones where :func:`longest_step` says so.
+    work : bool
+        Whether to integrate the powers. Their error of one step is kept below ``rtol`` of the
+        largest energy so far, so that the energy balance closes.
+    vary : bool or (above, below, width)
+        Whether to carry the derivatives to the initial state along; with those to a parameter if
+        the system is given with the parameter moved up and down, ``width`` apart. Steps then end
+        where normal forces begin, end or pass the depth of their law, at output times too.
+    vary_rtol : float, optional
+        Error of one step of the derivatives, relative to the largest they have been; ten times
+        ``rtol`` of their size by default, or of a thousandth of the largest.
+    events : sequence of ContactEvents, Crossing and Event
+        What to watch for.
+    """
+    if not np.isfinite(state).all():
+        raise InputError("The initial state holds values that are not finite.")
+    basis = system.basis
+    m, n, states = basis.modes, basis.contact_nodes, system.memory
+    times = np.array(times, dtype=float)
+    largest = np.abs(basis.T[:, :2]).max(axis=(0, 1))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    slip_scale, depth = np.empty(n), np.empty(n)
+    for nodes, _, law in system.law_groups("friction"):
+        slip_scale[nodes] = law.velocity_scale
+    for nodes, _, law in system.law_groups("normal"):
+        depth[nodes] = law.penetration_scale
+    longest = longest_step(system, times, max_step)
+    with np.errstate(over="ignore", invalid="ignore"):
+        energy = energy_scale(system, state)
+    breaks = np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float)
+    above, below, width, columns = system, system, 0.0, 0
+    if vary:
+        breaks = np.union1d(breaks, times[1:-1])
+        columns = len(state)
+        if not isinstance(vary, bool):
+            above, below, width = vary
+            columns += 1
+    control = Control(
+        displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
+        slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
+        breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
+        rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
+        speed_scale=system.velocity_scale, energy_scale=energy,
+        work=int(work), unfelt=first_unfelt.address)
+    with np.errstate(over="ignore", invalid="ignore"):
+        acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
+    first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
+                0.01 * longest)
+    return Run(
+        system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), times, control,
+        progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
+        np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)),
+        Vary(above.arrays, below.arrays, width, variation_for(
+            columns, m, n, states, width, float(vary_rtol or _LOOSER * rtol),
+            1.0 if vary_rtol else _FADED),
+             np.zeros((len(times) if vary else 0, columns, len(state)))),
+        watch_for(system, events, bool(vary)))
+
+
+def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
+    """A quarter of the shortest period of drive, loads and waves, or the given limit [s].
+
+    The stages of a step meet what is given in time at five times; longer steps could miss it.
+    Contacts that they miss are found, however long they are.
+    """
+    start, end = float(times[0]), float(times[-1])
+    longest = min(end - start, system.shortest_period(start, end) / 4.0)
+    return longest if max_step is None else min(longest, float(max_step))
+
+
+def _levels(system: ContactSystem) -> Array:
+    """Penetrations (l, n) at which the normal forces of the nodes begin or end."""
+    parts = [law.onsets(nodes.stop - nodes.start) for nodes, _, law in system.law_groups("normal")]
+    most = max(len(part) for part in parts)
+    # What a law has less of, it has twice.
+    return np.hstack([np.vstack([part, *[part[:1]] * (most - len(part))]) for part in parts])
+
+
+def _ground_bounds(system: ContactSystem, times: Array) -> Array:
+    """What bounds the ground, in the order of :mod:`fecontact.integrate.courses`."""
+    ground, start, end = system.ground, float(times[0]), float(times[-1])
+    low, high, slope = 0.0, 0.0, 0.0
+    if ground.wavy:
+        try:
+            (low, high), slope = ground.height_range, ground.steepest_slope
+        except NotImplementedError:
+            raise InputError(f"Ground: profile = {ground.profile!r} must say its height_range and "
+                             f"its steepest_slope, which bound it between the places where the "
+                             f"integrator meets it.") from None
+    return np.array([low, high, slope, ground.largest_speed(start, end),
+                     ground.largest_acceleration(start, end)])
+
+
+def finish(
+    run: Run, progress: Callable[[float], None] | None = None, seconds: float = 0.2,
+    keep: Callable[[], None] | None = None,
+) -> int:
+    """Go on to the end or a failure, reporting about every ``seconds``; the status.
+
+    ``keep`` is called after every piece of the run.
+    """
+    steps = _FEWEST
+    while True:
+        begin, first = clock.perf_counter(), run.attempts
+        status, done, passed = step_loop.RUNNING, 0, 0.0
+        # A call returns early when its events fill the table.
+        while status == step_loop.RUNNING and done < steps and passed < seconds:
+            status = run.advance(steps - done)
+            done, passed = run.attempts - first, clock.perf_counter() - begin
+        if progress is not None:
+            progress(run.time)
+        if status != step_loop.RUNNING:
+            return status
+        if keep is not None:
+            keep()
+        steps = int(np.clip(done * seconds / max(passed, 1e-9), _FEWEST,
+                            min(10 * steps, _MOST_STEPS)))
+
+
+def integrate(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float,
+    max_step: float | None = None,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: Path | None = None,
+    events: Sequence[Watched] = (),
+) -> tuple[Array, Array, Array, Status, dict[str, Any], Events]:
+    """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`.
+
+    Returns
+    -------
+    times (k,), states (k, 2 m + n s), work (k, 8 + n), status, statistics, events
+        If the run ended early, those until then, and the last state that was reached.
+    """
+    begin = clock.perf_counter()
+    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events)
+    kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
+    if kept is not None:
+        kept.read()
+    ended, result = None, step_loop.RUNNING
+    try:
+        result = finish(run, progress, keep=None if kept is None else kept.keep)
+    except KeyboardInterrupt:
+        if not run.outputs:  # nothing was computed that could be kept
+            raise
+        ended = Status.INTERRUPTED
+        if kept is not None:
+            kept.write()
+    statistics: dict[str, Any] = {"method": "Rodas5P", "rtol": rtol, **run.statistics,
+                                  "seconds": clock.perf_counter() - begin}
+    if ended is None:
+        ended = ENDS[result]
+    if ended not in (Status.FINISHED, Status.EVENT):
+        statistics["message"] = f"{_place(run, ended)}"
+    done = run.outputs
+    times, states, work = run.times[:done], run.states[:done], run.work[:done]
+    last = run.progress.state
+    if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
+        times = np.append(times, run.time)
+        states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
+    return times, states, work, ended, statistics, run.events
+
+
+ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,
+         step_loop.NOT_FINITE: Status.NOT_FINITE, step_loop.STOPPED: Status.EVENT}
+
+
+def _place(run: Run, ended: Status) -> str:
+    where = f"It ended at t = {run.time:.9g} s"
+    if ended is Status.MINIMUM_STEP and run.progress.counts[run_arrays.REJECTIONS]:
+        where += f", near contact node {int(run.progress.counts[run_arrays.WORST_NODE])}"
+    return f"{where}."

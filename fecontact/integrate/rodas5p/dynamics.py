@@ -1,0 +1,214 @@
+"""Accelerations of the reduced system, and their derivatives, for the time integrator.
+
+The same equations as :mod:`fecontact.system.kernels`, laid out for speed: rows Tx, Ty of all
+nodes side by side in ``shapes`` (m, 2 n), so that sums over nodes vectorise.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import block, helper, matrix
+from fecontact.laws.signatures import normal_at, signal_at
+from fecontact.system import kernels as kernels
+
+Array = NDArray[np.float64]
+
+# Entries of what is given in time: drive x and y, travel and speed of the ground, and their rates.
+DRIVE_X, DRIVE_Y, TRAVEL, SPEED, DRIVE_X_RATE, DRIVE_Y_RATE = range(6)
+GIVEN = 6
+
+
+class Gradients(NamedTuple):
+    """Derivatives of the node forces, as :func:`fecontact.system.kernels.node_gradients` gives.
+
+    partial : (n, 3, 4), derivatives of F, R and the pressing force to x, y, x', y'
+    force : (n, 3 + s), rates : (n, s, 3 + s), of friction with memory
+    """
+
+    partial: Array
+    force: Array
+    rates: Array
+
+
+GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
+
+
+@helper
+def set_given(t, s, given, pull):  # type: ignore[no-untyped-def]
+    """Fill ``given`` (6,) with what is given at time t, and ``pull`` (m,) with its modal force."""
+    for axis in range(2):
+        if s.drive_stiffness[axis] != 0.0:
+            value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
+            given[DRIVE_X + axis] = value
+            given[DRIVE_X_RATE + axis] = rate
+    given[TRAVEL], given[SPEED] = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    for i in range(len(pull)):
+        pull[i] = (s.constant_load[i] + given[DRIVE_X] * s.drive_shapes[0, i]
+                   + given[DRIVE_Y] * s.drive_shapes[1, i])
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
+        for i in range(len(pull)):
+            pull[i] += value * s.load_shapes[k, i]
+
+
+@helper
+def project(shapes, y, places, speeds):  # type: ignore[no-untyped-def]
+    """Fill displacements and velocities (2 n,), all x, then all y, of the contact nodes."""
+    m, rows = shapes.shape
+    for j in range(rows):
+        places[j] = shapes[0, j] * y[0]
+        speeds[j] = shapes[0, j] * y[m]
+    i = 1
+    while i + 3 < m:
+        for j in range(rows):
+            a, b, c, d = shapes[i, j], shapes[i + 1, j], shapes[i + 2, j], shapes[i + 3, j]
+            places[j] += a * y[i] + b * y[i + 1] + c * y[i + 2] + d * y[i + 3]
+            speeds[j] += (a * y[m + i] + b * y[m + i + 1] + c * y[m + i + 2] + d * y[m + i + 3])
+        i += 4
+    while i < m:
+        for j in range(rows):
+            places[j] += shapes[i, j] * y[i]
+            speeds[j] += shapes[i, j] * y[m + i]
+        i += 1
+
+
+@helper
+def gather(y, s, shapes, pull, forces, rate):  # type: ignore[no-untyped-def]
+    """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -R, then all F."""
+    m, rows = shapes.shape
+    for i in range(m):
+        total = pull[i]
+        for k in range(m):
+            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
+        for j in range(rows):
+            total += shapes[i, j] * forces[j]
+        rate[i] = y[m + i]
+        rate[m + i] = total
+
+
+@helper
+def set_rate(y, s, shapes, given, pull, w, small, rate):  # type: ignore[no-untyped-def]
+    """Fill ``rate`` (size,) with y'. ``w`` (3, 2 n) and ``small`` are room to work in."""
+    m, rows = shapes.shape
+    n = rows // 2
+    states = (len(y) - 2 * m) // n
+    places, speeds, forces = w[0], w[1], w[2]
+    project(shapes, y, places, speeds)
+    force, rates = small.force[0], small.rates[0]
+    for j in range(n):
+        first = 2 * m + j * states
+        F, R, _, _, _, _ = kernels.node_forces(
+            j, places[j], places[n + j], speeds[j], speeds[n + j],
+            y[first : first + s.memory[j]], given[TRAVEL], given[SPEED], s, force, rates)
+        forces[j] = -R
+        forces[n + j] = F
+        for k in range(states):
+            rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
+    gather(y, s, shapes, pull, forces, rate)
+
+
+@helper
+def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):  # type: ignore[no-untyped-def]
+    """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
+    m, rows = shapes.shape
+    n = rows // 2
+    states = (len(y) - 2 * m) // n
+    places, speeds, forces = w[0], w[1], w[2]
+    project(shapes, y, places, speeds)
+    for j in range(n):
+        first = 2 * m + j * states
+        F, R = kernels.node_gradients(
+            j, places[j], places[n + j], speeds[j], speeds[n + j],
+            y[first : first + s.memory[j]], given[TRAVEL], given[SPEED], s,
+            out.force[j], out.rates[j], out.partial[j])
+        forces[j] = -R
+        forces[n + j] = F
+        for k in range(states):
+            rate[first + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
+    gather(y, s, shapes, pull, forces, rate)
+
+
+@helper
+def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` (size,) with df/dt at a fixed state.
+
+    The ground that moves on under a node acts as the node moving back: travel enters with x,
+    speed with x'. ``acceleration`` is that of the ground, ``rate_of_loads`` (m,) the rate of the
+    modal loads.
+    """
+    m, rows = shapes.shape
+    n = rows // 2
+    states = g.rates.shape[1]
+    forces = w[2]
+    speed = given[SPEED]
+    out[: 2 * m] = 0.0
+    for j in range(n):
+        forces[j] = speed * g.partial[j, 1, 0] + acceleration * g.partial[j, 1, 2]
+        forces[n + j] = -speed * g.partial[j, 0, 0] - acceleration * g.partial[j, 0, 2]
+        pressing = -speed * g.partial[j, 2, 0] - acceleration * g.partial[j, 2, 2]
+        for k in range(states):
+            out[2 * m + j * states + k] = (
+                -acceleration * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
+                if k < s.memory[j] else 0.0)
+    for i in range(m):
+        total = (rate_of_loads[i] + given[DRIVE_X_RATE] * s.drive_shapes[0, i]
+                 + given[DRIVE_Y_RATE] * s.drive_shapes[1, i])
+        for j in range(rows):
+            total += shapes[i, j] * forces[j]
+        out[m + i] = total
+
+
+@helper
+def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):  # type: ignore[no-untyped-def]
+    """Time until the forces of a node change their character, or ``within`` if later.
+
+    By the velocity and acceleration of the nodes: touch-down and lift-off on level ground, the
+    penetrations ``depth`` (n,), slip velocities that fall to ``slow`` (n,) of either sign, and
+    normal forces that fall to zero. Stepping there saves the steps that would fail because
+    forces change within them; it is an estimate, and nothing depends on its accuracy.
+    """
+    m, rows = shapes.shape
+    n = rows // 2
+    project(shapes, y, w[0], w[1])
+    for j in range(rows):
+        total = 0.0
+        for i in range(m):
+            total += shapes[i, j] * rate[m + i]
+        w[2, j] = total
+    first = within
+    for j in range(n):
+        u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]
+        first = _crossing(u, v, a, first)
+        first = _crossing(u - depth[j], v, a, first)
+        force = normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+        if force > 0.0:
+            fall = g.partial[j, 0, 1] * -v + g.partial[j, 0, 3] * -a
+            if fall < 0.0 and -force / fall < first:
+                first = -force / fall
+            slip = w[1, j] - speed
+            towards = -w[2, j] if slip > 0.0 else w[2, j]
+            if abs(slip) > 1.5 * slow[j] and (abs(slip) - slow[j]) < towards * first:
+                first = (abs(slip) - slow[j]) / towards
+    return first
+
+
+@helper
+def _crossing(u, v, a, within):  # type: ignore[no-untyped-def]
+    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
+    if u * v > 0.0 and u * a >= 0.0:
+        return within
+    discriminant = v * v - 2.0 * a * u
+    if discriminant < 0.0:
+        return within
+    q = -(v + math.copysign(math.sqrt(discriminant), v))
+    one = q / a if a != 0.0 else -1.0
+    other = 2.0 * u / q if q != 0.0 else -1.0
+    if 0.0 < one < within:
+        within = one
+    if 0.0 < other < within:
+        within = other
+    return within

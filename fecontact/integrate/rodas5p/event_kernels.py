@@ -1,0 +1,401 @@
+"""Finding events within a step: contact nodes that change their state, and users' functions.
+
+The dense output of a step is looked at a few times, and what has changed since the time before is
+narrowed down by bisection. Gaps, slip velocities and what `Crossing` watches are polynomials
+whose changes of sign are known (:mod:`fecontact.integrate.courses`); between two of them they are
+looked at too, so that none escapes. Functions of users and the stick of friction with memory are
+known at the looks only.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import (
+    borrowed,
+    compile_law,
+    f8,
+    function_at,
+    helper,
+    i8,
+    integers,
+    kernel,
+    matrix,
+    vector,
+)
+from fecontact.integrate import bernstein
+from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, changes
+from fecontact.integrate.rodas5p import dynamics, tableau
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.laws.signatures import signal_at
+from fecontact.system import kernels as kernels
+from fecontact.system.kernels import SYSTEM
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+EVENT = f8(f8, vector, vector)
+event_at = function_at(EVENT)
+
+# Kinds of events; a user's event k is FIRST_OWN + k.
+TOUCH_DOWN, LIFT_OFF, STICK, SLIP_BEGINS, FIRST_OWN = range(5)
+# States of a node, as in `ContactState`; past the depth of the normal law 3 more.
+OPEN, STICKING, SLIPPING, DEEP = range(4)
+# Entries of Watch.counts.
+FOUND, NODES, KINKS = range(3)
+
+# Looks at a step, and more where functions of users are watched.
+_LOOKS, _MORE_LOOKS = 4, 16
+# Places besides for each node and function.
+PLACES = 12
+_HALVINGS = 44
+_MOST_A_NODE = 3
+
+
+class Watch(NamedTuple):
+    """What is watched during a run, and what was found.
+
+    Attributes
+    ----------
+    stick_speed : (n,) array
+        Slip velocity below which a node sticks, for laws without memory [m/s].
+    curve_speed, curve : (k,), (n, k) arrays
+        Slip velocities and R/F of steady sliding there, for laws with memory; zeros for others.
+    zones : (n,) array
+        State of the nodes at the start of the step.
+    own, own_parameters, own_values, own_direction : (l,), (l, p), (l,), (l,)
+        Users' functions, their values at the start of the step, and the direction of the change
+        of sign that counts.
+    linear : (l,) array
+        Whether the function is ``y @ p[1:] - p[0]``.
+    places, known : (n + l, PLACES), (n + l,) arrays
+        Parts of the step between changes of sign, and how many there are.
+    changed : (64,) array
+        Room for these changes.
+    note : int
+        Address of :data:`note_events`.
+    stops : (4 + l,) array
+        Whether the run ends at an event of this kind.
+    found, states : (K, 3), (K, size)
+        Time, kind and node (-1 for a user's event), and the state.
+    counts : (3,) array
+        Events found; whether contact nodes are watched; whether steps must end at the kinks of
+        the normal forces.
+    """
+
+    stick_speed: Array
+    curve_speed: Array
+    curve: Array
+    zones: Integers
+    own: Integers
+    own_parameters: Array
+    own_values: Array
+    own_direction: Integers
+    linear: Integers
+    places: Array
+    known: Integers
+    changed: Array
+    note: int
+    stops: Integers
+    found: Array
+    states: Array
+    counts: Integers
+
+
+WATCH = types.NamedTuple(
+    [vector, vector, matrix, integers, integers, matrix, vector, integers, integers, matrix,
+     integers, vector, i8, integers, matrix, matrix, integers], Watch)
+NOTE = f8(f8, f8, f8, SYSTEM, run_arrays.CONTROL, vector, run_arrays.ROOM, WATCH)
+note_events_at = function_at(NOTE)
+
+
+@helper
+def _between(x, places, values):  # type: ignore[no-untyped-def]
+    """Linear interpolation, constant outside."""
+    right = np.searchsorted(places, x)
+    if right == 0 or right == len(places):
+        return values[min(right, len(places) - 1)]
+    part = (x - places[right - 1]) / (places[right] - places[right - 1])
+    return (1.0 - part) * values[right - 1] + part * values[right]
+
+
+@helper
+def _zone(j, t, y, s, watch, depth, force, rates):  # type: ignore[no-untyped-def]
+    """State of node j, and whether it is past the depth of its normal law."""
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    x, height, x_rate, height_rate = kernels.node_motion(j, y, s)
+    F, R, u, _, slip, _ = kernels.node_forces(j, x, height, x_rate, height_rate,
+                                              kernels.memory_of(j, y, s), travel, speed, s, force,
+                                              rates)
+    zone = OPEN
+    if F != 0.0:
+        if s.memory[j] > 0 and len(watch.curve_speed) > 0 and watch.curve[j, 0] != 0.0:
+            sticks = abs(R) < 0.95 * abs(_between(slip, watch.curve_speed, watch.curve[j]) * F)
+        else:
+            sticks = abs(slip) < watch.stick_speed[j]
+        zone = STICKING if sticks else SLIPPING
+    return zone + DEEP if u > depth[j] else zone
+
+
+@helper
+def _note(watch, t, kind, node, y):  # type: ignore[no-untyped-def]
+    row = watch.counts[FOUND]
+    watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
+    watch.states[row, :] = y
+    watch.counts[FOUND] = row + 1
+
+
+@helper
+def full(watch):  # type: ignore[no-untyped-def]
+    """Whether the events of one more step may find no place."""
+    most = (_MORE_LOOKS + PLACES) * (_MOST_A_NODE * len(watch.zones) + len(watch.own))
+    return watch.counts[FOUND] + most > len(watch.found)
+
+
+@helper
+def _normal_zone(zone):  # type: ignore[no-untyped-def]
+    """What of a zone belongs to the normal force alone."""
+    return (0 if zone % DEEP == OPEN else 1) + (2 if zone >= DEEP else 0)
+
+
+@helper
+def _state_at(part, before, after, dense, y):  # type: ignore[no-untyped-def]
+    if part == 1.0:
+        y[:] = after
+    else:
+        tableau.interpolated(part, before, after, dense, y)
+
+
+@helper
+def _changed(j, t, h, latest, low, high, s, watch, depth, force, rates, before, after, dense, y):  # type: ignore[no-untyped-def]
+    """Where node j leaves its state between two parts of a step, and for which; y is set there."""
+    old = watch.zones[j] % DEEP
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        tableau.interpolated(middle, before, after, dense, y)
+        zone = _zone(j, min(t + middle * h, latest), y, s, watch, depth, force, rates)
+        if zone % DEEP == old:
+            low = middle
+        else:
+            high = middle
+    _state_at(high, before, after, dense, y)
+    return high, _zone(j, min(t + high * h, latest), y, s, watch, depth, force, rates)
+
+
+@helper
+def _own(k, t, h, latest, left, right, before, after, dense, watch, y):  # type: ignore[no-untyped-def]
+    """Value of a user's function at the right end, after its change of sign has been noted."""
+    g, p = event_at(watch.own[k]), watch.own_parameters[k]
+    old = watch.own_values[k]
+    new = g(min(t + right * h, latest), y, p)
+    rising = old < 0.0 <= new
+    falling = old > 0.0 >= new
+    if not ((rising and watch.own_direction[k] >= 0) or (
+            falling and watch.own_direction[k] <= 0)):
+        return new
+    low, high = left, right
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        tableau.interpolated(middle, before, after, dense, y)
+        value = g(min(t + middle * h, latest), y, p)
+        if (value >= 0.0) if rising else (value <= 0.0):
+            high = middle
+        else:
+            low = middle
+    _state_at(high, before, after, dense, y)
+    _note(watch, min(t + high * h, latest), FIRST_OWN + k, -1, y)
+    return new
+
+
+@helper
+def _end(t, h, begun, watch):  # type: ignore[no-untyped-def]
+    """Drop the events after the first at which the run stops; its part of the step, or 2."""
+    stop = np.inf
+    for row in range(begun, watch.counts[FOUND]):
+        if watch.stops[int(watch.found[row, 1])] != 0:
+            stop = min(stop, watch.found[row, 0])
+    if stop == np.inf:
+        return 2.0
+    kept = begun
+    for row in range(begun, watch.counts[FOUND]):
+        if watch.found[row, 0] <= stop:
+            watch.found[kept, :] = watch.found[row, :]
+            watch.states[kept, :] = watch.states[row, :]
+            kept += 1
+    watch.counts[FOUND] = kept
+    return (stop - t) / h
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, WATCH, dynamics.GRADIENTS))
+def begin(t, y, held_s, depth, held_watch, scratch):  # type: ignore[no-untyped-def]
+    """Take the state at the start of a run for that from which things change."""
+    s, watch = borrowed(held_s), borrowed(held_watch)
+    for j in range(len(watch.zones)):
+        watch.zones[j] = _zone(j, t, y, s, watch, depth, scratch.force[0], scratch.rates[0])
+    for k in range(len(watch.own)):
+        watch.own_values[k] = event_at(watch.own[k])(t, y, watch.own_parameters[k])
+
+
+@kernel(types.f8(f8, f8, f8, SYSTEM, vector, WATCH, dynamics.GRADIENTS, vector, vector, matrix,
+                 vector))
+def next_switch(  # type: ignore[no-untyped-def]
+    t, h, latest, held_s, held_depth, held_watch, held_scratch, held_before, held_after,
+    held_dense, held_y,
+):
+    """Part of the step until a normal force begins, ends or passes its depth; 1 if none does."""
+    s, watch, scratch = borrowed(held_s), borrowed(held_watch), borrowed(held_scratch)
+    depth, before, after = borrowed(held_depth), borrowed(held_before), borrowed(held_after)
+    dense, y = borrowed(held_dense), borrowed(held_y)
+    force, rates = scratch.force[0], scratch.rates[0]
+    first = 1.0
+    for j in range(len(watch.zones)):
+        old = _normal_zone(watch.zones[j])
+        if _normal_zone(_zone(j, min(t + h, latest), after, s, watch, depth, force,
+                              rates)) == old:
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            tableau.interpolated(middle, before, after, dense, y)
+            zone = _zone(j, min(t + middle * h, latest), y, s, watch, depth, force, rates)
+            if _normal_zone(zone) == old:
+                low = middle
+            else:
+                high = middle
+        first = min(first, high)
+    return first
+
+
+@helper
+def _keep_between(count, row, watch):  # type: ignore[no-untyped-def]
+    """Put the middles between changes of sign, of which there are so many, into a row of places."""
+    found = watch.changed
+    for i in range(1, count):
+        k = i
+        while k > 0 and found[k] < found[k - 1]:
+            found[k], found[k - 1] = found[k - 1], found[k]
+            k -= 1
+    watch.known[row] = 0
+    for i in range(min(count - 1, PLACES)):
+        watch.places[row, i] = 0.5 * (found[i] + found[i + 1])
+        watch.known[row] = i + 1
+
+
+@helper
+def _set_places(t, h, latest, s, control, before, room, watch):  # type: ignore[no-untyped-def]
+    """Fill ``watch.places`` for a step."""
+    n = len(watch.zones)
+    b, row = room.bound[0], room.bound[2]
+    levels = control.levels.shape[0]
+    for j in range(n):
+        count = 0
+        # Gaps over the levels of the normal law, and slip velocities either way where stick ends.
+        for k in range(levels + 2):
+            what, shift = GAP, 0.0
+            if k < levels:
+                shift = control.levels[k, j]
+            else:
+                what, shift = SLIP, watch.stick_speed[j] * (2.0 * (k - levels) - 1.0)
+            if watch.counts[NODES] == 0 or (what == SLIP and s.memory[j] > 0) or (
+                    count + MOST > len(watch.changed)):
+                continue
+            count += changes(what, j, t, h, latest, s, control.ground, room.courses, shift, b,
+                             room.halves, row, watch.changed[count : count + MOST])
+        _keep_between(count, j, watch)
+    for k in range(len(watch.own)):
+        count = 0
+        if watch.linear[k] != 0:
+            p = watch.own_parameters[k]
+            for i in range(COEFFICIENTS):
+                b[i] = -p[0]
+            for i in range(len(before)):
+                b[0] += p[1 + i] * before[i]
+                b[1] += p[1 + i] * room.inner[0, i]
+                b[2] += p[1 + i] * room.inner[1, i]
+                b[3] += p[1 + i] * room.inner[2, i]
+                b[4] += p[1 + i] * room.after[i]
+            count = bernstein.sign_changes(b, room.halves, row, watch.changed[:MOST])
+        _keep_between(count, n + k, watch)
+
+
+@helper
+def _note_changes(  # type: ignore[no-untyped-def]
+    j, zone, t, h, latest, left, right, s, watch, depth, force, rates, before, after, dense, y,
+):
+    """Note what node j does between two parts of a step, at whose right end it is in a zone."""
+    low = left
+    for _ in range(_MOST_A_NODE):
+        old = watch.zones[j] % DEEP
+        if old == zone % DEEP:
+            break
+        low, watch.zones[j] = _changed(j, t, h, latest, low, right, s, watch, depth, force,
+                                       rates, before, after, dense, y)
+        at, new = min(t + low * h, latest), watch.zones[j] % DEEP
+        if old == OPEN:
+            _note(watch, at, TOUCH_DOWN, j, y)
+        if new == OPEN:
+            _note(watch, at, LIFT_OFF, j, y)
+        elif new == STICKING:
+            _note(watch, at, STICK, j, y)
+        elif old == STICKING:
+            _note(watch, at, SLIP_BEGINS, j, y)
+    watch.zones[j] = zone
+
+
+def _note_events(t, h, latest, held_s, held_control, held_before, held_room, held_watch):  # type: ignore[no-untyped-def]
+    """Note the events of an accepted step; the part of it after which the run ends, or 2."""
+    s, watch, room = borrowed(held_s), borrowed(held_watch), borrowed(held_room)
+    control, before = borrowed(held_control), borrowed(held_before)
+    depth, after, dense, y = control.depth, room.after, room.dense, room.right
+    force, rates = room.scratch.force[0], room.scratch.rates[0]
+    begun = watch.counts[FOUND]
+    n = len(watch.zones)
+    looks = _LOOKS
+    for k in range(len(watch.own)):
+        if watch.linear[k] == 0:
+            looks = _MORE_LOOKS
+    _set_places(t, h, latest, s, control, before, room, watch)
+    for look in range(looks):
+        left, right = look / looks, (look + 1) / looks
+        _state_at(right, before, after, dense, y)
+        now = min(t + right * h, latest)
+        for k in range(len(watch.own)):
+            first = left
+            for i in range(watch.known[n + k]):
+                place = watch.places[n + k, i]
+                if first < place < right:
+                    _state_at(place, before, after, dense, y)
+                    watch.own_values[k] = _own(k, t, h, latest, first, place, before, after,
+                                               dense, watch, y)
+                    first = place
+            _state_at(right, before, after, dense, y)
+            watch.own_values[k] = _own(k, t, h, latest, first, right, before, after, dense, watch,
+                                       y)
+            _state_at(right, before, after, dense, y)
+        for j in range(n):
+            first = left
+            for i in range(watch.known[j]):
+                place = watch.places[j, i]
+                if first < place < right:
+                    _state_at(place, before, after, dense, y)
+                    zone = _zone(j, min(t + place * h, latest), y, s, watch, depth, force, rates)
+                    _note_changes(j, zone, t, h, latest, first, place, s, watch, depth, force,
+                                  rates, before, after, dense, y)
+                    first = place
+            if first != left:
+                _state_at(right, before, after, dense, y)
+            zone = _zone(j, now, y, s, watch, depth, force, rates)
+            if watch.counts[NODES] == 0 or zone % DEEP == watch.zones[j] % DEEP:
+                watch.zones[j] = zone
+                continue
+            _note_changes(j, zone, t, h, latest, first, right, s, watch, depth, force, rates,
+                          before, after, dense, y)
+            _state_at(right, before, after, dense, y)
+    return _end(t, h, begun, watch)
+
+
+# By its address, so that it is not compiled into every step of runs that watch for nothing.
+note_events = compile_law(NOTE, "note_events(t, h, latest, s, control, before, room, watch)",
+                          _note_events)

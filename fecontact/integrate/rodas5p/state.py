@@ -1,0 +1,175 @@
+"""What the compiled integrator works on: limits, the state of a run, room to work in."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import f8, i8, integers, matrix, vector
+from fecontact.integrate import bernstein, courses
+from fecontact.integrate.rodas5p import dynamics as motion
+from fecontact.integrate.rodas5p import stage_solver, tableau
+from fecontact.system.contact_energy import POWERS
+
+Array = NDArray[np.float64]
+
+# Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
+# fail may still lie ahead, else zero. ENERGY is the largest energy or work so far.
+TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS, ENERGY = range(8)
+# Entries of Progress.counts.
+STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(6)
+
+
+class Control(NamedTuple):
+    """What limits the steps.
+
+    Attributes
+    ----------
+    displacement_scale : (m,) array
+        Modal displacements below which errors count as if the displacement were this large.
+    memory_scale : (n s,) array
+        Scales of the internal variables.
+    slip_scale, slow, depth : (n,) arrays
+        Width of the smoothing of friction, slip velocity at which slip is about to become stick,
+        penetration at which the normal law changes its character.
+    largest : (m,) array
+        Largest motion of each mode at any point.
+    breaks : (k,) array
+        Times to step on to.
+    levels : (l, n) array
+        Penetrations at which normal forces begin or end.
+    ground : (5,) array
+        Lowest and highest place of the ground, its steepest slope, its largest speed and
+        acceleration, as :mod:`fecontact.integrate.courses` names them.
+    rtol, slip_part, longest, speed_scale, energy_scale : float
+        Relative tolerance, part of the distance from stick to which slip velocities are resolved,
+        longest step [s], velocity and energy below which errors count as if they were this large.
+    work : int
+        Whether to integrate the powers.
+    unfelt : int
+        Address of :data:`fecontact.integrate.rodas5p.unfelt.first_unfelt`.
+    """
+
+    displacement_scale: Array
+    memory_scale: Array
+    slip_scale: Array
+    slow: Array
+    depth: Array
+    largest: Array
+    breaks: Array
+    levels: Array
+    ground: Array
+    rtol: float
+    slip_part: float
+    longest: float
+    speed_scale: float
+    energy_scale: float
+    work: int
+    unfelt: int
+
+
+CONTROL = types.NamedTuple([vector] * 7 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
+
+
+class Progress(NamedTuple):
+    """All that a run needs to go on, bit for bit; copies of the arrays are a checkpoint.
+
+    Attributes
+    ----------
+    numbers, counts : arrays
+        See the names of their entries in this module.
+    state, rate : (size,) arrays
+        y and y'.
+    extremes : (m,) array
+        Largest modal displacements so far.
+    work, power : (8 + n,) arrays
+        Work so far and powers, of the system and of each node's friction.
+    gradients : Gradients
+        Derivatives of the node forces.
+    """
+
+    numbers: Array
+    counts: NDArray[np.int64]
+    state: Array
+    rate: Array
+    extremes: Array
+    work: Array
+    power: Array
+    gradients: motion.Gradients
+
+
+PROGRESS = types.NamedTuple(
+    [vector, integers, vector, vector, vector, vector, vector, motion.GRADIENTS], Progress)
+
+
+class Room(NamedTuple):
+    """Room to work in.
+
+    Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
+    what the names say; ``nodes`` (3, 2 n), ``given`` and ``pull`` for what acts at the time of a
+    stage, ``power`` (4, 8 + n) for a quadrature. ``ends`` to ``places`` serve to look at the
+    course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
+    what they may do.
+    """
+
+    stages: Array
+    dense: Array
+    stage: Array
+    right: Array
+    base: Array
+    time_rate: Array
+    after: Array
+    rate_after: Array
+    nodes: Array
+    given: Array
+    pull: Array
+    pull_rate: Array
+    power: Array
+    reduced: stage_solver.Reduced
+    scratch: motion.Gradients
+    gradients_after: motion.Gradients
+    ends: Array
+    inner: Array
+    courses: Array
+    bound: Array
+    halves: Array
+    places: Array
+
+
+ROOM = types.NamedTuple(
+    [matrix] * 2 + [vector] * 6 + [matrix] + [vector] * 3
+    + [matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector],
+    Room)
+
+
+def gradients_for(nodes: int, states: int) -> motion.Gradients:
+    """Zeros for so many contact nodes with so many internal variables each."""
+    return motion.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
+                            np.zeros((nodes, states, 3 + states)))
+
+
+def room_for(modes: int, nodes: int, states: int) -> Room:
+    """Room for a system of so many modes, contact nodes and internal variables per node."""
+    size = 2 * modes + nodes * states
+    stage, right, base, time_rate, after, rate_after = np.zeros((6, size))
+    return Room(
+        np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
+        stage, right, base, time_rate, after, rate_after,
+        np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
+        np.zeros((4, len(POWERS) + nodes)), stage_solver.reduced_for(modes, nodes, states),
+        gradients_for(nodes, states), gradients_for(nodes, states),
+        np.zeros((3, 2 * nodes)), np.zeros((3, size)), np.zeros((courses.DOUBT + 1, 3 * nodes)),
+        np.zeros((3, courses.COEFFICIENTS)),
+        np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST))
+
+
+def progress_for(state: Array, time: float, step: float, modes: int, nodes: int) -> Progress:
+    """A run that is about to start."""
+    numbers = np.zeros(8)
+    numbers[TIME], numbers[STEP] = time, step
+    size = len(state)
+    return Progress(
+        numbers, np.zeros(6, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
+        np.zeros(modes), np.zeros(len(POWERS) + nodes), np.zeros(len(POWERS) + nodes),
+        gradients_for(nodes, (size - 2 * modes) // nodes))

@@ -1,0 +1,138 @@
+"""Contacts and slips within a step that its stages did not feel.
+
+The error of a step is estimated from forces at a few places. A node that touches the ground and
+leaves it again between two of them moves as if the ground were not there, and the estimate is
+small. So the course of every node over an accepted step is looked at. A stretch in which a gap or
+slip velocity has another sign than at the ends of the step, or a force at least twice that at the
+ends, counts as unfelt if its impulse would change the state by more than a part of the tolerance.
+The step is then taken anew to a place within that stretch: its end feels the force, and the
+estimate of the error sees it.
+"""
+
+from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8, matrix
+from fecontact.integrate.courses import (
+    COEFFICIENTS,
+    DOUBT,
+    GAP,
+    SLIP,
+    at,
+    changes,
+)
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.laws.signatures import friction_at, normal_at
+from fecontact.system.kernels import SYSTEM
+
+_UNFELT = f8(f8, f8, f8, i8, SYSTEM, matrix, run_arrays.CONTROL, run_arrays.PROGRESS,
+             run_arrays.ROOM)
+first_unfelt_at = function_at(_UNFELT)
+
+# An unfelt impulse counts from this part of the tolerance on.
+_PART = 0.1
+# Steps end after this part of a stretch.
+_JUST_PAST = 0.01
+# Places at which the largest value of a stretch is looked for.
+_LOOKS = 8
+
+
+@helper
+def _matters(impulse, column, h, shapes, control, progress):  # type: ignore[no-untyped-def]
+    """Whether an impulse on a node would be an error beyond the tolerance of the step."""
+    speed_scale = max(progress.numbers[run_arrays.SPEED_SCALE], control.speed_scale)
+    allowed = _PART * control.rtol
+    for i in range(len(control.largest)):
+        kick = abs(shapes[i, column]) * impulse
+        place = max(progress.extremes[i], control.displacement_scale[i])
+        if kick * control.largest[i] > allowed * speed_scale or kick * h > allowed * place:
+            return True
+    return False
+
+
+@helper
+def _push(j, u, v, s):  # type: ignore[no-untyped-def]
+    """Normal force of node j."""
+    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+
+
+@helper
+def _unfelt_push(j, inside, level, value, ends, brief, s):  # type: ignore[no-untyped-def]
+    """Normal force that a stretch of ``brief`` s hides, where the gap over a level is ``value``.
+
+    ``ends`` is the largest gap over the level, of either sign, at ends of the step that belong to
+    the stretch.
+    """
+    if inside:
+        size = abs(value)
+        return abs(_push(j, level + size, 4.0 * size / brief, s) - _push(j, level - size, 0.0, s))
+    force = abs(_push(j, level - value, 0.0, s))
+    return force if force > 2.0 * abs(_push(j, level - ends, 0.0, s)) else 0.0
+
+
+@helper
+def _unfelt_rub(j, inside, F, slip, ends, s):  # type: ignore[no-untyped-def]
+    """The same of friction, for a slip velocity under the normal force F."""
+    rub, p = friction_at(s.friction[j]), s.friction_parameters[j]
+    force = abs(rub(slip, F, p)[0])
+    if inside:
+        return force + abs(rub(-slip, F, p)[0])
+    return force if force > 2.0 * abs(rub(ends, F, p)[0]) else 0.0
+
+
+def _first_unfelt(  # type: ignore[no-untyped-def]
+    t, h, latest, again, held_s, held_shapes, held_control, held_progress, held_room,
+):
+    """Part of the step at which to end it because of what it did not feel; 2 if there is nothing.
+
+    It is the earliest such place of all nodes: just past the begin of the stretch, or, when this
+    is not the first attempt (``again``) or the begin is that of the step, where the force is
+    largest.
+    """
+    s, shapes, room = borrowed(held_s), borrowed(held_shapes), borrowed(held_room)
+    control, progress = borrowed(held_control), borrowed(held_progress)
+    courses, bounds, levels = room.courses, control.ground, control.levels
+    b, height, row, places = room.bound[0], room.bound[1], room.bound[2], room.places
+    n = len(s.gap)
+    first = 2.0
+    for column in range(2 * n):
+        what, j = (SLIP, column) if column < n else (GAP, column - n)
+        if courses[DOUBT, column] == 0.0 or (what == SLIP and s.memory[j] > 0):
+            continue
+        for level in range(levels.shape[0] if what == GAP else 1):
+            shift = levels[level, j] if what == GAP else 0.0
+            found = changes(what, j, t, h, latest, s, bounds, courses, shift, b, room.halves, row,
+                            places)
+            for k in range(found + 1):
+                begin = places[k - 1] if k > 0 else 0.0
+                end = places[k] if k < found else 1.0
+                if begin >= first:
+                    break
+                place, largest, ends = begin, 0.0, 0.0
+                for look in range(_LOOKS + 1):
+                    part = begin + (end - begin) * look / _LOOKS
+                    value = at(what, part, j, t, h, latest, s, bounds, courses, shift, b, row)
+                    if abs(value) > abs(largest):
+                        largest, place = value, part
+                    if (part == 0.0 or part == 1.0) and abs(value) > abs(ends):
+                        ends = value
+                inside, brief = begin > 0.0 and end < 1.0, (end - begin) * h
+                force = 0.0
+                if what == GAP:
+                    force = _unfelt_push(j, inside, shift, largest, ends, brief, s)
+                elif abs(largest) > control.slip_scale[j]:
+                    for i in range(COEFFICIENTS):
+                        height[i] = courses[i, n + j]
+                    F = abs(_push(j, -at(GAP, place, j, t, h, latest, s, bounds, courses, 0.0,
+                                         height, row), 0.0, s))
+                    if F > 0.0:
+                        force = _unfelt_rub(j, inside, F, largest, ends, s)
+                if force > 0.0 and _matters(2.0 / 3.0 * force * brief, column, h, shapes, control,
+                                            progress):
+                    if again == 0 and begin > 0.0:
+                        place = begin + _JUST_PAST * (end - begin)
+                    first = min(first, place)
+    return first
+
+
+# By its address: few steps need it, and it need not be compiled into all.
+first_unfelt = compile_law(
+    _UNFELT, "first_unfelt(t, h, latest, again, s, shapes, control, progress, room)",
+    _first_unfelt)

@@ -1,0 +1,225 @@
+"""Derivatives of a step of the integrator to its start and to a parameter.
+
+A step maps y to y + sum_j A_8j u_j + u_8 with stages u_i of
+:mod:`fecontact.integrate.rodas5p.tableau`. For a column x of dy/dy_0, or of dy/dp, its stages U_i
+solve the same systems, with the factors of the step,
+
+    (I / (h gamma) - J) U_i = J(t_i, Y_i) X_i + sum_j C_ij U_j / h + H_i x  [+ p_i]
+    X_i = x + sum_j A_ij U_j,     H_i = d/de J(t + e d_i h, y + e u_i) at e = 0
+
+and p_i = df/dp(t_i, Y_i) + d/de df/dp(t + e d_i h, y + e u_i) for the column of the parameter. So
+the result is the derivative of what is computed, not another approximation of the same thing.
+H_i and p_i are differences over steps that are small against the scales of the laws, central ones
+but beside kinks.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
+from fecontact.integrate.rodas5p import curvature, dynamics, stage_solver, tableau
+from fecontact.integrate.rodas5p import variational_stages as columns
+from fecontact.laws.signatures import signal_at
+from fecontact.system.kernels import SYSTEM
+
+Array = NDArray[np.float64]
+
+# Parameters are moved by this part of their value for differences of the right-hand side.
+MOVE = 1e-5
+
+
+class Variation(NamedTuple):
+    """Columns of derivatives, and room for a step of them.
+
+    Attributes
+    ----------
+    columns : (k, size) array
+        dy/dy_0 column by column, then dy/dp if a parameter varies. Empty if none are wanted.
+    after : (k, size) array
+        They at the end of the step.
+    norms : (2, k) array
+        Largest size of each column since it began, and at the end of the step.
+    least : (k,) array
+        What these are at least: what makes the column of a parameter, which begins at zero,
+        worth attention.
+    stages : (8 k, size) array
+        U_i of column c in row 8 c + i.
+    tolerance, faded : float
+        Error of a column in a step that is allowed, in units of its size; of the part ``faded``
+        of the largest size that it has had where it is smaller.
+    moved, right : (k, size) arrays
+        X_i and the right sides of a stage, column by column.
+    pushed, bent : (k, m) arrays
+        Accelerations by X_i and by H_i; solutions u_v.
+    inside_matrix, ahead_matrix, solver : (m, 2 m) arrays
+        What makes these of X_i, x and the right sides.
+    """
+
+    columns: Array
+    after: Array
+    norms: Array
+    least: Array
+    stages: Array
+    tolerance: float
+    faded: float
+    moved: Array
+    pushed: Array
+    bent: Array
+    right: Array
+    inside_matrix: Array
+    ahead_matrix: Array
+    solver: Array
+    vectors: Array
+    nodes: Array
+    sinking: Array
+    given: Array
+    pull: Array
+    none: Array
+    inside: dynamics.Gradients
+    ahead: dynamics.Gradients
+    behind: dynamics.Gradients
+    usual: dynamics.Gradients
+
+
+VARIATION = types.NamedTuple(
+    [matrix] * 3 + [vector, matrix, f8, f8] + [matrix] * 10 + [vector] * 3
+    + [dynamics.GRADIENTS] * 4, Variation)
+
+
+def variation_for(
+    columns: int, modes: int, nodes: int, states: int, width: float, tolerance: float,
+    faded: float,
+) -> Variation:
+    """Room for so many columns; the first ``size`` of them are the unit matrix.
+
+    ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
+    """
+    size = 2 * modes + nodes * states
+    room = [dynamics.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
+                               np.zeros((nodes, states, 3 + states))) for _ in range(4)]
+    start = np.zeros((columns, size))
+    np.fill_diagonal(start, 1.0)
+    least = np.zeros(columns)
+    if width:
+        # A tenth of the state's own sizes, if the parameter changed by all of its value.
+        least[-1] = 0.1 * MOVE * 2.0 / (width * faded)
+    return Variation(start, np.zeros((columns, size)), np.tile(least, (2, 1)), least,
+                     np.zeros((tableau.STAGES * columns, size)), tolerance, faded,
+                     np.zeros((columns, size)), np.zeros((columns, modes)),
+                     np.zeros((columns, modes)), np.zeros((columns, size)),
+                     np.zeros((modes, 2 * modes)), np.zeros((modes, 2 * modes)),
+                     np.zeros((modes, 2 * modes)), np.zeros((7, size)),
+                     np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(dynamics.GIVEN),
+                     np.zeros(modes), np.zeros(modes), *room)
+
+
+@helper
+def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # type: ignore[no-untyped-def]
+    """Fill out = factor (f of the system above less f of that below)."""
+    dynamics.set_given(t, above, v.given, v.pull)
+    dynamics.set_rate(Y, above, shapes, v.given, v.pull, v.nodes, v.behind, rate)
+    dynamics.set_given(t, below, v.given, v.pull)
+    dynamics.set_rate(Y, below, shapes, v.given, v.pull, v.nodes, v.behind, other)
+    for k in range(len(Y)):
+        out[k] = factor * (rate[k] - other[k])
+
+
+@helper
+def _largest_error(scale, v):  # type: ignore[no-untyped-def]
+    largest = 0.0
+    for c in range(len(v.columns)):
+        before, after, error = 0.0, 0.0, 0.0
+        last = v.stages[tableau.STAGES * c + tableau.STAGES - 1]
+        for k in range(len(scale)):
+            before = max(before, abs(v.columns[c, k]) / scale[k])
+            after = max(after, abs(v.after[c, k]) / scale[k])
+            error = max(error, abs(last[k]) / scale[k])
+        size = max(before, after)
+        v.norms[1, c] = max(v.norms[0, c], size)
+        if error > 0.0:
+            largest = max(largest, error / max(size, v.faded * v.norms[1, c]))
+    return largest
+
+
+@kernel(types.f8(f8, f8, f8, f8, SYSTEM, SYSTEM, SYSTEM, f8, matrix, vector, vector, vector,
+                 vector, dynamics.GRADIENTS, stage_solver.REDUCED, matrix, vector, VARIATION))
+def propagate(  # type: ignore[no-untyped-def]
+    t, h, latest, G, held_s, held_above, held_below, width, held_shapes, held_slip, held_depth,
+    held_memory, held_state, held_gradients, held_reduced, held_stages, held_scale, held_v,
+):
+    """Carry the columns over the step from t to t + h whose stages and factors are given.
+
+    Returns the largest error of a column in units of its size, or of the part ``v.faded`` of the
+    largest it has been, with ``scale`` (size,) as the units of the state; columns of a parameter
+    that are still faint count as if they were not.
+
+    ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
+    with width = 0 no parameter varies.
+    """
+    s, shapes, v = borrowed(held_s), borrowed(held_shapes), borrowed(held_v)
+    above, below = borrowed(held_above), borrowed(held_below)
+    slip_scale, depth, memory_scale = (borrowed(held_slip), borrowed(held_depth),
+                                       borrowed(held_memory))
+    state, gradients = borrowed(held_state), borrowed(held_gradients)
+    reduced, stages, scale = borrowed(held_reduced), borrowed(held_stages), borrowed(held_scale)
+    size = len(state)
+    m = len(v.none)
+    w = v.nodes
+    Y, right, forced, rate, other = (v.vectors[0], v.vectors[1], v.vectors[3], v.vectors[4],
+                                     v.vectors[5])
+    ahead, behind = v.ahead, v.behind
+    if size == 2 * m:
+        columns.set_solver(G, reduced, v)
+    curvature.set_sinking(t, state, s, shapes, v, v.sinking)
+    for i in range(tableau.STAGES):
+        now = t if i == 0 else min(t + tableau.NODES[i] * h, latest)
+        tableau.combined(tableau.A[i], 1.0, state, stages, Y)
+        dynamics.set_given(now, s, v.given, v.pull)
+        dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.inside, rate)
+        curvature.learn(v.inside, v.usual)
+        advance = tableau.TIME[i] * h
+        reach = curvature.reach(stages[i], shapes, slip_scale, depth, memory_scale, w)
+        if width != 0.0:
+            _rates_between(now, Y, above, below, shapes, v, 1.0 / width, rate, other, forced)
+        for side in range(2):
+            e = reach if side == 0 else -reach
+            for k in range(size):
+                Y[k] = state[k] + e * stages[i, k]
+            later = t + e * advance
+            if width != 0.0:
+                _rates_between(later, Y, above, below, shapes, v, 0.5 / (e * width), rate, other,
+                               right)
+                for k in range(size):
+                    forced[k] += right[k]
+            dynamics.set_given(later, s, v.given, v.pull)
+            if side == 0:
+                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, ahead, rate)
+            else:
+                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, behind, rate)
+        curvature.differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
+                     signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1] * advance,
+                     v.sinking, shapes, w)
+        if size > 2 * m:
+            columns.one_by_one(i, h, G, s, shapes, gradients, reduced, forced, width != 0.0, v)
+        else:
+            columns.all_at_once(i, h, G, s, shapes, reduced, forced, width != 0.0, v)
+    return _largest_error(scale, v)
+
+
+@helper
+def keep(v):  # type: ignore[no-untyped-def]
+    """Take the columns at the end of the step for those of the next."""
+    v.columns[:] = v.after
+    v.norms[0] = v.norms[1]
+
+
+@helper
+def begin_anew(v):  # type: ignore[no-untyped-def]
+    """Let the columns be the unit matrix again."""
+    v.columns[:] = 0.0
+    v.norms[0], v.norms[1] = v.least, v.least
+    for k in range(v.columns.shape[1]):
+        v.columns[k, k] = 1.0

@@ -1,0 +1,129 @@
+"""What the smoothing of friction, or the compliance of a stop, changes in a run."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
+from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.integrate.nonsmooth.driver import integrate_set_valued
+from fecontact.integrate.nonsmooth.problem import CREEP, STEEP
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.trajectory import Status
+from fecontact.laws.friction_curve import coefficient, largest_coefficient
+from fecontact.system.contact_system import ContactSystem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothingCost:
+    """Difference between a smoothed and a set-valued run.
+
+    Attributes
+    ----------
+    orbit_difference : float
+        Largest difference of the displacement :attr:`component` in the second half of the run, in
+        units of its amplitude there (half of its range, set-valued).
+    component : str
+        The displacement that was compared: the one with the largest amplitude of all of B and of
+        the contact nodes, such as ``x of contact node 0``.
+    amplitude : float
+        Its amplitude [m].
+    break_away_smoothed, break_away : float
+        Friction force that the contact can take before it slides, in units of the normal force:
+        the maximum of the smoothed curve, and the limit of stick without smoothing; those of the
+        contact node where they differ most.
+    sentence : str
+        All of it for people.
+    """
+
+    orbit_difference: float
+    component: str
+    amplitude: float
+    break_away_smoothed: float
+    break_away: float
+    sentence: str
+
+
+def smoothing_cost(
+    system: ContactSystem,
+    t_end: float,
+    *,
+    initial: Initial = "rest",
+    outputs: int = 4001,
+    rtol: float = 1e-6,
+    restitution: float | None = None,
+    static_coefficient: float | Sequence[float] | None = None,
+) -> SmoothingCost:
+    """Run a system with its own laws and with set-valued ones from the same start, and compare.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        With friction laws that have a ``smoothing_slope``.
+    t_end : float
+        End of both runs [s]; some periods of the motion.
+    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m,) array
+        Where both start; see :func:`fecontact.integrate.initial_state.initial_state`.
+    outputs : int
+        Number of times at which the runs are compared, at least 20.
+    rtol : float
+        Relative tolerance of both.
+    restitution, static_coefficient
+        As for :func:`fecontact.integrate.nonsmooth.driver.integrate_set_valued`.
+
+    Raises
+    ------
+    InputError
+        As by the two runs, or if one of them ended early.
+    AnalysisError
+        If there is no equilibrium to start from.
+    """
+    require_kind("smoothing_cost", ContactSystem, system=system)
+    if not isinstance(outputs, int) or outputs < 20:
+        raise InputError(f"smoothing_cost: outputs = {outputs!r} must be at least 20.")
+    state = initial_state(system, initial, 0.0)
+    smoothed = simulate(system, t_end, t_start=0.0, initial=state, outputs=outputs, rtol=rtol)
+    exact = integrate_set_valued(system, state, smoothed.time, rtol=rtol, restitution=restitution,
+                                 static_coefficient=static_coefficient)
+    for name, run in (("smoothed", smoothed), ("set-valued", exact)):
+        if run.status is not Status.FINISHED:
+            raise InputError(f"smoothing_cost: the {name} run ended early at t = "
+                             f"{run.time[-1]:.6g} s. {run.status.value}")
+    m, half = system.basis.modes, outputs // 2
+    T = system.basis.T[:, :2].reshape(-1, m)
+    ours, theirs = exact.states[half:, :m] @ T.T, smoothed.modal_coordinates[half:] @ T.T
+    places = [f"{axis} of {point}" for point in (
+        "B", "C", *(f"contact node {j}" for j in range(system.basis.contact_nodes)))
+        for axis in "xy"]
+    amplitudes = 0.5 * np.ptp(ours, axis=0)[: len(places)]
+    row = int(np.argmax(amplitudes))
+    largest = float(np.abs(ours - theirs)[:, row].max())
+    difference = largest / float(amplitudes[row]) if amplitudes[row] > 0.0 else np.inf
+    before, after = _break_away(system, static_coefficient)
+    what = ("a rigid stop in place of the compliant contact" if restitution is not None
+            else "friction without smoothing")
+    sentence = (f"Over {t_end:.4g} s {what} moves {places[row]} by {100.0 * difference:.2g} % of "
+                f"its amplitude {amplitudes[row]:.3g} m")
+    sentence += "." if restitution is not None else (
+        f"; the smoothed contact breaks away at {before:.4g} F_N, not at {after:.4g} F_N.")
+    return SmoothingCost(difference, places[row], float(amplitudes[row]), before, after, sentence)
+
+
+def _break_away(
+    system: ContactSystem, static_coefficient: float | Sequence[float] | None
+) -> tuple[float, float]:
+    """Largest R/F with and without smoothing, of the node where they differ most."""
+    n = system.basis.contact_nodes
+    smooth, sharp = np.empty(n), np.empty(n)
+    for nodes, _, law in system.law_groups("friction"):
+        smooth[nodes] = largest_coefficient(law)[0]
+        sharp[nodes] = coefficient(replace(law, smoothing_slope=STEEP), CREEP)
+    if static_coefficient is not None:
+        sharp[:] = static_coefficient
+    worst = int(np.argmax(np.abs(smooth - sharp)))
+    return float(smooth[worst]), float(sharp[worst])

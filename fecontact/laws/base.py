@@ -1,0 +1,202 @@
+"""Base classes of the laws of contact nodes, and the ranges of their parameters.
+
+:mod:`fecontact.laws.signatures` says what the functions of laws take and give.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Annotated, Any, ClassVar, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import CompiledLaw
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.laws.friction_curve import stick_velocity
+from fecontact.laws.potential import stored_energy
+
+PerNode = float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Range:
+    """Values that a parameter may have, as part of its annotation: ``Annotated[PerNode, Range]``.
+
+    Attributes
+    ----------
+    allowed : str
+        The values in words: ``parameter = -1.0 must be {allowed}``.
+    holds : callable
+        Whether each number of an array is one of them.
+    """
+
+    allowed: str
+    holds: Callable[[NDArray[np.float64]], Any]
+
+
+Positive = Annotated[PerNode, Range("above zero", lambda x: x > 0.0)]
+NotNegative = Annotated[PerNode, Range("zero or above", lambda x: x >= 0.0)]
+OneOrAbove = Annotated[PerNode, Range("one or above", lambda x: x >= 1.0)]
+UpToOne = Annotated[PerNode, Range("above zero and at most 1", lambda x: (x > 0.0) & (x <= 1.0))]
+
+
+@cache
+def _ranges(law: Any) -> Mapping[str, tuple[Range, ...]]:
+    """Ranges that the annotations of a law's parameters name."""
+    try:
+        hints = get_type_hints(law, include_extras=True)
+    except NameError as error:
+        raise InputError(f"{law.__name__}: an annotation cannot be understood ({error}); use names "
+                         f"that the module of the law knows.") from None
+    return {name: tuple(item for item in getattr(hint, "__metadata__", ())
+                        if isinstance(item, Range))
+            for name, hint in hints.items()}
+
+
+@dataclass(frozen=True)
+class NodeLaw:
+    """A law whose parameters may differ from contact node to contact node."""
+
+    kernel: ClassVar[CompiledLaw]
+    extensive: ClassVar[frozenset[str]] = frozenset()
+    # Parameters whose lists are not one value per node.
+    shared_fields: ClassVar[frozenset[str]] = frozenset()
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    def __post_init__(self) -> None:
+        law: Any = type(self)
+        for entry in fields(self):
+            given = getattr(self, entry.name)
+            if entry.name in self.choices:
+                names = self.choices[entry.name]
+                if not isinstance(given, str) or given not in names:
+                    raise InputError(f"{self._title(entry.name)} = {given!r} must be one of "
+                                     f"{choices(names)}{nearest(str(given), names)}.")
+                continue
+            try:
+                array = np.asarray(given)
+            except ValueError:
+                array = np.empty(0)
+            if array.dtype.kind not in "iuf" or array.ndim > 1 or not array.size:
+                raise InputError(f"{self._title(entry.name)} = {given!r} must be a number or a "
+                                 f"list of numbers, one per contact node.")
+            if array.ndim and entry.type in (float, "float"):
+                raise InputError(f"{self._title(entry.name)} = {given!r} must be a number; only "
+                                 f"parameters annotated as PerNode take one per contact node.")
+            value = tuple(float(item) for item in array) if array.ndim else float(array)
+            if not np.isfinite(value).all():
+                raise InputError(f"{self._title(entry.name)} = {value!r} must be finite.")
+            object.__setattr__(self, entry.name, value)
+            for one in _ranges(law)[entry.name]:
+                self.require(one.allowed, one.holds, entry.name)
+
+    def node_count(self) -> int | None:
+        """Number of contact nodes for which parameters are given one by one; None if for none.
+
+        Raises
+        ------
+        InputError
+            If two parameters have different numbers of values.
+        """
+        sizes = {entry.name: len(value) for entry in fields(self)
+                 if entry.name not in self.shared_fields
+                 and isinstance(value := getattr(self, entry.name), tuple)}
+        if len(set(sizes.values())) > 1:
+            listed = ", ".join(f"{name} has {size}" for name, size in sizes.items())
+            raise InputError(f"{type(self).__name__}: parameters given per contact node need as "
+                             f"many values each, but {listed}.")
+        return next(iter(sizes.values()), None)
+
+    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters (n, k) of n nodes; ``share`` (n,) is each node's part of the face."""
+        columns = []
+        for entry in fields(self):
+            given = getattr(self, entry.name)
+            if entry.name in self.choices:
+                given = self.choices[entry.name].index(given)
+            value = np.asarray(given, dtype=float)
+            if value.ndim and value.shape != share.shape:
+                raise InputError(f"{self._title(entry.name)} has {value.size} values for "
+                                 f"{share.size} contact nodes; give one number or one per node.")
+            if not value.ndim and entry.name in self.extensive:
+                value = value * share
+            columns.append(np.broadcast_to(value, share.shape))
+        return np.array(columns).T.reshape(len(share), -1).copy()
+
+    def require(self, allowed: str, test: Callable[[NDArray[np.float64]], Any],
+                *names: str) -> None:
+        """Raise :class:`InputError` unless every value of the named parameters passes a test."""
+        for name in names:
+            value = getattr(self, name)
+            if not np.all(test(np.asarray(value, dtype=float))):
+                raise InputError(f"{self._title(name)} = {value!r} must be {allowed}.")
+
+    def _title(self, name: str) -> str:
+        return f"{type(self).__name__}: {name}"
+
+
+@dataclass(frozen=True)
+class NormalLaw(NodeLaw):
+    """A normal law; ``kernel`` is a :func:`normal_law`."""
+
+    @property
+    def penetration_scale(self) -> float:
+        """Penetration [m] over which the law changes its character, the smallest of all nodes.
+
+        Tolerances of time integration and starting values of equilibria follow from it.
+        """
+        raise NotImplementedError
+
+    def onsets(self, nodes: int) -> NDArray[np.float64]:
+        """Penetrations (k, n) of n nodes at which a force begins or ends [m]; here zero.
+
+        The time integrator looks for touches between its steps there.
+        """
+        return np.zeros((1, nodes))
+
+    def stored_energy(
+        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
+        return stored_energy(self.kernel.address, penetration, self.table(share),
+                             self.penetration_scale)
+
+
+@dataclass(frozen=True)
+class FrictionLaw(NodeLaw):
+    """A friction law; ``kernel`` is a :func:`friction_law` or a :func:`memory_friction_law`."""
+
+    @property
+    def memory(self) -> int:
+        """Number s of internal variables per node; zero for laws without memory."""
+        return 0
+
+    @property
+    def state_scale(self) -> NDArray[np.float64]:
+        """Scale (s,) of each internal variable, for tolerances."""
+        return np.ones(self.memory)
+
+    @property
+    def velocity_scale(self) -> float:
+        """Slip velocity [m/s] over which the force rises, the smallest of all nodes."""
+        raise NotImplementedError
+
+    def stick_velocity(self, nodes: int) -> NDArray[np.float64]:
+        """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
+
+        It is where the friction force is largest for a given normal force; where it has no
+        maximum, and for laws with memory, ten times :attr:`velocity_scale`.
+        """
+        if self.memory:
+            return np.full(nodes, 10.0 * self.velocity_scale)
+        return stick_velocity(self, nodes)
+
+    def sticks(
+        self,
+        slip_velocity: NDArray[np.float64],
+        normal_force: NDArray[np.float64],
+        friction_force: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Whether nodes in contact stick, from their slip velocities, F and R, each (N, n)."""
+        return np.abs(slip_velocity) < self.stick_velocity(slip_velocity.shape[-1])

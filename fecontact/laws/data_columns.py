@@ -1,0 +1,172 @@
+"""Sequences of numbers and two-column files, checked."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def numbers(owner: str, name: str, given: Any, least: int = 0) -> tuple[float, ...]:
+    """A sequence as a tuple of finite floats.
+
+    Raises
+    ------
+    InputError
+        For anything else, with the place of the value, or for fewer than ``least`` values.
+    """
+    try:
+        array = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty((0, 0))
+    if array.ndim != 1 or isinstance(given, str):
+        raise InputError(f"{owner}: {name} = {_short(given)} must be a list of numbers.")
+    if not np.isfinite(array).all():
+        place = int(np.argmin(np.isfinite(array)))
+        raise InputError(f"{owner}: {name}[{place}] = {array[place]} must be finite; repair or "
+                         f"remove that value.")
+    if len(array) < least:
+        raise InputError(f"{owner}: {name} has {len(array)} value{'s' * (len(array) != 1)}; at "
+                         f"least {least} are needed.")
+    return tuple(array.tolist())
+
+
+def require_growing(owner: str, name: str, values: tuple[float, ...]) -> None:
+    """Raise :class:`InputError` at the first value that is not larger than the one before it."""
+    steps = np.diff(values)
+    if (steps <= 0.0).any():
+        place = int(np.argmax(steps <= 0.0)) + 1
+        raise InputError(f"{owner}: {name}[{place}] = {values[place]:g} must be larger than the "
+                         f"value before it, {values[place - 1]:g}; sort the points and remove "
+                         f"repeated ones.")
+
+
+def require_resolved(owner: str, first: str, x: Array, second: str, y: Array) -> None:
+    """Raise :class:`InputError` where curves through the points would leave the floating range.
+
+    That is unless x grows by at least 1e-60 from point to point, and both are within 1e60.
+    """
+    for shown, value in ((first, float(x[0])), (first, float(x[-1])),
+                         (second, float(y[np.argmax(np.abs(y))]))):
+        if not abs(value) <= 1e60:
+            raise InputError(f"{owner}: {shown} reaches {value:g}; its values must be within "
+                             f"-1e60 to 1e60.")
+    steps = np.diff(x)
+    if not steps.min() >= 1e-60:
+        raise InputError(f"{owner}: {first} has points {steps.min():g} apart; their distances "
+                         f"must be at least 1e-60.")
+
+
+def require_closed(owner: str, name: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    """The values with the last equal to the first, which they must be but for rounding."""
+    if abs(values[-1] - values[0]) > 1e-9 * np.ptp(values):
+        raise InputError(f"{owner}: {name} must end as it begins to be repeated, but begins with "
+                         f"{values[0]:g} and ends with {values[-1]:g}; add the first value again "
+                         f"at the end of the period.")
+    return (*values[:-1], values[0])
+
+
+def read_or_given(
+    owner: str, file: str | None, *, least: int, **columns: tuple[float, ...]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Two sequences of the same length, the first growing, from a file or as given.
+
+    Raises
+    ------
+    InputError
+        Unless exactly one of both is there, and can be used.
+    """
+    (first, x), (second, y) = columns.items()
+    if file is not None:
+        if np.size(x) or np.size(y):
+            raise InputError(f"{owner}: file = {file!r} cannot stand beside {first} and {second}; "
+                             f"give the file or the two lists.")
+        x, y = (tuple(column.tolist()) for column in read_columns(owner, file, (first, second)))
+        owner = f"{owner}: file = '{file}'"
+    x, y = numbers(owner, first, x, least), numbers(owner, second, y)
+    if len(x) != len(y):
+        raise InputError(f"{owner}: {second} has {len(y)} values for {len(x)} {first}; give one "
+                         f"for each.")
+    require_growing(owner, first, x)
+    return x, y
+
+
+def read_columns(
+    owner: str, file: str | Path, names: tuple[str, ...], *, first_optional: bool = False
+) -> tuple[Array, ...]:
+    """Columns of numbers from a text or CSV file, one for each name.
+
+    Columns are separated by semicolons, tabs, commas or blanks; where semicolons or tabs
+    separate them, or a number is quoted, a comma in it is a decimal comma. Lines before the first
+    that holds just the numbers are a header; ``#`` starts a comment. Text that is not UTF-8 is
+    taken as Latin-1. With ``first_optional`` the file may lack the first column in all lines.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, with the line that is wrong.
+    """
+    lines = _text(owner, file).splitlines()
+    widths = {len(names), len(names) - first_optional}
+    wanted = f"{' and '.join(names)}{f', or {names[-1]} alone' * first_optional}"
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        words = _words(line.partition("#")[0].strip())
+        values = [value for word in words if (value := _number(word)) is not None]
+        if not words or (not rows and (len(values) < len(words) or len(words) not in widths)):
+            continue
+        widths = {len(rows[0])} if rows else widths
+        if len(words) not in widths or len(values) < len(words) or not np.isfinite(values).all():
+            found = (f"has {len(words)} column{'s' * (len(words) != 1)}"
+                     if len(words) not in widths else "has a value that is no finite number")
+            raise InputError(f"{owner}: file = '{file}', line {number}, {_short(line.strip())}, "
+                             f"{found}; each line must hold {wanted}, like the first.")
+        rows.append(values)
+    if not rows:
+        first = next((line.strip() for line in lines if line.strip()), None)
+        shown = "" if first is None else f"; it begins with {_short(first)}"
+        raise InputError(f"{owner}: file = '{file}' has no line of just the numbers {wanted}"
+                         f"{shown}.")
+    return tuple(np.array(rows).T)
+
+
+def _text(owner: str, file: str | Path) -> str:
+    if not isinstance(file, str | Path):
+        raise InputError(f"{owner}: file = {file!r} must be the name of a file.")
+    try:
+        content = Path(file).read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{owner}: file = '{file}' cannot be read: {reason}.") from None
+    if b"\0" in content:
+        raise InputError(f"{owner}: file = '{file}' cannot be read: it is not a text file.")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+def _words(line: str) -> list[str]:
+    line = re.sub(r'"([^"]*)"', lambda quoted: quoted[1].replace(",", "."), line)
+    for separator in (";", "\t"):
+        if separator in line:
+            words = line.rstrip(separator).split(separator)
+            return [word.strip().replace(",", ".") for word in words]
+    return [word for word in re.split(r"\s*,\s*|\s+", line) if word]
+
+
+def _number(word: str) -> float | None:
+    try:
+        return None if "_" in word else float(word)
+    except ValueError:
+        return None
+
+
+def _short(given: Any) -> str:
+    text = repr(given)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,167 @@
+"""Excitation at B and loads."""
+
+import math
+from dataclasses import dataclass, field
+from numbers import Integral
+from typing import Literal
+
+from fecontact.core.errors import (
+    InputError,
+    choices,
+    nearest,
+    require_finite,
+    require_not_negative,
+)
+from fecontact.laws.signals.harmonic import Harmonic, Signal
+
+_DIRECTIONS = ("x", "y", "moment")
+
+
+@dataclass(frozen=True)
+class Drive:
+    r"""Base excitation of B through springs and absolute dashpots (4.1-8..11).
+
+    .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin w_E t
+
+    acts on the body in -x, and likewise in y; u_x may be another motion. The dashpots feel the
+    absolute velocity of B.
+
+    Parameters
+    ----------
+    stiffness_x, stiffness_y : float
+        c_x, c_y, zero or above [N/m].
+    damping_x, damping_y : float
+        b_x, b_y, zero or above [N s/m].
+    amplitude_x, amplitude_y : float
+        x_0, y_0 [m].
+    angular_frequency : float
+        w_E, zero or above [rad/s].
+    motion_x, motion_y : Signal, optional
+        u_x(t), u_y(t) [m], instead of the harmonic with an amplitude.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, or an amplitude and a motion in the same direction.
+    """
+
+    stiffness_x: float = 0.0
+    stiffness_y: float = 0.0
+    damping_x: float = 0.0
+    damping_y: float = 0.0
+    amplitude_x: float = 0.0
+    amplitude_y: float = 0.0
+    angular_frequency: float = 0.0
+    motion_x: Signal | None = None
+    motion_y: Signal | None = None
+
+    def __post_init__(self) -> None:
+        require_not_negative(
+            "Drive", stiffness_x=self.stiffness_x, stiffness_y=self.stiffness_y,
+            damping_x=self.damping_x, damping_y=self.damping_y,
+            angular_frequency=self.angular_frequency,
+        )
+        require_finite("Drive", amplitude_x=self.amplitude_x, amplitude_y=self.amplitude_y)
+        for axis, motion, amplitude in (("x", self.motion_x, self.amplitude_x),
+                                        ("y", self.motion_y, self.amplitude_y)):
+            if motion is None:
+                continue
+            _require_signal("Drive", f"motion_{axis}", motion)
+            if amplitude != 0.0:
+                raise InputError(f"Drive: amplitude_{axis} = {amplitude!r} cannot stand beside "
+                                 f"motion_{axis}; give one of them.")
+        if self.motion_x is not None and self.motion_y is not None and self.angular_frequency:
+            raise InputError(f"Drive: angular_frequency = {self.angular_frequency!r} has no "
+                             f"effect beside motion_x and motion_y; leave it out.")
+
+    @property
+    def motions(self) -> tuple[Signal, Signal]:
+        """Motions of the springs' far ends in x and y [m]."""
+        w = self.angular_frequency
+        return (self.motion_x or Harmonic(self.amplitude_x, w),
+                self.motion_y or Harmonic(self.amplitude_y, w))
+
+    @property
+    def frequency_hz(self) -> float:
+        """Frequency of the excitation [Hz]; zero where it has none.
+
+        That of a harmonic motion with an amplitude, or else the lower one of the motions that are
+        given; where none is given, w_E / (2 pi).
+        """
+        given = [motion for motion in (self.motion_x, self.motion_y) if motion is not None]
+        harmonic = self.angular_frequency > 0.0 and (self.amplitude_x or self.amplitude_y)
+        if harmonic or not given:
+            return self.angular_frequency / (2.0 * math.pi)
+        return min((motion.frequency_hz for motion in given if motion.frequency_hz is not None),
+                   default=0.0)
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """Force or moment on the body at a point, given in time.
+
+    Parameters
+    ----------
+    point : str or int
+        'B', 'C' or a further named point; a contact node by its number from 0.
+    direction : 'x', 'y' or 'moment'
+        A force along +x, along +y (away from the ground), or a moment counter-clockwise.
+    signal : Signal
+        Its value in time [N], [N m].
+
+    Raises
+    ------
+    InputError
+        For another direction, or what is no point or no signal.
+    """
+
+    point: str | int = "C"
+    direction: Literal["x", "y", "moment"] = "y"
+    signal: Signal = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.point, Integral) and not isinstance(self.point, bool):
+            object.__setattr__(self, "point", int(self.point))
+        elif not isinstance(self.point, str):
+            raise InputError(f"PointLoad: point = {self.point!r} must be the name of a point or "
+                             f"the number of a contact node.")
+        if self.direction not in _DIRECTIONS:
+            raise InputError(f"PointLoad: direction = {self.direction!r} must be one of "
+                             f"{choices(_DIRECTIONS)}"
+                             f"{nearest(str(self.direction), _DIRECTIONS)}.")
+        _require_signal("PointLoad", "signal", self.signal)
+
+
+@dataclass(frozen=True)
+class Load:
+    """Constant load ``[0, -normal, 0]`` on the body at C (4.1-6), and loads given in time.
+
+    Parameters
+    ----------
+    normal : float
+        F_N0, positive towards the ground [N].
+    forces : sequence of PointLoad
+        Further forces and moments.
+
+    Raises
+    ------
+    InputError
+        For values that are not finite, or forces of another kind.
+    """
+
+    normal: float = 0.0
+    forces: tuple[PointLoad, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_finite("Load", normal=self.normal)
+        given = self.forces
+        if not isinstance(given, tuple | list) or not all(
+                isinstance(force, PointLoad) for force in given):
+            raise InputError(f"Load: forces = {given!r} must be a list of PointLoad.")
+        object.__setattr__(self, "forces", tuple(given))
+
+
+def _require_signal(owner: str, name: str, given: object) -> None:
+    if not isinstance(given, Signal):
+        raise InputError(f"{owner}: {name} = {given!r} must be a Signal, such as "
+                         f"Harmonic(amplitude, angular_frequency).")

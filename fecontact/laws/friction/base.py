@@ -1,0 +1,129 @@
+"""Base classes of friction laws: without memory, smoothed, with memory."""
+
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.laws import base
+from fecontact.laws.base import NodeLaw, Positive
+
+Array = NDArray[np.float64]
+
+Smoothing = Literal["arctan", "tanh", "square-root"]
+
+
+class MemorylessFriction(base.FrictionLaw):
+    """A friction law ``f(v, F, p)``, with the usual questions to its curve R/F over v.
+
+    The answers come from the compiled law itself; see :mod:`fecontact.laws.friction_curve`, whose
+    functions of the same names take any law without memory.
+    """
+
+    def coefficient(self, velocity: Array | float) -> Array:
+        """R/F at slip velocities [m/s], with their sign; (..., n) with parameters per node."""
+        from fecontact.laws import friction_curve
+
+        return friction_curve.coefficient(self, velocity)
+
+    def slope(self, velocity: Array | float) -> Array:
+        """d(R/F)/dv [s/m] at slip velocities [m/s]; negative where steady sliding is excited."""
+        from fecontact.laws import friction_curve
+
+        return friction_curve.slope(self, velocity)
+
+    def largest_coefficient(self) -> tuple[Array, Array]:
+        """Largest maximum (n,) of R/F and its slip velocity (n,) [m/s].
+
+        Without a maximum the velocity is infinite and the coefficient the value that R/F tends to.
+        """
+        from fecontact.laws import friction_curve
+
+        return friction_curve.largest_coefficient(self)
+
+    def velocity_of_minimum(self) -> Array:
+        """Smallest slip velocity (n,) at which R/F has a minimum [m/s], infinite without one."""
+        from fecontact.laws import friction_curve
+
+        return friction_curve.velocity_of_minimum(self)
+
+
+class SmoothedFriction(MemorylessFriction):
+    r"""Friction R = F (mu(\|v\|) s(v) + viscous term), with the sign of v smoothed to s(v).
+
+    Subclasses have the fields ``smoothing_slope``, k_s > 0 [s/m], and ``smoothing``. All
+    smoothings rise with the same slope ``2 k_s / pi`` at rest and tend to 1:
+
+    ===============  ===========================================
+    smoothing        s(v), with ``x = 2 k_s v / pi``
+    ===============  ===========================================
+    ``arctan``       ``(2 / pi) arctan(k_s v)`` (4.1-23)
+    ``tanh``         ``tanh(x)``
+    ``square-root``  ``x / sqrt(1 + x^2)``: ``v / sqrt(v^2 + eps^2)`` with
+                     ``eps = pi / (2 k_s)``
+    ===============  ===========================================
+
+    At v = 10 / k_s they have reached 0.937, 1 - 6e-6 and 0.988: the slow rise of the arctan is
+    a creep that the others have less of.
+    """
+
+    choices: ClassVar = {"smoothing": get_args(Smoothing)}
+
+    smoothing_slope: Positive
+
+    @property
+    def velocity_scale(self) -> float:
+        """Width 1/k_s of the smoothing [m/s], the smallest of all nodes."""
+        return 1.0 / float(np.max(self.smoothing_slope))
+
+
+class MemoryFriction(base.FrictionLaw):
+    """A friction law ``f(v, F, z, p, force, rates)`` with internal variables z.
+
+    Subclasses give :attr:`state_scale`, :meth:`steady_coefficient` and, where there is more than
+    one internal variable, :attr:`memory`.
+    """
+
+    @property
+    def memory(self) -> int:
+        """Number s of internal variables per node: one, if a law does not say otherwise."""
+        return 1
+
+    @property
+    def velocity_scale(self) -> float:
+        """Slip velocity [m/s] that moves the first internal variable by its scale in 0.1 s.
+
+        Friction with memory rises with displacement, not with velocity: velocities well below
+        this one do not change it over the time of some oscillations.
+        """
+        return 10.0 * float(self.state_scale[0])
+
+    def steady_coefficient(self, velocity: Array | float) -> Array:
+        """R/F of sliding at constant slip velocity [m/s], with its sign; for v = 0 that of v > 0.
+
+        With parameters per node, (n,) of them, velocities broadcast against (n,).
+        """
+        raise NotImplementedError
+
+    def stick_velocity(self, nodes: int) -> Array:
+        """Slip velocity (n,) of the size at which :meth:`sticks` may change its answer [m/s].
+
+        Whether a node sticks depends on its force, not on its slip velocity alone.
+        """
+        return np.full(nodes, self.velocity_scale)
+
+    def sticks(self, slip_velocity: Array, normal_force: Array, friction_force: Array
+               ) -> NDArray[np.bool_]:
+        """Whether nodes in contact stick: the size of R is below 0.95 of that of steady sliding."""
+        steady = np.abs(self.steady_coefficient(slip_velocity)) * normal_force
+        return np.asarray(np.abs(friction_force) < 0.95 * steady)
+
+
+def require_at_least(law: NodeLaw, larger: str, smaller: str) -> None:
+    """Raise :class:`InputError` if a parameter is smaller than another one at any node."""
+    high, low = getattr(law, larger), getattr(law, smaller)
+    counts = {len(value) for value in (high, low) if isinstance(value, tuple)}
+    if len(counts) < 2 and np.any(np.asarray(high) < np.asarray(low)):
+        raise InputError(f"{type(law).__name__}: {larger} = {high!r} must be at least "
+                         f"{smaller} = {low!r}.")

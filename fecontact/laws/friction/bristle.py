@@ -1,0 +1,208 @@
+"""Friction laws with memory: bristles and hysteresis."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.laws.base import NotNegative, OneOrAbove, PerNode, Positive, Range
+from fecontact.laws.friction import memory_kernels
+from fecontact.laws.friction.base import MemoryFriction, require_at_least
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DahlFriction(MemoryFriction):
+    r"""Dahl's law: a spring whose stiffness falls to zero as friction reaches mu F.
+
+    .. math::
+
+        R = F \sigma z, \qquad
+        z' = v\, \left|1 - \tfrac{\sigma z}{\mu} \operatorname{sgn} v\right|^{i - 1}
+        \left(1 - \tfrac{\sigma z}{\mu} \operatorname{sgn} v\right)
+
+    z is a deflection [m] that does not depend on the normal force F [N], at most mu / sigma in
+    size; the stiffness of the contact before it slides, sigma F [N/m], is proportional to F. v is
+    the slip velocity [m/s]. While F = 0, z falls back to zero.
+
+    Parameters
+    ----------
+    friction_coefficient : float or (n,) sequence
+        mu, positive.
+    presliding_stiffness : float or (n,) sequence
+        sigma, positive: stiffness at R = 0 per normal force [1/m].
+    exponent : float or (n,) sequence
+        i, one or above: 1 is an exponential approach to mu F.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    P. R. Dahl, A solid friction model, The Aerospace Corporation, TOR-0158(3107-18)-1 (1968).
+    """
+
+    kernel: ClassVar = memory_kernels.dahl
+
+    friction_coefficient: Positive = 0.55
+    presliding_stiffness: Positive = 1e5
+    exponent: OneOrAbove = 1.0
+
+    @property
+    def state_scale(self) -> Array:
+        """Deflection mu / sigma at which the contact slides [m], the smallest of all nodes."""
+        return np.array([np.min(np.divide(self.friction_coefficient, self.presliding_stiffness))])
+
+    def steady_coefficient(self, velocity: Array | float) -> Array:
+        """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
+        return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
+
+
+@dataclass(frozen=True)
+class LuGreFriction(MemoryFriction):
+    r"""LuGre's law: bristles that bend, are dragged along and slide.
+
+    .. math::
+
+        R = F\, [\sigma_0 z + \sigma_1(v)\, z' + \sigma_2 v], \qquad
+        z' = v - \frac{\sigma_0 |v|}{g(v)} z
+
+    .. math::
+
+        g(v) = \mu_k + (\mu_s - \mu_k)\, e^{-(|v|/v_s)^a}, \qquad
+        \sigma_1(v) = \sigma_1 e^{-(\lambda_1 v)^2}
+
+    z is the deflection of the bristles [m], v the slip velocity [m/s], F the normal force [N], to
+    which stiffness and damping are proportional. Sliding steadily ``R = F [g(v) sgn v + sigma_2
+    v]``. While F = 0, z falls back to zero.
+
+    Friction takes energy out of every motion if ``sigma_2 >= sigma_1 (mu_s / mu_k - 1)``, or if
+    ``sigma_1 <= 9.3 mu_k lambda_1``; otherwise as long as ``sigma_1 |v| <= 4 mu_k``.
+
+    Parameters
+    ----------
+    static_coefficient : float or (n,) sequence
+        mu_s, at least mu_k.
+    kinetic_coefficient : float or (n,) sequence
+        mu_k, positive.
+    stribeck_velocity : float or (n,) sequence
+        v_s, positive [m/s].
+    stribeck_exponent : float or (n,) sequence
+        a, positive; mostly 2 or 1.
+    bristle_stiffness : float or (n,) sequence
+        sigma_0, positive: stiffness at rest per normal force [1/m].
+    bristle_damping : float or (n,) sequence
+        sigma_1, zero or above: damping at rest per normal force [s/m].
+    viscous_coefficient : float or (n,) sequence
+        sigma_2, zero or above [s/m].
+    damping_decay : float or (n,) sequence
+        lambda_1, zero or above: 1 / lambda_1 is the velocity at which bristle damping has fallen
+        to 1/e; zero keeps it constant [s/m].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A new model for control of systems
+    with friction, IEEE Transactions on Automatic Control 40 (1995). N. Barahanov, R. Ortega,
+    Necessary and sufficient conditions for passivity of the LuGre friction model, ibid. 45 (2000).
+    """
+
+    kernel: ClassVar = memory_kernels.lugre
+
+    static_coefficient: PerNode = 0.8
+    kinetic_coefficient: Positive = 0.55
+    stribeck_velocity: Positive = 1e-3
+    stribeck_exponent: Positive = 2.0
+    bristle_stiffness: Positive = 1e5
+    bristle_damping: NotNegative = 0.0
+    viscous_coefficient: NotNegative = 0.0
+    damping_decay: NotNegative = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_at_least(self, "static_coefficient", "kinetic_coefficient")
+
+    @property
+    def state_scale(self) -> Array:
+        """Deflection mu_k / sigma_0 of sliding bristles [m], the smallest of all nodes."""
+        return np.array([np.min(np.divide(self.kinetic_coefficient, self.bristle_stiffness))])
+
+    @property
+    def velocity_scale(self) -> float:
+        """Stribeck velocity, or that of :class:`MemoryFriction` where it is less [m/s]."""
+        return min(super().velocity_scale, float(np.min(self.stribeck_velocity)))
+
+    def steady_coefficient(self, velocity: Array | float) -> Array:
+        """g(v) sgn(v) + sigma_2 v; see :class:`MemoryFriction`."""
+        v = np.asarray(velocity, dtype=float)
+        kinetic = np.asarray(self.kinetic_coefficient)
+        x = (np.abs(v) / self.stribeck_velocity) ** self.stribeck_exponent
+        g = kinetic + (np.asarray(self.static_coefficient) - kinetic) * np.exp(-x)
+        return np.asarray(np.where(v < 0.0, -g, g) + v * self.viscous_coefficient)
+
+
+@dataclass(frozen=True)
+class BoucWenFriction(MemoryFriction):
+    r"""Bouc-Wen hysteresis between -mu F and mu F.
+
+    .. math::
+
+        R = \mu F z, \qquad
+        z' = \frac{1}{u_s} \left[v - \beta\, |v|\, |z|^{n-1} z - (1 - \beta)\, v\, |z|^n\right]
+
+    z is dimensionless, at most 1 in size; the stiffness of the contact before it slides,
+    ``mu F / u_s`` [N/m], is proportional to the normal force F [N]. v is the slip velocity [m/s].
+    While F = 0, z falls back to zero.
+
+    Parameters
+    ----------
+    friction_coefficient : float or (n,) sequence
+        mu, zero or above.
+    yield_displacement : float or (n,) sequence
+        u_s, positive: deflection at which the initial stiffness would reach mu F [m].
+    beta : float or (n,) sequence
+        At least 1/2, which unloads with the initial stiffness to R = 0; above it loops are wider.
+        Below it loops could give energy off.
+    exponent : float or (n,) sequence
+        n, one or above: sharpness of the bend into sliding.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    Y.-K. Wen, Method for random vibration of hysteretic systems, Journal of the Engineering
+    Mechanics Division 102 (1976); in the normal form of F. Ikhouane, J. Rodellar, Systems with
+    Hysteresis (2007), with beta + gamma = 1.
+    """
+
+    kernel: ClassVar = memory_kernels.bouc_wen
+
+    friction_coefficient: NotNegative = 0.55
+    yield_displacement: Positive = 5e-6
+    beta: Annotated[PerNode, Range("0.5 or above", lambda x: x >= 0.5)] = 0.5
+    exponent: OneOrAbove = 1.0
+
+    @property
+    def state_scale(self) -> Array:
+        """One: the internal variable of sliding."""
+        return np.ones(1)
+
+    @property
+    def velocity_scale(self) -> float:
+        """Slip velocity [m/s] that passes the smallest yield displacement in 0.1 s."""
+        return 10.0 * float(np.min(self.yield_displacement))
+
+    def steady_coefficient(self, velocity: Array | float) -> Array:
+        """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
+        return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)

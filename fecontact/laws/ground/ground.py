@@ -1,0 +1,180 @@
+"""The moving ground."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.compiled import CompiledLaw
+from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
+from fecontact.laws.ground.motion import (
+    GroundMotion,
+    HarmonicSpeed,
+    SpeedRamp,
+    constant_speed,
+)
+from fecontact.laws.ground.profile import Profile
+from fecontact.laws.ground.profiles import Flat, Sine
+
+Array = NDArray[np.float64]
+
+__all__ = ["Ground", "GroundMotion", "HarmonicSpeed", "SpeedRamp"]
+
+
+@dataclass(frozen=True)
+class Ground:
+    r"""Ground that moves in +x, by default at constant speed V and with a sine waviness (4.3-1).
+
+    .. math:: y_R(\xi) = y_A \sin(2 \pi \xi / \lambda_w), \qquad \xi = X + x - \int_0^t V\,dt
+
+    is its height [m] below a node of reference abscissa X displaced by x; another profile and a
+    speed that changes in time may be given. The normal force stays vertical; keep the slope
+    ``2 pi amplitude / wavelength`` well below one.
+
+    Parameters
+    ----------
+    speed : float
+        V, positive in +x [m/s].
+    amplitude : float
+        y_A, zero or above; zero is flat ground [m].
+    wavelength : float
+        lambda_w, positive [m].
+    profile : Profile, optional
+        Heights [m] instead of the sine.
+    motion : GroundMotion, optional
+        How the speed differs from V in time.
+    friction_variation : Profile, optional
+        s(xi): friction is that of the normal force times 1 + s, which must not be negative.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, an amplitude beside a profile, or a variation that makes
+        friction negative.
+    """
+
+    speed: float = 0.0
+    amplitude: float = 0.0
+    wavelength: float = 2.5e-3
+    profile: Profile | None = None
+    motion: GroundMotion | None = None
+    friction_variation: Profile | None = None
+
+    def __post_init__(self) -> None:
+        require_finite("Ground", speed=self.speed)
+        require_not_negative("Ground", amplitude=self.amplitude)
+        require_positive("Ground", wavelength=self.wavelength)
+        for name, kind in (("profile", Profile), ("motion", GroundMotion),
+                           ("friction_variation", Profile)):
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, kind):
+                raise InputError(f"Ground: {name} = {given!r} must be a {kind.__name__}.")
+        if self.profile is not None and self.amplitude != 0.0:
+            raise InputError(f"Ground: amplitude = {self.amplitude!r} cannot stand beside profile; "
+                             f"give one of them.")
+        self._require_friction()
+
+    def _require_friction(self) -> None:
+        variation = self.friction_variation
+        if variation is None:
+            return
+        low = variation.height_range[0]
+        if low < -1.0:
+            raise InputError(f"Ground: friction_variation falls to {low:.4g} and would make "
+                             f"friction negative; its lowest value must be -1 or above.")
+        plain, raised = (variation.kernel.python(0.0, p)[0]
+                         for p in (variation.parameters(), self.friction_scale_parameters()))
+        if not math.isclose(raised - plain, 1.0, abs_tol=1e-9):
+            raise InputError(f"Ground: friction_variation = {variation!r} cannot serve: the kernel "
+                             f"of a profile must add its first parameter to the height.")
+
+    @cached_property
+    def _shape(self) -> Profile:
+        if self.profile is not None:
+            return self.profile
+        return Sine(self.amplitude, self.wavelength) if self.amplitude > 0.0 else Flat()
+
+    @property
+    def wavy(self) -> bool:
+        """Whether the height is not the same everywhere."""
+        return not self._shape.flat
+
+    @property
+    def steepest_slope(self) -> float:
+        """Largest magnitude of the slope of the profile, dimensionless."""
+        return self._shape.steepest_slope
+
+    @property
+    def height_range(self) -> tuple[float, float]:
+        """Smallest and largest height of the profile [m]."""
+        return self._shape.height_range
+
+    @property
+    def shortest_wavelength(self) -> float | None:
+        """Shortest wave of the profile and of the variation of friction [m]; None without."""
+        parts = [self._shape, *([self.friction_variation] if self.friction_variation else [])]
+        waves = [part.shortest_wavelength for part in parts]
+        return min((wave for wave in waves if wave is not None), default=None)
+
+    def height(self, abscissa: ArrayLike, time: float = 0.0) -> Array:
+        """Height [m] at abscissae of the inertial frame [m] at a time [s]."""
+        return self._shape.height(np.asarray(abscissa, dtype=float) - self.travel(time))
+
+    def travel(self, time: float) -> float:
+        """Travel [m] since t = 0 at a time [s]."""
+        return float(self.motion_kernel.python(float(time), self.motion_parameters())[0])
+
+    def velocity(self, time: float) -> float:
+        """Speed V, positive in +x, at a time [m/s]."""
+        return float(self.motion_kernel.python(float(time), self.motion_parameters())[1])
+
+    def largest_speed(self, t0: float, t1: float) -> float:
+        """Largest magnitude of the speed from t0 to t1 [m/s]."""
+        if self.motion is None:
+            return abs(float(self.speed))
+        return self.motion.largest_speed(self.speed, t0, t1)
+
+    def largest_acceleration(self, t0: float, t1: float) -> float:
+        """Largest magnitude of the rate of the speed from t0 to t1 [m/s2]."""
+        if self.motion is None:
+            return 0.0
+        return self.motion.largest_acceleration(self.speed, t0, t1)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Times between t0 and t1 at which the speed has kinks, ascending [s]."""
+        return () if self.motion is None else self.motion.breakpoints(t0, t1)
+
+    @property
+    def profile_kernel(self) -> CompiledLaw:
+        """Compiled profile."""
+        return self._shape.kernel
+
+    def profile_parameters(self) -> Array:
+        """Parameters of the compiled profile."""
+        return self._shape.parameters()
+
+    @property
+    def motion_kernel(self) -> CompiledLaw:
+        """Compiled motion: travel and speed."""
+        return constant_speed if self.motion is None else self.motion.kernel
+
+    def motion_parameters(self) -> Array:
+        """Parameters of the compiled motion."""
+        if self.motion is None:
+            return np.array([self.speed], dtype=float)
+        return self.motion.parameters(self.speed)
+
+    @property
+    def friction_scale_kernel(self) -> CompiledLaw | None:
+        """Compiled factor 1 + s of friction along the ground; None where it is one."""
+        return None if self.friction_variation is None else self.friction_variation.kernel
+
+    def friction_scale_parameters(self) -> Array:
+        """Parameters of the compiled factor."""
+        if self.friction_variation is None:
+            return np.zeros(1)
+        parameters = self.friction_variation.parameters()
+        parameters[0] += 1.0
+        return parameters

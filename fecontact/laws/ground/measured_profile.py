@@ -1,0 +1,140 @@
+"""Measured profiles of the ground."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
+from fecontact.laws.ground.profile import Profile
+from fecontact.laws.piecewise_polynomial import (
+    curve_range,
+    equivalent_period,
+    piecewise,
+    piecewise_parameters,
+)
+from fecontact.laws.signatures import ground_profile
+
+Array = NDArray[np.float64]
+
+
+@ground_profile
+def _trace(xi, p):  # type: ignore[no-untyped-def]
+    height, slope, curvature = piecewise(xi, p, 1)
+    return p[0] + height, slope, curvature
+
+
+@dataclass(frozen=True)
+class Trace(Profile):
+    """A measured height trace: the cubic spline through its points.
+
+    Slope and curvature are continuous everywhere. A trace that is not periodic has no curvature
+    at its ends; beyond each, within twice the distance of its last two points, the slope falls
+    smoothly to zero, and from there on the height is constant.
+
+    Parameters
+    ----------
+    abscissa : (N,) sequence
+        Places along the ground, growing.
+    heights : (N,) sequence
+        Heights there, positive out of the ground; of a periodic trace the last is the first.
+    file : str, optional
+        A text or CSV file with two columns, abscissae and heights, instead of both; lines before
+        the first of two numbers are a header. It is read once; afterwards ``file`` is None.
+    periodic : bool
+        Whether the trace is repeated.
+    remove_mean : bool
+        Whether heights count from their mean along the trace.
+    scale, abscissa_scale : float
+        Factors from the units of the heights and of the abscissa to m; for a variation of
+        friction, ``scale`` turns the heights into parts of the friction force.
+
+    Raises
+    ------
+    InputError
+        For a trace or file that cannot be used, with the place.
+    """
+
+    kernel: ClassVar = _trace
+
+    abscissa: tuple[float, ...] = ()
+    heights: tuple[float, ...] = ()
+    file: str | None = None
+    periodic: bool = False
+    remove_mean: bool = False
+    scale: float = 1.0
+    abscissa_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_finite("Trace", scale=self.scale)
+        require_positive("Trace", abscissa_scale=self.abscissa_scale)
+        for name in ("periodic", "remove_mean"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError(f"Trace: {name} = {getattr(self, name)!r} must be true or false.")
+        x, y = read_or_given("Trace", self.file, abscissa=self.abscissa, heights=self.heights,
+                             least=3)
+        if self.periodic:
+            y = require_closed("Trace", "heights", y)
+        for name, value in (("abscissa", x), ("heights", y), ("file", None)):
+            object.__setattr__(self, name, value)
+        places, heights = self._points
+        require_resolved("Trace", f"abscissa times abscissa_scale = {self.abscissa_scale:g}",
+                         places, f"heights times scale = {self.scale:g}", heights)
+
+    @property
+    def _points(self) -> tuple[Array, Array]:
+        """Places and heights in the unit of length of the system."""
+        with np.errstate(over="ignore"):
+            return (self.abscissa_scale * np.array(self.abscissa),
+                    self.scale * np.array(self.heights))
+
+    @cached_property
+    def _curve(self) -> Any:
+        from scipy.interpolate import CubicSpline, PPoly
+
+        x, y = self._points
+        spline = CubicSpline(x, y, bc_type="periodic" if self.periodic else "natural")
+        if self.remove_mean:
+            spline.c[3] -= float(spline.integrate(x[0], x[-1])) / (x[-1] - x[0])
+        if self.periodic:
+            return spline
+        # Beyond an end the curvature falls linearly to -slope / h at h, and to zero at 2 h.
+        before, after = x[1] - x[0], x[-1] - x[-2]
+        (low, high), (rise, fall) = spline(x[[0, -1]]), spline(x[[0, -1]], 1)
+        knots = np.concatenate([x[0] - before * np.array([2.0, 1.0]), x,
+                                x[-1] + after * np.array([1.0, 2.0])])
+        ends = [
+            [rise / (6.0 * before**2), 0.0, 0.0, low - rise * before],
+            [-rise / (6.0 * before**2), rise / (2.0 * before), 0.5 * rise,
+             low - 5.0 / 6.0 * rise * before],
+            [-fall / (6.0 * after**2), 0.0, fall, high],
+            [fall / (6.0 * after**2), -fall / (2.0 * after), 0.5 * fall,
+             high + 5.0 / 6.0 * fall * after],
+        ]
+        columns = np.array(ends).T
+        return PPoly(np.hstack([columns[:, :2], spline.c, columns[:, 2:]]), knots)
+
+    def parameters(self) -> Array:
+        """Level, number of pieces, whether they repeat, the knots and the coefficients."""
+        return np.concatenate([[0.0], piecewise_parameters(self._curve, self.periodic)])
+
+    @cached_property
+    def steepest_slope(self) -> float:
+        """Largest magnitude of the slope."""
+        return max(abs(value) for value in curve_range(self._curve.derivative()))
+
+    @cached_property
+    def height_range(self) -> tuple[float, float]:
+        """Smallest and largest height [m], also between the points."""
+        return curve_range(self._curve)
+
+    @cached_property
+    def shortest_wavelength(self) -> float | None:
+        """Wavelength of the sine with the same range and steepest slope [m]; None when flat.
+
+        Not less than twice the shortest distance of points.
+        """
+        return equivalent_period(self._curve)

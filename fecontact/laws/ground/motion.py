@@ -1,0 +1,189 @@
+"""Speeds of the ground that change in time."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import CompiledLaw
+from fecontact.core.errors import require_finite, require_positive
+from fecontact.laws.signals.base import between
+from fecontact.laws.signatures import signal
+
+Array = NDArray[np.float64]
+
+# Samples of a speed that is known by its values alone.
+_SAMPLES = 10_001
+
+
+@dataclass(frozen=True)
+class GroundMotion:
+    """Base class of motions of the ground: a frozen dataclass with a compiled ``signal``.
+
+    Its value is the travel [m], zero at t = 0, its rate the speed [m/s].
+    """
+
+    kernel: ClassVar[CompiledLaw]
+
+    def parameters(self, speed: float) -> Array:
+        """Parameters of the kernel, for the ground's constant speed [m/s]."""
+        raise NotImplementedError
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Times between t0 and t1 at which the speed has kinks, ascending [s]."""
+        return ()
+
+    @property
+    def shortest_period(self) -> float | None:
+        """Shortest time in which the speed goes up and down [s], for a limit of the step; or None.
+
+        Between breakpoints: steps end there.
+        """
+        return None
+
+    def largest_speed(self, speed: float, t0: float, t1: float) -> float:
+        """Largest magnitude of the speed from t0 to t1, or a bound of it [m/s]."""
+        raise NotImplementedError
+
+    def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
+        """Largest magnitude of the rate of the speed from t0 to t1, or a bound of it [m/s2].
+
+        Here one and a half times the largest change between samples.
+        """
+        p = self.parameters(speed)
+        times = np.linspace(t0, t1, _SAMPLES)
+        speeds = np.array([self.kernel.python(t, p)[1] for t in times])
+        return 1.5 * float(np.abs(np.diff(speeds)).max()) * (_SAMPLES - 1) / (t1 - t0)
+
+
+@signal
+def constant_speed(t, p):  # type: ignore[no-untyped-def]
+    """Travel and speed for p = [speed]."""
+    return p[0] * t, p[0]
+
+
+@signal
+def _harmonic_speed(t, p):  # type: ignore[no-untyped-def]
+    speed, amplitude, w, phase = p[0], p[1], p[2], p[3]
+    # cos(phase) - cos(w t + phase), without their cancellation.
+    travel = 2.0 * math.sin(0.5 * w * t + phase) * math.sin(0.5 * w * t)
+    return speed * t + amplitude / w * travel, speed + amplitude * math.sin(w * t + phase)
+
+
+@dataclass(frozen=True)
+class HarmonicSpeed(GroundMotion):
+    r"""Ground whose speed oscillates about the constant one.
+
+    .. math:: V(t) = V + A \sin(w t + \varphi)
+
+    The travel is the exact integral.
+
+    Parameters
+    ----------
+    amplitude : float
+        A [m/s].
+    angular_frequency : float
+        w, positive [rad/s].
+    phase : float
+        phi [rad].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _harmonic_speed
+
+    amplitude: float
+    angular_frequency: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite("HarmonicSpeed", amplitude=self.amplitude, phase=self.phase)
+        require_positive("HarmonicSpeed", angular_frequency=self.angular_frequency)
+
+    def parameters(self, speed: float) -> Array:
+        """V, A, w and phi."""
+        return np.array([speed, self.amplitude, self.angular_frequency, self.phase], dtype=float)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """2 pi / w [s]."""
+        return 2.0 * math.pi / self.angular_frequency
+
+    def largest_speed(self, speed: float, t0: float, t1: float) -> float:
+        """Largest magnitude of the speed from t0 to t1 [m/s]."""
+        low, high = (self.angular_frequency * t + self.phase for t in (t0, t1))
+        first = math.ceil(low / math.pi - 0.5)
+        last = min(math.floor(high / math.pi - 0.5), first + 1)
+        angles = [low, high, *(math.pi * (k + 0.5) for k in range(first, last + 1))]
+        return max(abs(speed + self.amplitude * math.sin(angle)) for angle in angles)
+
+    def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
+        """A w [m/s2]."""
+        return abs(self.amplitude) * self.angular_frequency
+
+
+@signal
+def _ramp(t, p):  # type: ignore[no-untyped-def]
+    speed, change, start, duration = p[0], p[1], p[2], p[3]
+    s = min(max((t - start) / duration, 0.0), 1.0)
+    after = max(t - start - duration, 0.0)
+    travel = speed * t + change * (0.5 * duration * s * s + after) - p[4]
+    return travel, speed + change * s
+
+
+@dataclass(frozen=True)
+class SpeedRamp(GroundMotion):
+    r"""Ground whose speed goes linearly from the constant one to another, and stays there.
+
+    .. math:: V(t) = V + (V_1 - V) \frac{t - t_1}{T}, \qquad t_1 \le t \le t_1 + T
+
+    The speed is continuous, with a kink at both ends; the travel is the exact integral.
+
+    Parameters
+    ----------
+    end_speed : float
+        V_1 [m/s].
+    start : float
+        t_1 [s].
+    duration : float
+        T, positive [s].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _ramp
+
+    end_speed: float
+    start: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        require_finite("SpeedRamp", end_speed=self.end_speed, start=self.start)
+        require_positive("SpeedRamp", duration=self.duration)
+
+    def parameters(self, speed: float) -> Array:
+        """V, V_1 - V, t_1, T and the travel that is to be zero at t = 0."""
+        p = np.array([speed, self.end_speed - speed, self.start, self.duration, 0.0])
+        p[4] = self.kernel.python(0.0, p)[0]
+        return p
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Start and end of the ramp, as far as they lie between t0 and t1 [s]."""
+        return between((self.start, self.start + self.duration), t0, t1)
+
+    def largest_speed(self, speed: float, t0: float, t1: float) -> float:
+        """Largest magnitude of the speed from t0 to t1 [m/s]."""
+        p = self.parameters(speed)
+        return max(abs(float(self.kernel.python(t, p)[1])) for t in (t0, t1))
+
+    def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
+        """That of the ramp [m/s2]."""
+        return abs(self.end_speed - speed) / self.duration

@@ -1,0 +1,66 @@
+"""What a profile is: the base class of all profiles of the ground."""
+
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.compiled import CompiledLaw, i8, kernel, matrix, vector
+from fecontact.laws.signatures import ground_at
+
+Array = NDArray[np.float64]
+
+
+@kernel(types.void(i8, vector, vector, matrix))
+def _shape(address, xi, p, out):  # type: ignore[no-untyped-def]
+    for k in range(len(xi)):
+        out[k, 0], out[k, 1], out[k, 2] = ground_at(address)(xi[k], p)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Base class of profiles y(xi): a frozen dataclass with a compiled ``ground_profile``.
+
+    The height, its slope and its curvature are continuous. The first parameter of every kernel
+    is a level, which it adds to the height: zero for heights, one for a factor 1 + y of the
+    friction force. A profile of one's own sets ``kernel`` and overrides what is not as here.
+    """
+
+    kernel: ClassVar[CompiledLaw]
+
+    def parameters(self) -> Array:
+        """Parameters of the kernel: the level 0, then, here, the fields in their order."""
+        return np.array([0.0, *(getattr(self, entry.name) for entry in fields(self))])
+
+    @property
+    def steepest_slope(self) -> float:
+        """Largest magnitude of the slope y'."""
+        raise NotImplementedError
+
+    @property
+    def height_range(self) -> tuple[float, float]:
+        """Smallest and largest height."""
+        raise NotImplementedError
+
+    @property
+    def shortest_wavelength(self) -> float | None:
+        """Shortest length over which it goes up and down [m]; None when flat."""
+        raise NotImplementedError
+
+    @property
+    def flat(self) -> bool:
+        """Whether the height is the same everywhere."""
+        return self.shortest_wavelength is None
+
+    def shape(self, xi: ArrayLike) -> Array:
+        """Heights, slopes and curvatures (..., 3) at abscissae (...,) [m]."""
+        places = np.asarray(xi, dtype=float)
+        out = np.empty((places.size, 3))
+        _shape(self.kernel.address, places.ravel(), self.parameters(), out)
+        return out.reshape(*places.shape, 3)
+
+    def height(self, xi: ArrayLike) -> Array:
+        """Heights (...,) at abscissae (...,) of the ground's own frame [m]."""
+        return self.shape(xi)[..., 0].copy()

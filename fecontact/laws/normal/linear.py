@@ -1,0 +1,174 @@
+"""Linear contact, stops on both sides, and a prescribed normal force."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, Positive
+from fecontact.laws.signatures import normal_law
+
+
+@normal_law
+def _linear(u, v, p):  # type: ignore[no-untyped-def]
+    stiffness, damping = p[0], p[1]
+    force = stiffness * u + damping * v
+    if u <= 0.0 or force <= 0.0:
+        return 0.0, 0.0, 0.0
+    return force, stiffness, damping
+
+
+@dataclass(frozen=True)
+class LinearContact(NormalLaw):
+    r"""Smooth surface on a spring with a parallel dashpot.
+
+    .. math:: F = \max(0,\ c u + d v), \qquad u > 0
+
+    u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
+    It is the rough surface in the limit R_Z -> 0. With damping the force jumps at first contact;
+    a rough surface has no such jump.
+
+    Parameters
+    ----------
+    stiffness : float or (n,) sequence
+        c of the whole face, or of each node, positive [N/m].
+    damping : float or (n,) sequence
+        d of the whole face, or of each node, zero or above [N s/m].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _linear
+    extensive: ClassVar = frozenset({"stiffness", "damping"})
+
+    stiffness: Positive
+    damping: NotNegative = 0.0
+
+    @property
+    def penetration_scale(self) -> float:
+        """Penetration under 1 N on the whole face, or on each node [m], the smallest of all."""
+        return 1.0 / float(np.max(self.stiffness))
+
+    def stored_energy(
+        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
+        return np.asarray(0.5 * self.table(share)[:, 0] * np.maximum(penetration, 0.0) ** 2)
+
+
+@normal_law
+def _two_sided(u, v, p):  # type: ignore[no-untyped-def]
+    stiffness, clearance, exponent, factor = p[0], p[1], p[2], p[3]
+    if u > 0.0:
+        side, depth = 1.0, u
+    elif u < -clearance:
+        side, depth = -1.0, -u - clearance
+    else:
+        return 0.0, 0.0, 0.0
+    damped = 1.0 + factor * side * v
+    if damped <= 0.0:
+        return 0.0, 0.0, 0.0
+    lower = 1.0 if exponent == 1.0 else depth ** (exponent - 1.0)
+    elastic = stiffness * lower * depth
+    return side * elastic * damped, exponent * stiffness * lower * damped, elastic * factor
+
+
+@dataclass(frozen=True)
+class TwoSidedStop(NormalLaw):
+    r"""Play between a stop below, at the ground, and one above.
+
+    .. math::
+
+        F = K u^n \max(0,\ 1 + \chi v) \quad (u > 0), \qquad
+        F = -K w^n \max(0,\ 1 - \chi v), \quad w = -u - s \quad (u < -s)
+
+    u is the penetration into the lower stop [m], v its rate [m/s], s the clearance; F [N] pushes
+    the body up, F > 0, at the lower and down, F < 0, at the upper stop, and neither pulls. Within
+    the clearance the body is free. n = 1 are linear springs.
+
+    Parameters
+    ----------
+    stiffness : float or (n,) sequence
+        K of each stop over the whole face, or at each node, positive [N/m^n].
+    clearance : float or (n,) sequence
+        s: way between touching the one and the other stop, zero or above [m].
+    exponent : float or (n,) sequence
+        n, one or above.
+    damping_factor : float or (n,) sequence
+        chi, zero or above [s/m].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _two_sided
+    extensive: ClassVar = frozenset({"stiffness"})
+
+    stiffness: Positive
+    clearance: NotNegative
+    exponent: OneOrAbove = 1.0
+    damping_factor: NotNegative = 0.0
+
+    @property
+    def penetration_scale(self) -> float:
+        """Penetration under 1 N on the whole face, or on each node [m], the smallest of all."""
+        stiffness, exponent = np.asarray(self.stiffness), np.asarray(self.exponent)
+        return float(np.min(stiffness ** (-1.0 / exponent)))
+
+    def onsets(self, nodes: int) -> NDArray[np.float64]:
+        """Zero and minus the clearance (2, n) [m]."""
+        return np.array([np.zeros(nodes), np.broadcast_to(-np.asarray(self.clearance), nodes)])
+
+    def stored_energy(
+        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Energy (..., n) stored in both stops [J]: the integral of F(u, 0) from 0 to u."""
+        stiffness, clearance, exponent, _ = self.table(share).T
+        depth = np.maximum(penetration, np.maximum(-penetration - clearance, 0.0))
+        return np.asarray(stiffness / (exponent + 1.0) * depth ** (exponent + 1.0))
+
+
+@normal_law
+def _prescribed(u, v, p):  # type: ignore[no-untyped-def]
+    return p[0], 0.0, 0.0
+
+
+@dataclass(frozen=True)
+class PrescribedForce(NormalLaw):
+    r"""Constant normal force F = F_0 on the body [N], whatever the penetration.
+
+    As in models of friction oscillators with motion along the ground only; the contact never
+    opens.
+
+    Parameters
+    ----------
+    force : float or (n,) sequence
+        F_0 of the whole face, or of each node, zero or above [N].
+
+    Raises
+    ------
+    InputError
+        For a negative force.
+    """
+
+    kernel: ClassVar = _prescribed
+    extensive: ClassVar = frozenset({"force"})
+
+    force: NotNegative
+
+    @property
+    def penetration_scale(self) -> float:
+        """A micrometre, the size of roughness: the law itself has no scale [m]."""
+        return 1e-6
+
+    def stored_energy(
+        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Energy (..., n) of the force [J]: F_0 u, zero at u = 0."""
+        return np.asarray(self.table(share)[:, 0] * penetration)

@@ -1,0 +1,234 @@
+"""Normal laws that are a power of the penetration, with damping in proportion to the force."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, PerNode, Positive, UpToOne
+from fecontact.laws.signatures import normal_law
+
+
+@normal_law
+def _power(u, v, p):  # type: ignore[no-untyped-def]
+    scale, length, exponent, factor = p[0], p[1], p[2], p[3]
+    damped = 1.0 + factor * v
+    if u <= 0.0 or damped <= 0.0:
+        return 0.0, 0.0, 0.0
+    ratio = u / length
+    # Powers of the usual exponents are much faster this way.
+    if exponent == 1.5:
+        lower = ratio**0.5
+    elif exponent == 1.0:
+        lower = 1.0
+    elif exponent == 2.0:
+        lower = ratio
+    else:
+        lower = ratio ** (exponent - 1.0)
+    elastic = scale * lower * ratio
+    return elastic * damped, exponent * scale * lower / length * damped, elastic * factor
+
+
+@dataclass(frozen=True)
+class _Power(NormalLaw):
+    """Laws whose row of parameters is F_0, l, n, chi of F_0 (u / l)^n max(0, 1 + chi v)."""
+
+    kernel: ClassVar = _power
+
+    @property
+    def penetration_scale(self) -> float:
+        """Penetration under 1 N on the whole face, or on each node [m], the smallest of all."""
+        sizes = [np.size(value) for value in vars(self).values() if not isinstance(value, str)]
+        table = self.table(np.ones(max(sizes)))
+        return float(np.min(table[:, 1] * table[:, 0] ** (-1.0 / table[:, 2])))
+
+    def stored_energy(
+        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
+        scale, length, exponent, _ = self.table(share).T
+        s = np.maximum(penetration / length, 0.0)
+        return np.asarray(scale * length / (exponent + 1.0) * s ** (exponent + 1.0))
+
+
+@dataclass(frozen=True)
+class PowerContact(_Power):
+    r"""Hertz-type contact with Hunt-Crossley damping.
+
+    .. math:: F = K u^n \max(0,\ 1 + \chi v), \qquad u > 0
+
+    u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile;
+    n = 3/2 is a sphere on a plane, n = 1 a linear spring. The damping grows with the penetration,
+    so that the force starts from zero and is lost at once with the contact.
+
+    Parameters
+    ----------
+    stiffness : float or (n,) sequence
+        K of the whole face, or of each node, positive [N/m^n].
+    exponent : float or (n,) sequence
+        n, one or above.
+    damping_factor : float or (n,) sequence
+        chi, zero or above [s/m].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    K. H. Hunt, F. R. E. Crossley, Coefficient of restitution interpreted as damping in
+    vibroimpact, J. Appl. Mech. 42 (1975) 440-445.
+    """
+
+    extensive: ClassVar = frozenset({"stiffness"})
+
+    stiffness: Positive
+    exponent: OneOrAbove = 1.5
+    damping_factor: NotNegative = 0.0
+
+    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters (n, 4): K, 1, n, chi."""
+        return np.insert(super().table(share), 1, 1.0, axis=1)
+
+
+@dataclass(frozen=True)
+class RestitutionContact(_Power):
+    r"""Hertz-type contact whose damping is given by a coefficient of restitution e.
+
+    .. math:: F = K u^n \max(0,\ 1 + \chi v), \qquad u > 0
+
+    with chi from e and the impact velocity v_r for which it holds, by the damping model:
+
+    - ``hunt-crossley``: an impact at v_r has exactly the restitution e,
+      chi v_r (1 + e) = ln[(1 + chi v_r) / (1 - chi e v_r)];
+    - ``lankarani-nikravesh``: chi = 3 (1 - e^2) / (4 v_r), for e close to one;
+    - ``flores``: chi = 8 (1 - e) / (5 e v_r), approximate for all e.
+
+    u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
+
+    Parameters
+    ----------
+    stiffness : float or (n,) sequence
+        K of the whole face, or of each node, positive [N/m^n].
+    restitution : float or (n,) sequence
+        e, above zero and at most 1; with Lankarani-Nikravesh also zero.
+    reference_velocity : float or (n,) sequence
+        v_r, positive [m/s].
+    exponent : float or (n,) sequence
+        n, one or above.
+    damping_model : 'hunt-crossley', 'lankarani-nikravesh' or 'flores'
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    H. M. Lankarani, P. E. Nikravesh, A contact force model with hysteresis damping for impact
+    analysis of multibody systems, J. Mech. Des. 112 (1990) 369-376. P. Flores et al., On the
+    continuous contact force models for soft materials in multibody dynamics, Multibody Syst. Dyn.
+    25 (2011) 357-375.
+    """
+
+    extensive: ClassVar = frozenset({"stiffness"})
+    choices: ClassVar = {"damping_model": ("hunt-crossley", "lankarani-nikravesh", "flores")}
+
+    stiffness: Positive
+    restitution: PerNode
+    reference_velocity: Positive
+    exponent: OneOrAbove = 1.5
+    damping_model: str = "hunt-crossley"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.damping_model == "lankarani-nikravesh":
+            self.require("zero to 1", lambda e: (e >= 0) & (e <= 1), "restitution")
+        else:
+            self.require("above zero and at most 1", lambda e: (e > 0) & (e <= 1), "restitution")
+
+    @property
+    def damping_factor(self) -> float | NDArray[np.float64]:
+        """Damping factor chi [s/m], of the face or (n,) of each node."""
+        e = np.asarray(self.restitution, dtype=float)
+        if self.damping_model == "lankarani-nikravesh":
+            product = 0.75 * (1.0 - e**2)
+        elif self.damping_model == "flores":
+            product = 1.6 * (1.0 - e) / e
+        else:
+            product = np.vectorize(_hunt_crossley, otypes=[float])(e)
+        factor = product / np.asarray(self.reference_velocity, dtype=float)
+        return factor if factor.ndim else float(factor)
+
+    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters (n, 4): K, 1, n, chi."""
+        stiffness, _, _, exponent, _ = super().table(share).T
+        factor = np.broadcast_to(self.damping_factor, share.shape)
+        return np.column_stack([stiffness, np.ones_like(share), exponent, factor])
+
+
+def _hunt_crossley(e: float) -> float:
+    """Solve x (1 + e) = ln[(1 + x) / (1 - e x)] for x = chi v > 0; zero for e = 1."""
+    from scipy.optimize import brentq
+
+    def excess(x: float) -> float:
+        return float(x * (1.0 + e) - np.log1p(x) + np.log1p(-e * x))
+
+    if e > 1.0 - 1e-5:
+        return 1.5 * (1.0 - e)
+    # The left side leads up to x = (1 - e) / e, and at the pole 1 / e the right side is infinite.
+    low, high = (1.0 - e) / e, (1.0 - np.finfo(float).eps) / e
+    if excess(high) >= 0.0:
+        return high
+    return float(brentq(excess, low, high, xtol=1e-15 * low, rtol=1e-14))
+
+
+@dataclass(frozen=True)
+class PowerLawContact(_Power):
+    r"""Machined surfaces pressed together: approach as a power of the pressure (Back-Burdekin).
+
+    .. math:: u = C p^m \quad\Rightarrow\quad F = A (u / C)^{1/m} \max(0,\ 1 + \chi v)
+
+    u > 0 is the penetration [m], v its rate [m/s], p the pressure [Pa], F the normal force on the
+    body [N], never tensile.
+
+    Parameters
+    ----------
+    nominal_area : float or (n,) sequence
+        A of the whole face, or of each node, positive [m^2].
+    coefficient : float or (n,) sequence
+        C, positive [m/Pa^m]; 1 um/MPa^0.5 is 1e-9 m/Pa^0.5.
+    exponent : float or (n,) sequence
+        m, above zero and at most 1; about 0.5 for metals.
+    damping_factor : float or (n,) sequence
+        chi, zero or above [s/m].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    N. Back, M. Burdekin, A. Cowley, Review of the research on fixed and sliding joints, Proc.
+    13th MTDR Conf. (1973) 87-97.
+    """
+
+    extensive: ClassVar = frozenset({"nominal_area"})
+
+    nominal_area: Positive
+    coefficient: Positive
+    exponent: UpToOne = 0.5
+    damping_factor: NotNegative = 0.0
+
+    @property
+    def penetration_scale(self) -> float:
+        """Penetration under a pressure of 1 MPa [m], the smallest of all nodes."""
+        return float(np.min(self.coefficient * np.power(1e6, self.exponent)))
+
+    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters (n, 4): A, C, 1/m, chi."""
+        area, coefficient, exponent, factor = super().table(share).T
+        return np.column_stack([area, coefficient, 1.0 / exponent, factor])

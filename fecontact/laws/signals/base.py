@@ -1,0 +1,83 @@
+"""What a signal is: the base class of all signals."""
+
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.compiled import CompiledLaw, i8, kernel, matrix, vector
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.laws.signatures import signal_at
+
+Array = NDArray[np.float64]
+
+
+@kernel(types.void(i8, vector, vector, matrix))
+def _history(address, t, p, out):  # type: ignore[no-untyped-def]
+    for k in range(len(t)):
+        out[k, 0], out[k, 1] = signal_at(address)(t[k], p)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.signatures.signal`.
+
+    A signal of one's own sets ``kernel``, and overrides what else is not as here.
+    """
+
+    kernel: ClassVar[CompiledLaw]
+
+    def parameters(self) -> Array:
+        """Parameters of the kernel; here the fields in their order.
+
+        The kernel may get zeros after them.
+        """
+        return np.array([getattr(self, entry.name) for entry in fields(self)], dtype=float)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Times between t0 and t1 on which an integrator must step, ascending [s].
+
+        There the signal, its rate or its second derivative jumps, or a steep piece begins or ends.
+        The times t0 and t1 are not among them.
+        """
+        return ()
+
+    @property
+    def shortest_period(self) -> float | None:
+        """Shortest time in which it goes up and down [s], for a limit of the step; or None.
+
+        Between breakpoints: what is smooth from one to the next, on which steps end, needs none.
+        """
+        return None
+
+    @property
+    def frequency_hz(self) -> float | None:
+        """Frequency with which it repeats [Hz], or None."""
+        return None
+
+    @property
+    def largest(self) -> float:
+        """Upper bound of its magnitude."""
+        raise NotImplementedError
+
+    def history(self, times: ArrayLike) -> Array:
+        """Values and rates (N, 2) at N times [s]."""
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        out = np.empty((len(t), 2))
+        _history(self.kernel.address, t, self.parameters(), out)
+        return out
+
+
+def between(times: ArrayLike, t0: float, t1: float) -> tuple[float, ...]:
+    """Those of the times that lie between t0 and t1, ascending, each once."""
+    found = np.unique(np.asarray(times, dtype=float))
+    return tuple(found[(found > t0) & (found < t1)].tolist())
+
+
+def require_one_of(owner: str, name: str, value: object, names: tuple[str, ...]) -> None:
+    """Raise :class:`InputError` unless a value is one of a few names."""
+    if value not in names:
+        raise InputError(f"{owner}: {name} = {value!r} must be one of {choices(names)}"
+                         f"{nearest(str(value), names)}.")

@@ -1,0 +1,275 @@
+"""Signals: what is given in time, such as the motion of the drive or a load."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
+from fecontact.laws.data_columns import numbers
+from fecontact.laws.signals.base import Signal, between, require_one_of
+from fecontact.laws.signals.transient import Pulse, Step, Tabulated
+from fecontact.laws.signatures import signal
+
+Array = NDArray[np.float64]
+
+__all__ = ["Constant", "Harmonic", "Harmonics", "Pulse", "Signal", "Step", "Sweep", "Tabulated"]
+
+
+@signal
+def _constant(t, p):  # type: ignore[no-untyped-def]
+    return p[0], 0.0
+
+
+@dataclass(frozen=True)
+class Constant(Signal):
+    """A constant value.
+
+    Parameters
+    ----------
+    value : float
+        In the unit of what is given.
+
+    Raises
+    ------
+    InputError
+        For a value that is not finite.
+    """
+
+    kernel: ClassVar = _constant
+
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite("Constant", value=self.value)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the value."""
+        return abs(float(self.value))
+
+
+@signal
+def _harmonic(t, p):  # type: ignore[no-untyped-def]
+    amplitude, w, phase = p[0], p[1], p[2]
+    angle = w * t + phase
+    return amplitude * math.sin(angle), amplitude * w * math.cos(angle)
+
+
+@dataclass(frozen=True)
+class Harmonic(Signal):
+    r"""A sine.
+
+    .. math:: A \sin(w t + \varphi)
+
+    Parameters
+    ----------
+    amplitude : float
+        A, in the unit of what is given.
+    angular_frequency : float
+        w, zero or above [rad/s].
+    phase : float
+        phi [rad]; pi / 2 for a cosine.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _harmonic
+
+    amplitude: float
+    angular_frequency: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite("Harmonic", amplitude=self.amplitude, phase=self.phase)
+        require_not_negative("Harmonic", angular_frequency=self.angular_frequency)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """2 pi / w [s]; None for a constant."""
+        w = self.angular_frequency
+        return 2.0 * math.pi / w if w > 0.0 and self.amplitude != 0.0 else None
+
+    @property
+    def frequency_hz(self) -> float | None:
+        """Its frequency [Hz]; None for a constant."""
+        return None if self.shortest_period is None else self.angular_frequency / (2.0 * math.pi)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the amplitude."""
+        return abs(float(self.amplitude))
+
+
+@signal
+def _harmonics(t, p):  # type: ignore[no-untyped-def]
+    value, rate = 0.0, 0.0
+    for k in range(int(p[0])):
+        amplitude, w = p[3 * k + 1], p[3 * k + 2]
+        angle = w * t + p[3 * k + 3]
+        value += amplitude * math.sin(angle)
+        rate += amplitude * w * math.cos(angle)
+    return value, rate
+
+
+@dataclass(frozen=True)
+class Harmonics(Signal):
+    r"""A sum of sines of any frequencies.
+
+    .. math:: \sum_k A_k \sin(w_k t + \varphi_k)
+
+    Parameters
+    ----------
+    amplitudes : sequence
+        A_k, in the unit of what is given.
+    angular_frequencies : sequence
+        w_k, zero or above [rad/s].
+    phases : sequence, optional
+        phi_k [rad]; zero by default.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, or sequences of different lengths.
+    """
+
+    kernel: ClassVar = _harmonics
+
+    amplitudes: tuple[float, ...]
+    angular_frequencies: tuple[float, ...]
+    phases: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            given = numbers("Harmonics", entry.name, getattr(self, entry.name),
+                            0 if entry.name == "phases" else 1)
+            object.__setattr__(self, entry.name, given)
+            if len(given) not in (len(self.amplitudes), 0):
+                raise InputError(f"Harmonics: {entry.name} has {len(given)} values for "
+                                 f"{len(self.amplitudes)} amplitudes; give one for each.")
+        for k, w in enumerate(self.angular_frequencies):
+            require_not_negative("Harmonics", **{f"angular_frequencies[{k}]": w})
+
+    def parameters(self) -> Array:
+        """Number of sines, then A, w and phi of each."""
+        phases = self.phases or np.zeros(len(self.amplitudes))
+        rows = np.column_stack([self.amplitudes, self.angular_frequencies, phases])
+        return np.concatenate([[len(rows)], rows.ravel()])
+
+    @property
+    def _heard(self) -> list[float]:
+        """Angular frequencies above zero whose amplitude is not zero."""
+        return sorted(w for a, w in zip(self.amplitudes, self.angular_frequencies, strict=True)
+                      if a != 0.0 and w > 0.0)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """That of the highest frequency [s]."""
+        return 2.0 * math.pi / self._heard[-1] if self._heard else None
+
+    @property
+    def frequency_hz(self) -> float | None:
+        """The lowest frequency [Hz], if all others are whole multiples of it; else None."""
+        if not self._heard:
+            return None
+        ratios = np.array(self._heard) / self._heard[0]
+        whole = np.abs(ratios - np.round(ratios)) <= 1e-9 * ratios
+        return self._heard[0] / (2.0 * math.pi) if whole.all() else None
+
+    @property
+    def largest(self) -> float:
+        """Sum of the magnitudes of the amplitudes."""
+        return math.fsum(abs(a) for a in self.amplitudes)
+
+
+@signal
+def _sweep(t, p):  # type: ignore[no-untyped-def]
+    amplitude, w0, w1, duration = p[0], p[1], p[2], p[3]
+    inside = min(max(t, 0.0), duration)
+    if p[4] == 0.0:
+        w = w0 + (w1 - w0) * inside / duration
+        angle = 0.5 * (w0 + w) * inside
+    else:
+        growth = math.log(w1 / w0) / duration
+        x = growth * inside
+        w = w0 * math.exp(x)
+        angle = w0 * inside * (math.expm1(x) / x if x != 0.0 else 1.0)
+    angle += w * (t - inside)
+    return amplitude * math.sin(angle), amplitude * w * math.cos(angle)
+
+
+@dataclass(frozen=True)
+class Sweep(Signal):
+    r"""A sine whose frequency goes from one value to another, and stays there.
+
+    .. math:: A \sin\Big(2 \pi \int_0^t f\,dt\Big), \qquad
+        f = f_0 + (f_1 - f_0) \frac{t}{T} \quad\text{or}\quad
+        f = f_0 \Big(\frac{f_1}{f_0}\Big)^{t/T}, \qquad 0 \le t \le T
+
+    f is f_0 before t = 0 and f_1 after t = T; the phase is the exact integral.
+
+    Parameters
+    ----------
+    amplitude : float
+        A, in the unit of what is given.
+    start_frequency_hz, end_frequency_hz : float
+        f_0, f_1, zero or above, for a logarithmic sweep above zero [Hz].
+    duration : float
+        T, positive [s].
+    kind : 'linear' or 'logarithmic'
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
+
+    kernel: ClassVar = _sweep
+
+    amplitude: float
+    start_frequency_hz: float
+    end_frequency_hz: float
+    duration: float
+    kind: Literal["linear", "logarithmic"] = "linear"
+
+    def __post_init__(self) -> None:
+        require_finite("Sweep", amplitude=self.amplitude)
+        require_one_of("Sweep", "kind", self.kind, ("linear", "logarithmic"))
+        require = require_not_negative if self.kind == "linear" else require_positive
+        require("Sweep", start_frequency_hz=self.start_frequency_hz,
+                end_frequency_hz=self.end_frequency_hz)
+        require_positive("Sweep", duration=self.duration)
+
+    def parameters(self) -> Array:
+        """A, the angular frequencies, T, and 1 for a logarithmic sweep."""
+        return np.array([self.amplitude, 2.0 * math.pi * self.start_frequency_hz,
+                         2.0 * math.pi * self.end_frequency_hz, self.duration,
+                         self.kind == "logarithmic"], dtype=float)
+
+    def instantaneous_frequency_hz(self, times: ArrayLike) -> Array:
+        """Frequencies f [Hz] at times [s]."""
+        part = np.clip(np.asarray(times, dtype=float) / self.duration, 0.0, 1.0)
+        f0, f1 = self.start_frequency_hz, self.end_frequency_hz
+        if self.kind == "linear":
+            return np.asarray(f0 + (f1 - f0) * part)
+        return np.asarray(f0 * (f1 / f0) ** part)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Start and end of the sweep, as far as they lie between t0 and t1 [s]."""
+        return between((0.0, self.duration), t0, t1)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """That of the highest frequency [s]."""
+        highest = max(self.start_frequency_hz, self.end_frequency_hz)
+        return 1.0 / highest if highest > 0.0 and self.amplitude != 0.0 else None
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the amplitude."""
+        return abs(float(self.amplitude))

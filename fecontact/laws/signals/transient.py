@@ -1,0 +1,280 @@
+"""Signals that are not harmonic: steps, pulses and tables."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
+from fecontact.laws.piecewise_polynomial import (
+    curve_range,
+    linear_curve,
+    piecewise,
+    piecewise_parameters,
+    steep_pieces,
+)
+from fecontact.laws.signals.base import Signal, between, require_one_of
+from fecontact.laws.signatures import signal
+
+Array = NDArray[np.float64]
+
+_PULSES = ("half-sine", "rectangle", "triangle", "haversine")
+_RISE = 0.01
+
+
+@signal
+def _step(t, p):  # type: ignore[no-untyped-def]
+    return (p[1] if t >= p[0] else 0.0), 0.0
+
+
+@dataclass(frozen=True)
+class Step(Signal):
+    """Zero before a time, a value from then on; no ramp between them.
+
+    Integrators step on the time. As a motion of the drive it makes the springs' force jump, and
+    the work of the jump counts; as the motion of a body it would need an infinite force.
+
+    Parameters
+    ----------
+    time : float
+        Of the jump [s].
+    value : float
+        After it, in the unit of what is given.
+
+    Raises
+    ------
+    InputError
+        For values that are not finite.
+    """
+
+    kernel: ClassVar = _step
+
+    time: float
+    value: float
+
+    def __post_init__(self) -> None:
+        require_finite("Step", time=self.time, value=self.value)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """The time, if it lies between t0 and t1 [s]."""
+        return between(self.time, t0, t1)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the value."""
+        return abs(float(self.value))
+
+
+@signal
+def _pulse(t, p):  # type: ignore[no-untyped-def]
+    amplitude, duration, rise = p[0], p[2], p[3]
+    s = t - p[1]
+    if s <= 0.0 or s >= duration:
+        return 0.0, 0.0
+    if p[4] == 0.0:
+        w = math.pi / duration
+        return amplitude * math.sin(w * s), amplitude * w * math.cos(w * s)
+    if p[4] == 3.0:
+        w = math.pi / duration
+        return amplitude * math.sin(w * s) ** 2, amplitude * w * math.sin(2.0 * w * s)
+    falling = s > 0.5 * duration
+    sign = -1.0 if falling else 1.0
+    x = min((duration - s if falling else s) / rise, 1.0)
+    if p[4] == 1.0:
+        return amplitude * x * x * (3.0 - 2.0 * x), sign * amplitude * 6.0 * x * (1.0 - x) / rise
+    return amplitude * x, sign * amplitude / rise
+
+
+@dataclass(frozen=True)
+class Pulse(Signal):
+    r"""A single pulse, zero before and after; with s = (t - t_0) / T from 0 to 1:
+
+    - ``half-sine``: A sin(pi s);
+    - ``haversine``: A sin^2(pi s), whose rate is continuous;
+    - ``triangle``: A (1 - abs(1 - 2 s));
+    - ``rectangle``: A, but it rises from zero and falls to zero as A x^2 (3 - 2 x), x from 0 to 1
+      within the time ``rise``, which is part of T; its integral is A (T - rise).
+
+    Parameters
+    ----------
+    kind : 'half-sine', 'rectangle', 'triangle' or 'haversine'
+    amplitude : float
+        A, in the unit of what is given.
+    duration : float
+        T, positive [s].
+    start : float
+        t_0 [s].
+    rise : float, optional
+        For a rectangle, above zero and at most T / 2 [s]; by default a hundredth of T.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, or a rise of another kind of pulse.
+    """
+
+    kernel: ClassVar = _pulse
+
+    kind: Literal["half-sine", "rectangle", "triangle", "haversine"]
+    amplitude: float
+    duration: float
+    start: float = 0.0
+    rise: float | None = None
+
+    def __post_init__(self) -> None:
+        require_one_of("Pulse", "kind", self.kind, _PULSES)
+        require_finite("Pulse", amplitude=self.amplitude, start=self.start)
+        require_positive("Pulse", duration=self.duration)
+        if self.rise is None:
+            return
+        if self.kind != "rectangle":
+            raise InputError(f"Pulse: rise = {self.rise!r} is for a rectangle; leave it out for "
+                             f"kind = '{self.kind}'.")
+        require_positive("Pulse", rise=self.rise)
+        if self.rise > 0.5 * self.duration:
+            raise InputError(f"Pulse: rise = {self.rise!r} must be at most half of duration = "
+                             f"{self.duration!r}.")
+
+    @property
+    def _rise(self) -> float:
+        if self.kind != "rectangle":
+            return 0.5 * self.duration
+        return _RISE * self.duration if self.rise is None else self.rise
+
+    def parameters(self) -> Array:
+        """A, t_0, T, the time of rise, and the index of the kind."""
+        return np.array([self.amplitude, self.start, self.duration, self._rise,
+                         _PULSES.index(self.kind)], dtype=float)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Start, end and kinks of the pulse, as far as they lie between t0 and t1 [s]."""
+        places = [0.0, self.duration]
+        if self.kind in ("triangle", "rectangle"):
+            places += [self._rise, self.duration - self._rise]
+        return between(self.start + np.array(places), t0, t1)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude of the amplitude."""
+        return abs(float(self.amplitude))
+
+
+@signal
+def _tabulated(t, p):  # type: ignore[no-untyped-def]
+    value, rate, _ = piecewise(t, p, 0)
+    return value, rate
+
+
+@dataclass(frozen=True)
+class Tabulated(Signal):
+    """Values at given times, with straight lines or a smooth curve between them.
+
+    Outside the times the end values hold, or the table is repeated. The smooth curve is the cubic
+    spline with continuous second derivative; at its ends its rate is zero where the values hold,
+    and periodic where they repeat.
+
+    Parameters
+    ----------
+    times : (N,) sequence
+        Growing [s].
+    values : (N,) sequence
+        Values at these times; to be repeated, the last must be the first.
+    file : str, optional
+        A text or CSV file with two columns, times and values, instead of both; lines before the
+        first of two numbers are a header. It is read once; afterwards ``file`` is None.
+    interpolation : 'linear' or 'cubic'
+    outside : 'hold' or 'repeat'
+    scale : float
+        Factor from the values of the table to the unit of what is given.
+
+    Raises
+    ------
+    InputError
+        For a table or file that cannot be used, with the place.
+    """
+
+    kernel: ClassVar = _tabulated
+
+    times: tuple[float, ...] = ()
+    values: tuple[float, ...] = ()
+    file: str | None = None
+    interpolation: Literal["linear", "cubic"] = "linear"
+    outside: Literal["hold", "repeat"] = "hold"
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        owner = "Tabulated"
+        require_one_of(owner, "interpolation", self.interpolation, ("linear", "cubic"))
+        require_one_of(owner, "outside", self.outside, ("hold", "repeat"))
+        require_finite(owner, scale=self.scale)
+        times, values = read_or_given(owner, self.file, times=self.times, values=self.values,
+                                      least=3 if self.interpolation == "cubic" else 2)
+        if self.outside == "repeat":
+            values = require_closed(owner, "values", values)
+        with np.errstate(over="ignore"):
+            require_resolved(owner, "times", np.array(times), f"values times scale = "
+                             f"{self.scale:g}", self.scale * np.array(values))
+        for name, value in (("times", times), ("values", values), ("file", None)):
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def _curve(self) -> Any:
+        from scipy.interpolate import CubicSpline
+
+        values = tuple(self.scale * value for value in self.values)
+        if self.interpolation == "linear":
+            return linear_curve(self.times, values)
+        return CubicSpline(self.times, values,
+                           bc_type="clamped" if self.outside == "hold" else "periodic")
+
+    def parameters(self) -> Array:
+        """Number of pieces, whether they repeat, the times and the pieces' coefficients."""
+        return piecewise_parameters(self._curve, self.outside == "repeat")
+
+    @cached_property
+    def _steps(self) -> tuple[float | None, Array]:
+        """Period of the smooth pieces, and the times at which steps must end."""
+        times = np.array(self.times)
+        if self.interpolation == "linear":
+            return None, times
+        period, steep = steep_pieces(self._curve)
+        ends = times[[0, -1]] if self.outside == "hold" else times[:0]
+        return period, np.union1d(ends, steep)
+
+    def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
+        """Times between t0 and t1 at which a piece of a line or a steep piece of a curve ends [s].
+
+        And the ends of a curve that hold.
+        """
+        times, places = np.array(self.times), self._steps[1]
+        if self.outside == "hold" or not len(places) or t1 <= t0:
+            return between(places, t0, t1)
+        period = times[-1] - times[0]
+        if places[-1] == times[-1]:
+            places = np.union1d(times[:1], places[:-1])
+        turns = np.arange(math.floor((t0 - times[-1]) / period),
+                          math.ceil((t1 - times[0]) / period) + 1)
+        return between(np.add.outer(turns * period, places).ravel(), t0, t1)
+
+    @property
+    def shortest_period(self) -> float | None:
+        """Period of the harmonic with the curve's range and its steepest rate [s], or None.
+
+        Without pieces that begin and end with a breakpoint, as all of a table of lines do and
+        those of a curve that are much steeper than the others.
+        """
+        return self._steps[0]
+
+    @property
+    def frequency_hz(self) -> float | None:
+        """With which the table is repeated [Hz]; None if its ends hold."""
+        return 1.0 / (self.times[-1] - self.times[0]) if self.outside == "repeat" else None
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude, also between the times."""
+        return max(abs(value) for value in curve_range(self._curve))

@@ -1,0 +1,160 @@
+"""Branches in HDF5 files."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
+from fecontact.core.stored import (
+    DamagedError,
+    array,
+    member,
+    reading,
+    require_lengths,
+    text,
+    texts,
+    values,
+)
+from fecontact.output.files.hdf5 import new_file, open_file
+
+
+def write_branch(path: str | Path, branch: Branch) -> Path:
+    """Write a branch into an HDF5 file, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    require_kind("write_branch", Branch, branch=branch)
+    with new_file(path) as file:
+        _store(file.create_group("branch"), branch)
+    return Path(path)
+
+
+def read_branch(path: str | Path) -> Branch:
+    """Read the branch that :func:`write_branch` wrote, or the first of several.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it holds no branch.
+    """
+    with open_file(path, "branch") as file:
+        return _stored(file["branch"], path)
+
+
+def write_branches(path: str | Path, branches: Mapping[str, Branch]) -> Path:
+    """Write branches by name into one HDF5 file, whole or not at all.
+
+    They stand in ``branches/0``, ``branches/1``, ... with their names as attributes.
+
+    Raises
+    ------
+    InputError
+        If there are none, or the file cannot be written.
+    """
+    from h5py import SoftLink
+
+    if not branches:
+        raise InputError(f"There are no branches to write into {path}.")
+    with new_file(path) as file:
+        for number, (name, branch) in enumerate(branches.items()):
+            group = file.create_group(f"branches/{number}")
+            group.attrs["name"] = name
+            _store(group, branch)
+        file["branch"] = SoftLink("/branches/0")
+    return Path(path)
+
+
+def read_branches(path: str | Path) -> dict[str, Branch]:
+    """Read the branches that :func:`write_branches` wrote, in their order.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is damaged, or it holds no branches.
+    """
+    with open_file(path, "branches") as file:
+        groups = member(file, "branches")
+        return {text(groups[key], "name"): _stored(groups[key], path)
+                for key in sorted(groups, key=int)}
+
+
+def _store(group: Any, branch: Branch) -> None:
+    """Write a branch into an empty HDF5 group."""
+    group.attrs.update(parameter=branch.name, status=branch.status.name, message=branch.message)
+    group.create_dataset("kind", data=[point.kind or "" for point in branch.points])
+    for name in ("u", "tangent"):
+        _write(group, name, [getattr(point, name) for point in branch.points])
+    for name in branch.points[0].values if branch.points else ():
+        _write(group, f"values/{name}", [point.values[name] for point in branch.points])
+    for index, point in enumerate(branch.points):
+        for name, value in point.details.items():
+            group.create_dataset(f"details/{index}/{name}", data=value)
+    for name, value in branch.attributes.items():
+        group.create_dataset(f"attributes/{name}", data=value)
+
+
+def _stored(group: Any, path: str | Path) -> Branch:
+    """Read a branch from an HDF5 group that :func:`_store` filled, of the file ``path``."""
+    with reading(path):
+        kinds = texts(group, "kind") if len(member(group, "kind")) else []
+        count = len(kinds)
+        u = array(group, "u", (count, None) if count else (0,))
+        tangent = array(group, "tangent", u.shape)
+        stored = {name: _read(item, count)
+                  for name, item in _members(group, "values").items()}
+        details = {int(index): {name: _value(item) for name, item in part.items()}
+                   for index, part in _members(group, "details").items()}
+        points = tuple(
+            BranchPoint(u[k], tangent[k], {name: row[k] for name, row in stored.items()},
+                        kinds[k] or None, details.get(k, {})) for k in range(count))
+        attributes = {name: _value(item)
+                      for name, item in _members(group, "attributes").items()}
+        return Branch(text(group, "parameter"), points, Status[text(group, "status")],
+                   text(group, "message"), attributes)
+
+
+def _write(group: Any, name: str, values: list[Any]) -> None:
+    """One dataset for values of the same shape, else one for each."""
+    if len({np.shape(value) for value in values}) <= 1:
+        group.create_dataset(name, data=np.array(values) if not values
+                             or not isinstance(values[0], str) else values)
+        return
+    for index, value in enumerate(values):
+        group.create_dataset(f"{name}/{index}", data=value)
+
+
+def _members(group: Any, name: str) -> Any:
+    """The members of a group that may be missing."""
+    if name not in group:
+        return {}
+    found = member(group, name)
+    if not hasattr(found, "items"):
+        raise DamagedError(f"'{name}' is no group")
+    return found
+
+
+def _read(item: Any, count: int) -> list[Any]:
+    if not hasattr(item, "shape"):
+        return [_value(item[str(index)]) for index in range(count)]
+    found = [_plain(value) for value in np.atleast_1d(values(item))]
+    require_lengths(f"'{item.name}'", count, found)
+    return found
+
+
+def _value(item: Any) -> Any:
+    return _plain(values(item))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode()
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value

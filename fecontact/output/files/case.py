@@ -1,0 +1,251 @@
+"""A case in one HDF5 file: the run, all that it was computed from, and frames for ParaView."""
+
+import json
+import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from fecontact.core.checks import as_path, require_kind
+from fecontact.core.errors import InputError
+from fecontact.core.stored import DamagedError, array, from_json, member, reading, text, texts
+from fecontact.integrate.events import Events
+from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.laws.registry import UntrustedError, law_files, movable, trusting, with_folder
+from fecontact.output.files.frames import frame_indices
+from fecontact.output.files.hdf5 import new_file, open_file, store_basis, stored_basis
+from fecontact.output.files.vtkhdf import write_vtkhdf
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_energy import POWERS
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import GROUND_RATE
+from fecontact.system.tables import system_from_tables, system_tables
+
+_PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
+_STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
+          "work": "J"}
+_OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
+             "held_normal_force": "N", "held_friction_force": "N"}
+# What laws of the user's own give, by which a run can be drawn without their code.
+_OF_LAWS = {"penetration_rate": "m/s", "ground_rate": "m/s", "contact_energy": "J"}
+_CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
+            "slip_velocity": "m/s", "contact_state": "0 open, 1 stick, 2 slip"}
+# In the order of the columns of a contact history.
+_COLUMNS = ("normal_force", "friction_force", "penetration", "penetration_rate", "slip_velocity",
+            "ground_rate")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run as read from its file.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        Equal to the one that was written, to the last bit.
+    study : str or None
+        The study that described the run, as TOML text.
+    versions : mapping
+        Versions of fecontact and the libraries it ran with.
+    """
+
+    trajectory: Trajectory
+    study: str | None = None
+    versions: dict[str, str] = field(default_factory=dict)
+
+
+def write_case(
+    path: str | Path, trajectory: Trajectory, *, frames: int = 200, study: str | None = None,
+    root: str | Path | None = None,
+) -> Path:
+    """Write a run into one HDF5 file, whole or not at all.
+
+    With frames the file is a temporal VTKHDF file too: call it ``NAME.vtkhdf`` and ParaView opens
+    it by double click. The rest lies outside its group /VTKHDF: /basis, /trajectory, /system,
+    /study and /versions.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; it is replaced if it exists.
+    trajectory : Trajectory
+        The run.
+    frames : int
+        Number of output times whose fields are stored, evenly spaced, never more than there are;
+        zero, or a modal basis without shapes over the body, leaves /VTKHDF out.
+    study : str, optional
+        The study that described the run, as TOML text.
+    root : str or Path, optional
+        Laws in files of your own that lie below this folder are named relative to the case, so
+        that the folder can be moved as a whole; by default that of the case. Laws elsewhere are
+        named by their absolute paths.
+
+    Raises
+    ------
+    InputError
+        If ``frames`` is negative, or the file cannot be written.
+    """
+    require_kind("write_case", Trajectory, trajectory=trajectory)
+    path = as_path(path, "a run")
+    indices = frame_indices(trajectory.time, frames)
+    folder = Path(path).parent
+    root = folder if root is None else Path(root)
+    with new_file(path) as file:
+        for name, text in _versions().items():
+            file.require_group("versions").attrs[name] = text
+        store_basis(file.create_group("basis"), trajectory.system.basis)
+        file.create_group("system").attrs["json"] = json.dumps(
+            movable(system_tables(trajectory.system), folder, root))
+        if study is not None:
+            file.create_group("study").attrs["toml"] = _changed(
+                study, lambda table: movable(table, folder, root))
+        _write_trajectory(file.create_group("trajectory"), trajectory)
+        if len(indices) and trajectory.system.basis.field is not None:
+            write_vtkhdf(file, trajectory, indices)
+    return Path(path)
+
+
+def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case:
+    """Read a run that :func:`write_case` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    trust : bool or files
+        Whether to run the code of laws that the file names as ``FILE.py:CLASS``, or the files of
+        Python whose code may be run. Untrusted laws are not loaded: forces, states of contact and
+        energies of the run are those that the file holds, and what needs the laws themselves
+        raises InputError. Laws of modules that are loaded already are used.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is not HDF5, was not written by fecontact, holds no run, is
+        damaged, its system has parameters that this version does not know, or its ground, drive
+        or load needs code that is not trusted.
+    """
+    path = as_path(path, "a run")
+    with open_file(path, "basis") as file:
+        if "trajectory" not in file:
+            raise InputError(f"{path} holds a modal basis but no run; read it with "
+                             f"read_basis.")
+        basis = stored_basis(member(file, "basis"))
+        tables = with_folder(from_json(text(member(file, "system"), "json"), dict, "the system"),
+                             Path(path).parent)
+        stored = member(file, "trajectory")
+        state = _read_state(stored, basis)
+        of_laws = _read_of_laws(stored, basis, len(state["time"]))
+        status = Status[text(stored, "status")]
+        statistics = from_json(text(stored, "statistics"), dict, "the statistics")
+        study = (_changed(text(member(file, "study"), "toml"),
+                          lambda table: with_folder(table, Path(path).parent))
+                 if "study" in file else None)
+        versions = {name: str(one) for name, one in member(file, "versions").attrs.items()}
+    with trusting(trust):
+        try:
+            system = system_from_tables(basis, tables, str(path))
+        except UntrustedError as error:
+            if of_laws is None:
+                raise
+            from fecontact.output.files.recorded_laws import recorded_system
+
+            system = recorded_system(basis, tables, str(path), state, *of_laws, str(error))
+    with reading(path):
+        _require_states(system, state)
+    return Case(Trajectory(system=system, status=status, statistics=statistics, **state),
+                study, versions)
+
+
+def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
+    """What a trajectory holds besides system, status and statistics."""
+    time = array(stored, "time", (None,))
+    N, m, n = len(time), basis.modes, basis.contact_nodes
+    if not (N and np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+        raise DamagedError("the output times are not ascending")
+    widths = {"modal_coordinates": m, "modal_velocities": m, "work": len(POWERS), "memory": None}
+    state: dict[str, Any] = {"time": time}
+    for name in (*_STATE, *_OPTIONAL):
+        if name != "time" and (name in _STATE or name in stored):
+            state[name] = array(stored, name, (N, widths.get(name, n)))
+    if "events" in stored:
+        events = member(stored, "events")
+        times = array(events, "time", (None,))
+        nodes = array(events, "node", (len(times),), "i")
+        if len(nodes) and not (nodes.min() >= -1 and nodes.max() < n):
+            raise DamagedError("events name contact nodes that the basis lacks")
+        state["events"] = Events(times, tuple(texts(events, "kind", len(times))), nodes,
+                                 array(events, "states", (len(times), None)))
+    return state
+
+
+def _require_states(system: ContactSystem, state: dict[str, Any]) -> None:
+    """Raise DamagedError unless states have as many internal variables as the laws."""
+    n, memory = system.basis.contact_nodes, state.get("memory")
+    found = 0 if memory is None else memory.shape[1]
+    if found != n * system.memory:
+        raise DamagedError(f"states have {found} internal variables, not {n * system.memory}")
+    if "events" in state and state["events"].states.shape[1] != system.size:
+        raise DamagedError(f"states at events do not have {system.size} values")
+
+
+def _read_of_laws(stored: Any, basis: ModalBasis, count: int) -> tuple[Any, Any, Any] | None:
+    """Contact history, contact states and contact energy of a run with laws of the user's own."""
+    if not all(name in stored for name in _OF_LAWS):
+        return None
+    shape = count, basis.contact_nodes
+    return (np.stack([array(stored, name, shape) for name in _COLUMNS], axis=2),
+            array(stored, "contact_state", shape, "i"),
+            array(stored, "contact_energy", (count,)))
+
+
+def _changed(study: str, change: Callable[[Any], Any]) -> str:
+    """A study with its tables changed, but for that of the mesh; the same text where none is."""
+    tables = tomllib.loads(study)
+    changed = {name: table if name == "geometry" else change(table)
+               for name, table in tables.items()}
+    return study if changed == tables else tomli_w.dumps(changed)
+
+
+def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
+    import h5py
+
+    kept = {name: unit for name, unit in _OPTIONAL.items()
+            if getattr(trajectory, name) is not None}
+    of_laws = _of_laws(trajectory) if law_files(system_tables(trajectory.system)) else {}
+    for name, unit in (_STATE | kept | _CONTACT | _OF_LAWS).items():
+        if name in _OF_LAWS and not of_laws:
+            continue
+        data = group.create_dataset(name, data=of_laws[name] if name in of_laws
+                                    else getattr(trajectory, name))
+        data.attrs["unit"] = unit
+    if trajectory.events is not None:
+        events = group.create_group("events")
+        for name, unit in (("time", "s"), ("node", ""), ("states", "as y = [q, q', z]")):
+            data = events.create_dataset(name, data=getattr(trajectory.events, name))
+            data.attrs["unit"] = unit
+        events.create_dataset("kind", data=list(trajectory.events.kind), dtype=h5py.string_dtype())
+    group.attrs["status"] = trajectory.status.name
+    group.attrs["statistics"] = json.dumps(trajectory.statistics, default=lambda x: x.item())
+
+
+def _of_laws(trajectory: Trajectory) -> dict[str, Any]:
+    contact = trajectory.system.contact_history(trajectory.time, trajectory.states)
+    return {"penetration_rate": trajectory.penetration_rate,
+            "ground_rate": contact[:, :, GROUND_RATE],
+            "contact_energy": trajectory.energies.contact}
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

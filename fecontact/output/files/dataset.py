@@ -1,0 +1,139 @@
+"""A run as named arrays with dimensions and units, for other programs."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import MissingLibraryError
+from fecontact.integrate.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+_NODES = {
+    "normal_force": "N", "friction_force": "N", "penetration": "m", "slip_velocity": "m/s",
+    "pressure": "N/m", "friction_work": "J", "contact_state": "0 open, 1 stick, 2 slip",
+}
+_AXES = ("x", "y", "phi")
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """An array, its dimensions and its unit.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        Names out of time, point, axis, node, mode.
+    values : array
+    unit : str
+    """
+
+    dims: tuple[str, ...]
+    values: NDArray[Any]
+    unit: str
+
+
+def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
+    """What the dimensions stand for: time, names of points, axes, nodes, modes."""
+    require_kind("A table of a run", Trajectory, trajectory=trajectory)
+    basis = trajectory.system.basis
+    return {
+        "time": Variable(("time",), trajectory.time, "s"),
+        "point": Variable(("point",), np.array(_points(trajectory)), "1"),
+        "axis": Variable(("axis",), np.array(_AXES), "1"),
+        "node": Variable(("node",), np.arange(basis.contact_nodes), "1"),
+        "node_x": Variable(("node",), basis.contact_x, "m"),
+        "node_length": Variable(("node",), basis.tributary, "m"),
+        "mode": Variable(("mode",), np.arange(basis.modes), "1"),
+        "mode_frequency": Variable(("mode",), basis.frequencies_hz, "Hz"),
+    }
+
+
+def variables(trajectory: Trajectory) -> dict[str, Variable]:
+    """All that a run holds and what follows from it.
+
+    Displacements and velocities [x, y, phi] of B, C and further named points that the body has
+    and of the contact nodes, forces and states of these, energies, modal coordinates.
+    """
+    require_kind("A table of a run", Trajectory, trajectory=trajectory)
+    basis, q, rate = (trajectory.system.basis, trajectory.modal_coordinates,
+                      trajectory.modal_velocities)
+    points = [basis.point_index(name) for name in _points(trajectory)]
+    nodes = slice(2, 2 + basis.contact_nodes)
+    found = {}
+    for name, modal, unit in (("displacement", q, "m, m, rad"),
+                              ("velocity", rate, "m/s, m/s, rad/s")):
+        for what, rows, dim in (("", basis.T[points], "point"), ("node_", basis.T[nodes], "node")):
+            found[what + name] = Variable(("time", dim, "axis"), np.einsum(
+                "pam,tm->tpa", rows, modal), unit)
+    for name, unit in _NODES.items():
+        found[name] = Variable(("time", "node"), getattr(trajectory, name), unit)
+    energies = trajectory.energies
+    for name in energies.__dataclass_fields__:
+        found[f"energy_{name}"] = Variable(("time",), getattr(energies, name), "J")
+    found["modal_coordinates"] = Variable(("time", "mode"), q, "kg^0.5 m")
+    found["modal_velocities"] = Variable(("time", "mode"), rate, "kg^0.5 m/s")
+    return found
+
+
+def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
+    """All variables as single columns (N,) with headers, ``B displacement x [m]``.
+
+    Modal coordinates are left out: they say nothing without the modes.
+    """
+    require_kind("A table of a run", Trajectory, trajectory=trajectory)
+    names = {key: [str(value) for value in variable.values]
+             for key, variable in coordinates(trajectory).items()}
+    found: dict[str, NDArray[Any]] = {"time [s]": trajectory.time}
+    for name, variable in variables(trajectory).items():
+        title = name.removeprefix("node_").replace("_", " ")
+        if "mode" in variable.dims:
+            continue
+        if variable.dims == ("time",):
+            found[f"{title} [{variable.unit}]"] = variable.values
+            continue
+        units = variable.unit.split(", ") if "axis" in variable.dims else [variable.unit]
+        dim = variable.dims[1]
+        for place, label in enumerate(names[dim]):
+            owner = label if dim == "point" else f"node {label}"
+            for axis, unit in enumerate(units):
+                ending = f" {_AXES[axis]}" if "axis" in variable.dims else ""
+                values = variable.values[:, place]
+                found[f"{owner} {title}{ending} [{unit}]"] = (
+                    values[:, axis] if values.ndim > 1 else values)
+    return found
+
+
+def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
+    """A run as an :class:`xarray.Dataset`, with coordinates and an attribute ``units`` each.
+
+    Dimensions are time, point, axis, node and mode: ``ds.displacement.sel(point="B", axis="x")``.
+
+    Raises
+    ------
+    MissingLibraryError
+        If xarray is not installed.
+    """
+    try:
+        from xarray import DataArray, Dataset
+    except ImportError:
+        raise MissingLibraryError("xarray is not installed; install it with pip install "
+                                  "'fecontact[xarray]'.") from None
+
+    def array(variable: Variable) -> Any:
+        return DataArray(variable.values, dims=variable.dims, attrs={"units": variable.unit})
+
+    return Dataset(
+        {name: array(variable) for name, variable in variables(trajectory).items()},
+        coords={name: array(variable) for name, variable in coordinates(trajectory).items()},
+        attrs={"title": "fecontact run", "status": trajectory.status.value})
+
+
+def _points(trajectory: Trajectory) -> list[str]:
+    """Names of the points that the body has."""
+    basis = trajectory.system.basis
+    return [name for name in ("B", "C", *basis.extra) if basis.T[basis.point_index(name)].any()]

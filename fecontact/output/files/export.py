@@ -1,0 +1,145 @@
+"""Runs as tables and arrays for other programs: CSV, MATLAB, netCDF; and VTU for ParaView."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.atomic_write import replaced
+from fecontact.core.checks import as_path
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.files.dataset import columns, coordinates, to_xarray, variables
+
+SUFFIXES = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc"}
+
+
+def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
+    """Write a run as a table: one row a time, one column a quantity, a line of names and units.
+
+    Seventeen digits, so that numbers read back are equal to the last bit. Modal coordinates are
+    left out.
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    table = columns(trajectory)
+
+    def write(part: Path) -> None:
+        with part.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(",".join(f'"{name}"' if "," in name else name for name in table) + "\n")
+            for first in range(0, len(trajectory.time), 1000):
+                rows = np.column_stack([values[first : first + 1000] for values in table.values()])
+                # Shortest texts that read back as the same numbers.
+                file.writelines(",".join(map(repr, row)) + "\n" for row in rows.tolist())
+
+    return _whole(path, write)
+
+
+def export_mat(trajectory: Trajectory, path: str | Path) -> Path:
+    """Write a run for MATLAB and Octave (version 5).
+
+    Variables as of :func:`fecontact.output.files.dataset.variables`, ``time`` and the other
+    coordinates, and a structure ``units`` with the unit of each.
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    from scipy.io import savemat
+
+    everything = coordinates(trajectory) | variables(trajectory)
+    content: dict[str, Any] = {
+        name: variable.values.astype(object) if variable.values.dtype.kind == "U"
+        else variable.values for name, variable in everything.items()}
+    content["units"] = {name: variable.unit for name, variable in everything.items()}
+    content["status"] = trajectory.status.value
+
+    def write(part: Path) -> None:
+        savemat(part, content, appendmat=False, do_compression=True, oned_as="column",
+                long_field_names=True)
+
+    return _whole(path, write)
+
+
+def export_netcdf(trajectory: Trajectory, path: str | Path) -> Path:
+    """Write a run as netCDF (version 3, 64-bit offsets), as :func:`to_xarray` names it.
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    MissingLibraryError
+        If xarray is not installed.
+    """
+    dataset = to_xarray(trajectory)
+
+    def write(part: Path) -> None:
+        dataset.to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
+
+    return _whole(path, write)
+
+
+def export_run(
+    trajectory: Trajectory, case: Path, form: str, output: Path | None = None, frames: int = 200
+) -> Path:
+    """Write a stored run in another format beside its file, or where ``output`` says.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    case : Path
+        The file it is stored in.
+    form : 'pvd', 'csv', 'mat' or 'netcdf'
+        The format.
+    output : Path, optional
+        A file; for 'pvd' a folder of its own.
+    frames : int
+        Number of fields over the body, for 'pvd'.
+
+    Raises
+    ------
+    InputError
+        For another format, a file with another ending, or what cannot be written.
+    """
+    if form == "pvd":
+        from fecontact.output.files.pvd import export_pvd
+
+        folder = output or case.with_name(f"{case.stem}-pvd")
+        return export_pvd(trajectory, folder / f"{case.stem}.pvd", frames=frames)
+    if form not in SUFFIXES:
+        raise InputError(f"format = {form!r} must be one of {choices(('pvd', *SUFFIXES))}"
+                         f"{nearest(form, SUFFIXES)}.")
+    path = output or case.with_suffix(SUFFIXES[form])
+    if path.suffix != SUFFIXES[form]:
+        raise InputError(f"{path} must end in {SUFFIXES[form]} for the format {form}.")
+    writers = {"csv": export_csv, "mat": export_mat, "netcdf": export_netcdf}
+    return writers[form](trajectory, path)
+
+
+def _whole(path: str | Path, write: Callable[[Path], None]) -> Path:
+    """Let a file be written beside its place, and put it there when it is complete."""
+    path = as_path(path, "a table")
+    with replaced(path) as part:
+        write(part)
+    return path

@@ -1,0 +1,101 @@
+"""Fields over the body at chosen times, for files and pictures."""
+
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.reduction.field import Field
+
+Array = NDArray[np.float64]
+
+
+
+def frame_indices(
+    time: Array, frames: int, start: float | None = None, end: float | None = None
+) -> NDArray[np.intp]:
+    """Output times to show: the nearest ones to ``frames`` evenly spaced times, each once.
+
+    Parameters
+    ----------
+    time : (N,) array
+        Ascending [s].
+    frames : int
+        Largest number of times, zero or above.
+    start, end : float, optional
+        First and last time to choose from [s].
+
+    Raises
+    ------
+    InputError
+        If ``frames`` is not such a number, or no output time lies between start and end.
+    """
+    for name, value in (("start", start), ("end", end)):
+        if value is not None and not (isinstance(value, Real) and value == value):
+            raise InputError(f"{name} = {value!r} must be a time of the run.")
+    if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 0:
+        raise InputError(f"frames = {frames!r} must be a whole number, zero or above.")
+    first = 0 if start is None else int(np.searchsorted(time, start, side="left"))
+    last = len(time) if end is None else int(np.searchsorted(time, end, side="right"))
+    if first >= last:
+        raise InputError(f"There is no output time from {start} s to {end} s; the run has times "
+                         f"from {time[0]:g} s to {time[-1]:g} s.")
+    chosen = np.arange(first, last)
+    if frames >= len(chosen):
+        return chosen
+    inside = time[chosen]
+    wanted = np.linspace(inside[0], inside[-1], frames)
+    right = np.clip(np.searchsorted(inside, wanted), 1, len(inside) - 1)
+    nearest = np.where(wanted - inside[right - 1] < inside[right] - wanted, right - 1, right)
+    return chosen[np.unique(nearest)]
+
+
+def require_field(trajectory: Trajectory) -> Field:
+    """The modes over the body; InputError if the modal basis holds none."""
+    require_kind("A picture", Trajectory, trajectory=trajectory)
+    field = trajectory.system.basis.field
+    if field is None:
+        raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "
+                         "body; make the basis with modal_basis(body, ...).")
+    return field
+
+
+def displacement(field: Field, q: Array) -> Array:
+    """Displacements (F, N, 2) of the nodes [m] at modal coordinates q (F, m)."""
+    nodes, _, modes = field.shapes.shape
+    return np.asarray(q @ field.shapes.reshape(2 * nodes, modes).T).reshape(len(q), nodes, 2)
+
+
+def von_mises(field: Field, q: Array) -> Array:
+    """Von Mises stress (F, N) at the nodes [Pa] at modal coordinates q (F, m)."""
+    nodes, _, modes = field.stress.shape
+    components = field.stress.transpose(1, 0, 2).reshape(4 * nodes, modes)
+    xx, yy, zz, xy = np.moveaxis((q @ components.T).reshape(len(q), 4, nodes), 1, 0)
+    square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2
+    return np.sqrt(square)
+
+
+def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
+    """Forces (F, n, 2) of the ground on the contact nodes, [-R, F] [N]."""
+    return np.stack([-trajectory.friction_force[which], trajectory.normal_force[which]], axis=-1)
+
+
+def nodal_contact_force(trajectory: Trajectory, which: Any = slice(None)) -> Array:
+    """Contact forces (F, N, 2) spread over the nodes of the body [N]; their sum is the total."""
+    field = require_field(trajectory)
+    forces = contact_forces(trajectory, which)
+    n = forces.shape[1]
+    rows = field.restriction.tocsr()[6 : 6 + 3 * n]
+    moments = np.zeros((*forces.shape[:2], 1))
+    spread = rows.T @ np.concatenate([forces, moments], axis=2).reshape(len(forces), 3 * n).T
+    return np.asarray(spread).T.reshape(len(forces), len(field.nodes), 2)
+
+
+def blocks(indices: NDArray[np.intp], nodes: int) -> list[NDArray[np.intp]]:
+    """Pieces of the chosen times, small enough for four doubles per node to stay in cache."""
+    size = max(1, 2**20 // (4 * nodes))
+    return [indices[first : first + size] for first in range(0, len(indices), size)]

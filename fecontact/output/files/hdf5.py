@@ -1,0 +1,210 @@
+"""HDF5 files: written whole or not at all, and the modal basis inside them."""
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.atomic_write import replaced
+from fecontact.core.checks import as_path, require_kind
+from fecontact.core.errors import InputError
+from fecontact.core.interrupts import held_back_interrupt
+from fecontact.core.stored import (
+    DamagedError,
+    array,
+    indices,
+    member,
+    reading,
+    require_lengths,
+    sound_sparse,
+    values,
+)
+from fecontact.reduction.field import Field, Quality
+from fecontact.reduction.modal_basis import ModalBasis
+
+_PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
+_FIELD = ("nodes", "cells", "outline", "shapes", "stress")
+
+
+class _Sink(io.FileIO):
+    """A file for HDF5 that never fails: the first error is kept, what follows is dropped.
+
+    The library leaves a file that it cannot write in a state in which closing it crashes the
+    process.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self.error: OSError | None = None
+
+    def write(self, content: Any) -> int:
+        view = memoryview(content).cast("B")
+        done = 0
+        while self.error is None and done < len(view):
+            try:
+                done += super().write(view[done:])
+            except OSError as error:
+                self.error = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+
+@contextmanager
+def new_file(path: str | Path) -> Iterator[Any]:
+    """A new HDF5 file, open for writing, that takes its place when the block ends well.
+
+    Ctrl-C is held back until then: an exception inside the library would leave a broken file open.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    import h5py
+
+    with held_back_interrupt() as check:
+        with replaced(path) as part, _Sink(part) as sink:
+            try:
+                with h5py.File(sink, "w") as file:
+                    yield file
+            except Exception:
+                if sink.error is None:
+                    raise
+            if sink.error is not None:
+                raise sink.error
+        check()
+
+
+@contextmanager
+def open_file(path: str | Path, group: str) -> Iterator[Any]:
+    """An HDF5 file, open for reading, that must hold ``group``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is not HDF5, or it has no such group; and in the place of
+        whatever else the block raises, see :func:`fecontact.core.stored.reading`.
+    """
+    import h5py
+
+    path = as_path(path, "a file of results")
+    if not path.is_file():
+        raise InputError(f"{path} does not exist.")
+    try:
+        file = h5py.File(path, "r")
+    except OSError:
+        raise InputError(f"{path} is not an HDF5 file, or is damaged.") from None
+    with reading(path), file:
+        if group not in file:
+            raise InputError(f"{path} was not written by fecontact: it has no group '{group}'.")
+        yield file
+
+
+def write_basis(path: str | Path, basis: ModalBasis) -> None:
+    """Write a modal basis to an HDF5 file, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    require_kind("write_basis", ModalBasis, basis=basis)
+    with new_file(path) as file:
+        store_basis(file.create_group("basis"), basis)
+
+
+def read_basis(path: str | Path) -> ModalBasis:
+    """Read a basis that :func:`write_basis` wrote, or that of a case; exact to the last bit.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it holds no basis or a damaged one.
+    """
+    with open_file(path, "basis") as file:
+        return stored_basis(member(file, "basis"))
+
+
+def store_basis(group: Any, basis: ModalBasis) -> None:
+    """Write a basis into an HDF5 group."""
+    for name in _PLAIN:
+        group.create_dataset(name, data=getattr(basis, name))
+    group.attrs["extra"] = list(basis.extra)
+    group.attrs["groups"] = [name for name, _ in basis.groups]
+    group.attrs["group_sizes"] = [count for _, count in basis.groups]
+    if basis.quality is not None:
+        quality = group.create_group("quality")
+        for name, value in vars(basis.quality).items():
+            quality.create_dataset(name, data=value)
+    if basis.field is None:
+        return
+    field = group.create_group("field")
+    for name in _FIELD:
+        field.create_dataset(name, data=getattr(basis.field, name))
+    restriction = basis.field.restriction.tocsr()
+    for name in ("data", "indices", "indptr"):
+        field.create_dataset(f"restriction/{name}", data=getattr(restriction, name))
+    field["restriction"].attrs["shape"] = restriction.shape
+
+
+def stored_basis(group: Any) -> ModalBasis:
+    """Read a basis from an HDF5 group that :func:`store_basis` filled.
+
+    Raises
+    ------
+    DamagedError, KeyError, InputError
+        If it holds something else; see :func:`fecontact.core.stored.reading`.
+    """
+    w = array(group, "angular_frequencies", (None,))
+    m = len(w)
+    T = array(group, "T", (None, 3, m))
+    extra = tuple(str(name) for name in np.atleast_1d(group.attrs["extra"]))
+    names, sizes = (np.atleast_1d(group.attrs[name]) for name in ("groups", "group_sizes"))
+    require_lengths("'group_sizes'", len(names), sizes)
+    return ModalBasis(
+        w, array(group, "damping", (m, m)), T, array(group, "positions", (len(T), 2)),
+        array(group, "tributary", (None,)), extra=extra,
+        field=_read_field(member(group, "field"), m, len(T)) if "field" in group else None,
+        quality=_read_quality(member(group, "quality"), m, len(T)) if "quality" in group else None,
+        groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)))
+
+
+def _read_field(group: Any, modes: int, points: int) -> Field:
+    import scipy.sparse as sp
+
+    nodes = array(group, "nodes", (None, 2))
+    N = len(nodes)
+    cells = indices(group, "cells", (None, None), N)
+    if cells.shape[1] not in (3, 4):
+        raise DamagedError(f"cells have {cells.shape[1]} corners, not 3 or 4")
+    stored = member(group, "restriction")
+    shape = tuple(int(length) for length in np.atleast_1d(stored.attrs["shape"]))
+    if shape != (3 * points, 2 * N):
+        raise DamagedError(f"the restriction has shape {shape}, not {(3 * points, 2 * N)}")
+    rows = array(stored, "indptr", (shape[0] + 1,), "i")
+    columns = array(stored, "indices", (None,), "i")
+    restriction = sp.csr_array((array(stored, "data", (len(columns),)), columns, rows),
+                               shape=shape)
+    return Field(nodes, cells, indices(group, "outline", (None, 2), N),
+                 array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
+                 sound_sparse(restriction))
+
+
+def _read_quality(group: Any, modes: int, points: int) -> Quality:
+    mass, count, orthogonality = (
+        values(member(group, name)).item() for name in ("mass", "vibration_modes",
+                                                        "orthogonality"))
+    return Quality(
+        mass=float(mass), vibration_modes=int(count), orthogonality=float(orthogonality),
+        residuals=array(group, "residuals", (modes,)),
+        participation=array(group, "participation", (2, modes)),
+        compliance=array(group, "compliance", (points, 2)))

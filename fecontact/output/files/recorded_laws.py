@@ -1,0 +1,169 @@
+"""A contact system whose laws are known only where they were recorded.
+
+Laws of a user's own file are code. A run read from somewhere else is not to run it; what its file
+holds of the laws is enough to draw and export the run.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.laws.registry import UntrustedError
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.gap import gap_values
+from fecontact.system.tables import system_parts
+
+Array = NDArray[np.float64]
+
+LAW_PARTS = ("normal", "friction")
+
+
+class UnreadLaw:
+    """A law whose code was not run; InputError for all that is asked of it."""
+
+    def __init__(self, table: Mapping[str, Any], needs: str) -> None:
+        self._table, self._needs = dict(table), needs
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") and name != "__dataclass_fields__":
+            raise AttributeError(name)
+        raise InputError(self._needs)
+
+    def __repr__(self) -> str:
+        return f"UnreadLaw({self._table})"
+
+
+class _Recorded:
+    """A function of rows of numbers that is known at some of them."""
+
+    def __init__(self, rows: Array, values: NDArray[Any], needs: str) -> None:
+        self._values, self._needs = values, needs
+        self._places = {row.tobytes(): place for place, row in enumerate(rows)}
+
+    def __call__(self, rows: Array) -> NDArray[Any]:
+        """Values at rows that are all known; InputError for others."""
+        try:
+            return self._values[[self._places[row.tobytes()] for row in
+                                 np.ascontiguousarray(rows)]].copy()
+        except KeyError:
+            raise InputError(self._needs) from None
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSystem(ContactSystem):
+    """A system whose contact forces, states and energies are those of one run.
+
+    All that does not follow from them raises InputError.
+
+    Attributes
+    ----------
+    history : function
+        Contact quantities (N, n, 6) of times and states.
+    energy, sticking : functions
+        Contact energy (N,) [J] of penetrations, and whether nodes stick, (N, n), of slip
+        velocities, normal and friction forces.
+    states : int
+        Number of internal variables of a node.
+    needs : str
+        The sentence for what is not recorded.
+    """
+
+    history: Any = None
+    energy: Any = None
+    sticking: Any = None
+    states: int = 0
+    needs: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+
+    @property
+    def memory(self) -> int:
+        """Number of internal variables of a node."""
+        return self.states
+
+    @property
+    def arrays(self) -> Any:
+        """The compiled laws, which are not there."""
+        raise InputError(self.needs)
+
+    def with_(self, **changes: Any) -> ContactSystem:
+        """A copy with other parameters, which the laws would be needed for."""
+        raise InputError(self.needs)
+
+    def parameters(self) -> dict[str, Any]:
+        """All parameters, which the laws would be needed for."""
+        raise InputError(self.needs)
+
+    def contact_history(self, times: Array, states: Array) -> Array:
+        """Recorded contact quantities (N, n, 6)."""
+        return np.asarray(self.history(np.column_stack([times, states])))
+
+    def stored_energy(self, penetration: Array) -> Array:
+        """Recorded energy in the contact (N,) [J]."""
+        return np.asarray(self.energy(penetration))
+
+    def sticks(
+        self, slip_velocity: Array, normal_force: Array, friction_force: Array
+    ) -> NDArray[np.bool_]:
+        """Whether nodes stuck (N, n)."""
+        return np.asarray(self.sticking(np.hstack([slip_velocity, normal_force, friction_force])))
+
+
+def recorded_system(
+    basis: ModalBasis, tables: Mapping[str, Any], where: str, state: Mapping[str, Any],
+    contact: Array, contact_state: NDArray[Any], energy: Array, needs: str,
+) -> RecordedSystem:
+    """The system of a run from what was recorded of it.
+
+    Parameters
+    ----------
+    basis : ModalBasis
+        That of the run.
+    tables : mapping
+        As of :func:`fecontact.core.tables.system_tables`.
+    where : str
+        The file, for messages.
+    state : mapping
+        ``time``, ``modal_coordinates``, ``modal_velocities`` and, with memory, ``memory``.
+    contact : (N, n, 6) array
+        See :meth:`ContactSystem.contact_history`.
+    contact_state : (N, n) integer array
+        Values of :class:`fecontact.integrate.trajectory.ContactState`.
+    energy : (N,) array
+        Energy in the contact [J].
+    needs : str
+        The sentence for what is not recorded.
+
+    Raises
+    ------
+    InputError
+        If ground, drive or load need code too.
+    """
+    parts = system_parts(tables, where, ("ground", "drive", "load"))
+    laws = {part: _law(part, tables, where, needs) for part in LAW_PARTS}
+    memory = state.get("memory")
+    rows = np.column_stack([state["time"], state["modal_coordinates"], state["modal_velocities"],
+                            *(() if memory is None else (memory,))])
+    normal, friction, penetration, slip = (contact[:, :, k] for k in (0, 1, 2, 4))
+    return RecordedSystem(
+        basis, gap=tables.get("gap", 0.0), **parts, **laws,
+        history=_Recorded(rows, contact, needs),
+        energy=_Recorded(penetration, energy, needs),
+        sticking=_Recorded(np.hstack([slip, normal, friction]), contact_state == 1, needs),
+        states=0 if memory is None else memory.shape[1] // basis.contact_nodes, needs=needs)
+
+
+def _law(part: str, tables: Mapping[str, Any], where: str, needs: str) -> Any:
+    """A law that needs no code, or what stands in its place."""
+    if tables.get("contact"):
+        return UnreadLaw(tables["contact"], needs)
+    try:
+        return system_parts(tables, where, (part,))[part]
+    except UntrustedError:
+        return UnreadLaw(tables[part], needs)

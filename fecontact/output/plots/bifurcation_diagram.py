@@ -1,0 +1,232 @@
+"""Bifurcation diagrams."""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices
+from fecontact.output.plots.diagram_insets import DOTS, draw_beneath, draw_insets, main_axis
+from fecontact.output.plots.style import DASHES, distinct_colours, new_figure, save_figure
+from fecontact.system.parameter_labels import parameter_label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+    from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+    from fecontact.output.plots.diagram_insets import Inset
+
+Array = NDArray[np.float64]
+Quantity = str | int | Callable[["BranchPoint"], float]
+
+# Letters and markers of special points.
+_SPECIAL = {
+    "Hopf": ("H", "o"), "fold": ("F", "s"), "branch point": ("BP", "D"),
+    "period doubling": ("PD", "^"), "Neimark-Sacker": ("NS", "v"), "cusp": ("CP", "P"),
+    "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
+    "double Hopf": ("HH", ">"), "unresolved": ("?", "x"),
+}
+
+
+def plot_branches(
+    branches: "Branch | Sequence[Branch]", path: str | Path, y: Quantity = 0, *,
+    x: Quantity = "parameter", x_label: str | None = None, y_label: str | None = None,
+    names: Sequence[str] = (), beneath: "BruteForce | None" = None,
+    observe: tuple[str | int, str] = ("B", "x"), insets: "Sequence[Inset]" = (),
+) -> Path:
+    """Plot branches: stable parts solid, unstable ones dashed, special points marked and labelled.
+
+    Parameters
+    ----------
+    branches : Branch or sequence of Branch
+        Each gets its own colour, those of one name the same.
+    path : str or Path
+        A .png, .pdf or .svg file; it is replaced if it exists.
+    y, x : str, int or callable
+        What to draw: 'parameter', the name of a stored number, the number of a state counted from
+        0, or a function of a :class:`fecontact.bifurcation.continuation.branch.BranchPoint`. For y
+        also 'observed_section' of :func:`fecontact.bifurcation.orbits.samples.observe`, one curve
+        for each period of the excitation.
+    x_label, y_label : str, optional
+        Labels of the axes, with units.
+    names : sequence of str
+        Names of the branches for the legend, in which each name stands once; several branches
+        without names are numbered there.
+    beneath : BruteForce, optional
+        Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
+        should be 'observed_section'.
+    observe : (point, axis)
+        The displacement of the runs that is drawn; see
+        :meth:`fecontact.bifurcation.attractors.poincare_scan.BruteForce.observed`.
+    insets : sequence of Inset
+        Phase planes of chosen points, drawn above the diagram; see
+        :func:`fecontact.output.plots.diagram_insets.phase_inset`.
+
+    Raises
+    ------
+    InputError
+        For a quantity that is not stored, another suffix, or a file that cannot be written.
+    """
+    from fecontact.bifurcation.continuation.branch import Branch
+
+    require_kind("plot_branches", (Branch, Sequence), branches=branches)
+    several = [branches] if isinstance(branches, Branch) else list(branches)
+    for branch in several:
+        require_kind("plot_branches", Branch, branch=branch)
+    if not several:
+        raise InputError("branches = [] holds nothing to draw; give at least one Branch.")
+    return save_figure(path, lambda: branches_figure(several, y, x, x_label, y_label, names,
+                                                     beneath, observe, insets))
+
+
+def branches_figure(
+    branches: "Sequence[Branch]", y: Quantity = 0, x: Quantity = "parameter",
+    x_label: str | None = None, y_label: str | None = None, names: Sequence[str] = (),
+    beneath: "BruteForce | None" = None, observe: tuple[str | int, str] = ("B", "x"),
+    insets: "Sequence[Inset]" = (),
+) -> "Figure":
+    """See :func:`plot_branches`."""
+    figure = new_figure(8.0, 7.2 if insets else 5.2)
+    axis = main_axis(figure, insets)
+    dots = draw_beneath(axis, beneath, observe)
+    known: dict[str, list[tuple[float, float]]] = {}
+    dashed = False
+    if len(branches) > 1:
+        names = [*names, *(f"branch {k + 1}" for k in range(len(names), len(branches)))]
+    groups = [*names[: len(branches)], *range(len(names), len(branches))]
+    # One more, as one of them is that of runs.
+    apart = [colour for colour in distinct_colours(len(set(groups)) + 1)
+             if colour not in DOTS.values()]
+    colours = dict(zip(dict.fromkeys(groups), apart, strict=False))
+    for group, branch in zip(groups, branches, strict=True):
+        places, curves = _values(branch, x), _values(branch, y, rows=True)
+        stable = _stable_pieces(branch)
+        dashed |= not stable.all()
+        colour = colours[group]
+        heights = curves if curves.ndim == 1 else curves[:, 0]
+        for first, last in _runs(stable):
+            axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
+                      linewidth=1.8 if stable[first] else 1.2,
+                      linestyle="-" if stable[first] else DASHES)
+        for index, point in enumerate(branch.points):
+            if point.kind is not None:
+                known.setdefault(point.kind, []).append((places[index], heights[index]))
+    axis.set_xlabel(x_label or _label(x, branches[0].name))
+    axis.set_ylabel(y_label or _label(y, branches[0].name))
+    axis.margins(x=0.02, y=0.06)
+    axis.autoscale_view()
+    axis.ticklabel_format(axis="y", scilimits=(-3, 5))
+    _mark(axis, known)
+    draw_insets(figure, axis, insets)
+    _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
+    return figure
+
+
+def _values(branch: "Branch", quantity: Quantity, rows: bool = False) -> Array:
+    """Values (N,) of a quantity, or (N, s) of a row of them where these are allowed."""
+    if callable(quantity):
+        return np.array([quantity(point) for point in branch.points], dtype=float)
+    if isinstance(quantity, int):
+        return np.asarray(branch.column("state")[:, quantity])
+    if quantity == "parameter":
+        return branch.parameter
+    found = branch.column(quantity)
+    if rows and quantity == "observed_section" and found.ndim == 2:
+        return found
+    if found.ndim != 1 or found.dtype.kind not in "fiub":
+        plain = [name for name, value in branch.points[0].values.items()
+                 if np.ndim(value) == 0 and not isinstance(value, complex)]
+        raise InputError(f"{quantity!r} is not one number at each point; choose from "
+                         f"{choices(plain)}, the number of a state, or give a function.")
+    return found.astype(float)
+
+
+def _stable_pieces(branch: "Branch") -> NDArray[np.bool_]:
+    """Whether each piece (N - 1,) between neighbours is stable; decided by regular points."""
+    stable = [None if point.kind is not None else bool(point.values.get("stable", True))
+              for point in branch.points]
+    pieces: list[bool] = []
+    for before, after in pairwise(stable):
+        known = [value for value in (before, after) if value is not None]
+        pieces.append(all(known) if known else (pieces[-1] if pieces else True))
+    return np.array(pieces or [True], dtype=bool)
+
+
+def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last point of each row of pieces of the same kind."""
+    edges = [0, *(np.flatnonzero(np.diff(stable)) + 1).tolist(), len(stable)]
+    return list(pairwise(edges))
+
+
+def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
+    """Markers, and letters on the side where there is room; without where there is none."""
+    special: list[tuple[str, str, float, float]] = []
+    for kind, places in known.items():
+        letters, marker = _SPECIAL.get(kind, ("", "."))
+        # A point that two branches share is marked once.
+        distinct: list[tuple[float, float]] = []
+        for place in places:
+            if not any(np.allclose(place, other, rtol=1e-6) for other in distinct):
+                distinct.append(place)
+        for number, (x, y) in enumerate(distinct):
+            count = str(number + 1) if letters and len(distinct) > 1 else ""
+            special.append((f"{letters or kind}{count}", marker, x, y))
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    points = 72.0 / axis.figure.dpi
+    seen = axis.transData.transform([(x, y) for _, _, x, y in special] or np.empty((0, 2))) * points
+    taken: list[Array] = [np.concatenate([place - 4.0, place + 4.0]) for place in seen]
+    for (text, marker, x, y), place in zip(special, seen, strict=True):
+        axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
+                  linestyle="none", zorder=4)
+        size = np.array([6.5 * len(text), 10.0])
+        for right, above in ((1, 1), (0, 0), (0, 1), (1, 0)):
+            side = np.array([right, above])
+            corner = place + 6.0 * (2 * side - 1) - (1 - side) * size
+            box = np.concatenate([corner, corner + size])
+            if any((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all() for other in taken):
+                continue
+            taken.append(box)
+            axis.annotate(text, (x, y), xytext=(12.0 * right - 6.0, 12.0 * above - 6.0),
+                          ha="left" if right else "right", va="bottom" if above else "top",
+                          textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
+            break
+
+
+def _legend(
+    axis: "Axes", colours: dict[str, str], known: dict[str, list[tuple[float, float]]],
+    dashed: bool, dots: Sequence[Any],
+) -> None:
+    from matplotlib.lines import Line2D
+
+    handles: list[Any] = [Line2D([], [], color=colour, linewidth=1.8, label=name)
+                          for name, colour in colours.items()]
+    if dashed:
+        handles.append(Line2D([], [], color="#303030", linewidth=1.8, label="stable"))
+        handles.append(Line2D([], [], color="#303030", linewidth=1.2, linestyle=DASHES,
+                              label="unstable"))
+    for kind in known:
+        letters, marker = _SPECIAL.get(kind, ("", "."))
+        handles.append(Line2D([], [], color="#303030", marker=marker, markerfacecolor="white",
+                              linestyle="none", markersize=7.0,
+                              label=f"{kind} ({letters})" if letters else kind))
+    handles += dots
+    if handles:
+        axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
+
+
+def _label(quantity: Quantity, parameter: str) -> str:
+    if quantity == "parameter":
+        return parameter_label(parameter)
+    if quantity == "period":
+        return "period [s]"
+    if isinstance(quantity, int):
+        return f"state {quantity}"
+    return quantity if isinstance(quantity, str) else ""

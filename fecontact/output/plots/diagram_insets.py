@@ -1,0 +1,141 @@
+"""What stands beneath and above bifurcation diagrams: runs by brute force, phase planes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+    from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+    from fecontact.bifurcation.fields.contact_field import ContactField
+
+Array = NDArray[np.float64]
+
+_INK = "#303030"
+# Colours of runs, which no branch has.
+DOTS = {"up": "#b4b0a8", "down": "#e69f00"}
+
+
+@dataclass(frozen=True, eq=False)
+class Inset:
+    """A phase plane that belongs to a place of a diagram.
+
+    Attributes
+    ----------
+    parameter, height : float
+        The place.
+    displacement, velocity : (k,) arrays
+        The closed curve, in m and m/s.
+    title : str
+        Above it.
+    stable : bool
+        Whether it is drawn solid.
+    """
+
+    parameter: float
+    height: float
+    displacement: Array
+    velocity: Array
+    title: str
+    stable: bool
+
+
+def phase_inset(
+    field: "ContactField", branch: "Branch", point: "BranchPoint", height: float,
+    observe: tuple[str | int, str] = ("B", "x"), title: str | None = None,
+) -> Inset:
+    """The phase plane of an orbit of a branch, for the diagram in which it has this height.
+
+    Parameters
+    ----------
+    field, branch, point
+        A point of a branch of orbits, and its field.
+    height : float
+        y of the point in the diagram.
+    observe : (point, axis)
+        Displacement and velocity that are drawn; axis 'x', 'y' or 'rotation'.
+    title : str, optional
+        The parameter's value by default.
+
+    Raises
+    ------
+    InputError
+        If the point is no orbit.
+    """
+    from fecontact.bifurcation.orbits.samples import motion_of
+
+    states = motion_of(field, branch, point)[1]
+    row = field.displacement_row(*observe)
+    modes = field.system().basis.modes
+    rate = np.concatenate([np.zeros(modes), row[:modes], np.zeros(len(row) - 2 * modes)])
+    return Inset(point.parameter, height, states @ row, states @ rate,
+                 title or f"{branch.name} = {point.parameter:.4g}",
+                 bool(point.values["stable"]))
+
+
+def main_axis(figure: "Figure", insets: Sequence[Inset]) -> "Axes":
+    """The axis of the diagram, with a row of small ones above it where there are insets."""
+    if not insets:
+        return figure.subplots()
+    grid = figure.add_gridspec(2, max(3, len(insets)), height_ratios=(1.0, 2.4))
+    return figure.add_subplot(grid[1, :])
+
+
+def draw_insets(figure: "Figure", axis: "Axes", insets: Sequence[Inset]) -> None:
+    """Phase planes above the diagram, each with a line to its place."""
+    from matplotlib.patches import ConnectionPatch
+
+    if not insets:
+        return
+    from fecontact.core.units import suitable_unit
+
+    # From left to right as in the diagram, so that the lines do not cross.
+    ordered = sorted(insets, key=lambda inset: inset.parameter)
+    length, length_name = suitable_unit(
+        float(max(np.abs(inset.displacement).max() for inset in ordered)), "m")
+    speed, speed_name = suitable_unit(
+        float(max(np.abs(inset.velocity).max() for inset in ordered)), "m/s")
+    grid = axis.get_gridspec()
+    assert grid is not None
+    for number, inset in enumerate(ordered):
+        small = figure.add_subplot(grid[0, number])
+        small.plot(inset.displacement / length, inset.velocity / speed, color=_INK, linewidth=1.0,
+                   linestyle="-" if inset.stable else (0, (4, 2.5)))
+        small.set_title(inset.title, fontsize=9.0)
+        small.tick_params(labelsize=7.5)
+        small.set_xlabel(f"displacement [{length_name}]" if number == 0 else "", fontsize=8.0,
+                         loc="left")
+        small.set_ylabel(f"velocity [{speed_name}]" if number == 0 else "", fontsize=8.0)
+        small.margins(0.08)
+        axis.plot(inset.parameter, inset.height, "o", markersize=4.0, color=_INK, zorder=6)
+        figure.add_artist(ConnectionPatch(
+            (0.5, 0.0), (inset.parameter, inset.height), small.transAxes, axis.transData,
+            color="#8a8a8a", linewidth=0.7, zorder=5))
+
+
+def draw_beneath(
+    axis: "Axes", runs: "BruteForce | None", observe: tuple[str | int, str]
+) -> list[Any]:
+    """Dots of runs once per period, up and down; handles for the legend."""
+    if runs is None:
+        return []
+    from matplotlib.lines import Line2D
+
+    point, direction = observe
+    up, down = runs.observed(point, direction)  # type: ignore[arg-type]
+    handles = []
+    for name, values, size in (("up", up, 2.6), ("down", down, 1.3)):
+        if not values.size:
+            continue
+        places = np.repeat(runs.values, values.shape[1])
+        axis.plot(places, values.reshape(-1), "o", color=DOTS[name], markersize=size,
+                  markeredgewidth=0.0, linestyle="none", zorder=1, rasterized=True)
+        handles.append(Line2D([], [], color=DOTS[name], marker="o", linestyle="none",
+                              markersize=4.0, label=f"runs, {name}"))
+    return handles

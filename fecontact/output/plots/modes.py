@@ -1,0 +1,94 @@
+"""Figures of the modes of a body: their shapes, and how they converge."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.output.plots.style import new_figure
+from fecontact.reduction.convergence import ModeConvergence
+from fecontact.reduction.field import Field
+from fecontact.reduction.modal_basis import ModalBasis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_VISIBLE = 0.07  # largest displacement drawn, as a part of the body's extent
+_WIDTH = 10.0  # inches
+
+
+def modes_figure(basis: ModalBasis, count: int = 12) -> "Figure":
+    """The first modes: deformed body, coloured by amplitude, over its undeformed outline."""
+    if basis.field is None:
+        raise InputError("These modes cannot be drawn: the modal basis holds no shapes over the "
+                         "body; make it with ElasticBody.modal_basis.")
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise InputError(f"count = {count!r} must be a whole number of at least one mode.")
+    field, shown = basis.field, min(count, basis.modes)
+    size = np.ptp(field.nodes, axis=0)
+    reach = _VISIBLE * float(np.linalg.norm(size))
+    aspect = (size[0] + 2.0 * reach) / (size[1] + 2.0 * reach)
+    columns = min(shown, 6, int(np.ceil(np.sqrt(1.8 * shown / aspect))))
+    rows = -(-shown // columns)
+    height = min(_WIDTH / columns / aspect, 3.5)
+    figure = new_figure(_WIDTH, rows * (height + 0.4) + 0.8)
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for axis in grid.flat:
+        axis.set_axis_off()
+    for mode, axis in enumerate(grid.flat[:shown]):
+        drawn = _draw_mode(axis, field, mode, reach)
+        hertz = basis.frequencies_hz[mode]
+        axis.set_title(f"mode {mode}: " + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
+    figure.colorbar(drawn, ax=grid, location="bottom", label="amplitude, relative to the largest",
+                    aspect=50, shrink=0.5, pad=0.02)
+    return figure
+
+
+def convergence_figure(result: ModeConvergence) -> "Figure":
+    """Frequencies and contact compliance against unknowns, missing compliance against modes."""
+    figure = new_figure(1.2 * _WIDTH, 4.0)
+    meshes, modes = figure.subplots(1, 2)
+    sizes = result.unknowns[:-1]
+    change = np.abs(result.frequencies_hz[:-1] / result.frequencies_hz[-1] - 1.0)
+    for i, values in enumerate(change.T):
+        hertz = result.frequencies_hz[-1, i]
+        meshes.loglog(sizes, values, "o-", label=f"f{i + 1} = {hertz:.5g} Hz")
+    compliance = np.abs(result.compliance[:-1] / result.compliance[-1] - 1.0)
+    for values, axis, style in zip(compliance.T, "xy", ("s--", "^--"), strict=True):
+        meshes.loglog(sizes, values, style, color="#707070", label=f"contact compliance in {axis}")
+    meshes.set(xlabel="unknowns of the mesh", ylabel="relative distance from the finest mesh")
+    meshes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    for values, axis, style in zip(result.missing.T, "xy", ("s-", "^-"), strict=True):
+        modes.semilogx(result.modes, 100.0 * values, style, label=f"in {axis}")
+    modes.set(xlabel="modes", ylabel="missing contact compliance, worst node [%]")
+    modes.set_xticks(result.modes, [str(count) for count in result.modes])
+    modes.minorticks_off()
+    modes.set_ylim(bottom=0.0)
+    modes.legend()
+    return figure
+
+
+def _draw_mode(axis: "Axes", field: Field, mode: int, reach: float) -> Any:
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    shape = field.shapes[:, :, mode]
+    amplitude = np.linalg.norm(shape, axis=1)
+    largest = float(amplitude.max()) or 1.0
+    places = field.nodes + reach / largest * shape
+    cells = field.cells
+    if cells.shape[1] == 4:
+        cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), amplitude / largest,
+                           shading="gouraud", cmap="viridis", vmin=0.0, vmax=1.0,
+                           rasterized=True)
+    for nodes, colour in ((field.nodes, "#8c8c8c"), (places, "#303030")):
+        axis.add_collection(LineCollection(list(nodes[field.outline]), colors=colour,
+                                           linewidths=0.8))
+    low, high = field.nodes.min(axis=0) - reach, field.nodes.max(axis=0) + reach
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    return drawn

@@ -1,0 +1,106 @@
+"""The style of all figures: colours, sizes, notes, and how they are written to files."""
+
+from collections.abc import Callable
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fecontact.analysis.resolved import Resolved
+from fecontact.core.atomic_write import replaced
+from fecontact.core.checks import as_path
+from fecontact.core.errors import InputError
+from fecontact.integrate.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Colours that people with colour-blindness tell apart (Okabe and Ito).
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
+# Further ones, for the many branches of a diagram; no two of all are nearer to each other.
+_MORE_COLOURS = ("#882200", "#99dd88", "#7766ff", "#000044", "#0000ff")
+DASHES: Any = (0, (4, 2.5))
+# Of energies and powers, by the place where they are stored, come in or are lost.
+ENERGY_COLOURS = {
+    "kinetic": "#0072b2", "elastic": "#56b4e9", "modal_damping": "#56b4e9",
+    "drive_spring": "#d55e00", "drive_work": "#d55e00", "dashpots": "#d55e00",
+    "contact": "#009e73", "ground_work": "#009e73", "contact_damping": "#009e73",
+    "belt_work": "#e69f00", "friction": "#e69f00", "load_work": "#cc79a7",
+}
+# Colours that people with colour-blindness tell apart; 'open' takes that of the background.
+STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
+_SUFFIXES = (".png", ".pdf", ".svg")
+
+STYLE: Any = {
+    "font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#4d4d4d",
+    "axes.grid": True, "grid.color": "#e4e2de", "grid.linewidth": 0.7, "axes.axisbelow": True,
+    "lines.linewidth": 1.2, "legend.frameon": False, "axes.titleweight": "normal",
+    "xtick.color": "#303030", "ytick.color": "#303030", "axes.formatter.useoffset": False,
+    "agg.path.chunksize": 20000, "savefig.dpi": 150, "svg.fonttype": "none", "pdf.fonttype": 42,
+}
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """An empty figure [inches] that no plotting session knows of."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def distinct_colours(count: int) -> list[str]:
+    """So many colours, no two alike; up to twelve are told apart by colour-blind people too."""
+    if count <= len(COLOURS) + len(_MORE_COLOURS):
+        return [*COLOURS, *_MORE_COLOURS][:count]
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    # Neighbours, which follow one another, are as far apart in lightness as they can be.
+    shades = [to_hex(colour) for colour in colormaps["cividis"](np.linspace(0.0, 0.95, count))]
+    half = (count + 1) // 2
+    mixed = [""] * count
+    mixed[::2], mixed[1::2] = shades[:half], shades[half:]
+    return mixed
+
+
+def add_note(figure: "Figure", drawn: Resolved) -> None:
+    """Say below a figure where its curves are coarser than the motion."""
+    if not drawn.note:
+        return
+    width, height = figure.get_size_inches()
+    lines = wrap(drawn.note, int(15.0 * width))
+    figure.text(0.995, 0.05 / height, "\n".join(lines), ha="right", va="bottom", fontsize=8.0,
+                color="#a03000")
+    below = (0.05 + 0.16 * len(lines)) / height
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0.0, below, 1.0, 1.0 - below))  # type: ignore[call-arg]
+
+
+def state_names(trajectory: Trajectory) -> tuple[str, ...]:
+    """Open, stick, slip by their numbers; open and contact in a run without friction forces."""
+    return ("open", "stick", "slip") if trajectory.friction_force.any() else ("open", "contact")
+
+
+def save_figure(path: str | Path, figure: Callable[[], "Figure"]) -> Path:
+    """Draw a figure in the package's style and write it.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
+    """
+    path = as_path(path, "a plot")
+    if path.suffix.lower() not in _SUFFIXES:
+        raise InputError(f"{path} must end in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}.")
+    if not path.parent.is_dir():
+        raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
+    from matplotlib import rc_context
+
+    with replaced(path) as part, rc_context(STYLE):
+        figure().savefig(part, format=path.suffix[1:].lower())
+    return path

@@ -1,0 +1,93 @@
+"""The total contact forces over time, with a cursor: a strip above the scene of flat bodies."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.analysis.resolved import resolved
+from fecontact.analysis.window import window
+from fecontact.core.units import suitable_unit
+from fecontact.output.plots.figures import thinned
+from fecontact.output.plots.style import STATE_COLOURS
+from fecontact.output.render.frames_data import Motion
+
+Image = NDArray[np.uint8]
+
+_DARK, _GRID, _CURSOR = "#303030", "#e4e2de", (178, 24, 43)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceChart:
+    """A strip with the sums of the normal and the friction forces over the time that is drawn.
+
+    Attributes
+    ----------
+    motion : Motion
+    width, height : int
+        Size in pixels.
+    font : float
+        Size of text in points, at 100 pixels an inch.
+    """
+
+    motion: Motion
+    width: int
+    height: int
+    font: float
+
+    def image(self, frame: int) -> Image:
+        """The strip (height, width, 3) with the cursor at a frame."""
+        lines, (low, high), columns = self._drawn
+        image = lines.copy()
+        half = max(1, round(0.1 * self.font))
+        column = int(columns[frame])
+        image[low:high, column - half : column + half] = _CURSOR
+        return image
+
+    @cached_property
+    def _drawn(self) -> tuple[Image, tuple[int, int], NDArray[np.intp]]:
+        """The strip without cursor, the rows of its axes, and the column of each frame."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(self.width / 100, self.height / 100), dpi=100, facecolor="white")
+        canvas = FigureCanvasAgg(figure)
+        left, below = 7.0 * self.font / self.width, 3.4 * self.font / self.height
+        axes: Any = figure.add_axes((left, below, 0.97 - left, 0.97 - below))
+        motion, trajectory = self.motion, self.motion.trajectory
+        first, last = float(motion.times[0]), float(motion.times[-1])
+        if last > first:
+            trajectory = resolved(window(trajectory, first, last)).trajectory
+        part = (first <= trajectory.time) & (trajectory.time <= last)
+        time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
+        forces = {"normal force": (trajectory.normal_force, _DARK),
+                  "friction force": (trajectory.friction_force, STATE_COLOURS["slip"])}
+        totals = {name: (force[part].sum(axis=1), colour)
+                  for name, (force, colour) in forces.items() if force.any() or name[0] == "n"}
+        largest = max(float(np.abs(total).max()) for total, _ in totals.values())
+        unit, force_symbol = suitable_unit(largest, "N")
+        for name, (total, colour) in totals.items():
+            axes.plot(*thinned(trajectory.time[part] / time_unit, total / unit), color=colour,
+                      linewidth=0.1 * self.font, label=name)
+        if len(motion.times) > 1:
+            axes.set_xlim(motion.times[0] / time_unit, motion.times[-1] / time_unit)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
+        axes.set_ylabel(f"total [{force_symbol}]", fontsize=0.9 * self.font, color=_DARK)
+        axes.set_xlabel(f"t [{symbol}]", fontsize=0.9 * self.font, color=_DARK, labelpad=0.0)
+        axes.tick_params(labelsize=0.9 * self.font, colors=_DARK, length=0.3 * self.font)
+        axes.locator_params(axis="y", nbins=4)
+        axes.grid(color=_GRID)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(loc="upper right", ncols=2, fontsize=0.9 * self.font, frameon=False,
+                    borderaxespad=0.0)
+        canvas.draw()
+        image = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+        box = axes.get_window_extent()
+        columns = axes.transData.transform(
+            np.column_stack([motion.times / time_unit, np.zeros(len(motion.times))]))[:, 0]
+        columns = np.clip(np.round(columns), 2, self.width - 3).astype(np.intp)
+        return image, (self.height - int(box.y1), self.height - int(box.y0)), columns

@@ -1,0 +1,206 @@
+"""What a moving picture shows, in numbers: places, colours, forces and ground at each frame."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_scale
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.units import round_125
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.files.frames import (
+    blocks,
+    contact_forces,
+    displacement,
+    require_field,
+    von_mises,
+)
+from fecontact.output.plots.style import state_names
+from fecontact.reduction.field import Field
+
+Array = NDArray[np.float64]
+Colour = Literal["displacement", "von_mises"]
+
+COLOURS = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
+
+_VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A run, prepared for drawing: the same scale and colour range hold for all its frames.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        Its modal basis must hold shapes over the body.
+    indices : (F,) integer array
+        Output times to draw.
+    colour : "displacement" or "von_mises"
+        What the body is coloured by.
+    given_scale : float or None
+        Factor of all displacements; None for one that makes the largest well visible.
+
+    Raises
+    ------
+    InputError
+        For a basis without shapes, another colour, or a scale that is not positive.
+    """
+
+    trajectory: Trajectory
+    indices: NDArray[np.intp]
+    colour: Colour = "displacement"
+    given_scale: float | None = None
+
+    def __post_init__(self) -> None:
+        require_field(self.trajectory)
+        if self.colour not in COLOURS:
+            raise InputError(f"colour = '{self.colour}' is not known"
+                             f"{nearest(self.colour, COLOURS)}; choose from {choices(COLOURS)}.")
+        if self.given_scale is not None:
+            require_scale("The deformation", self.given_scale)
+
+    @cached_property
+    def field(self) -> Field:
+        """Modes over the body."""
+        return require_field(self.trajectory)
+
+    @cached_property
+    def times(self) -> Array:
+        """Times (F,) of the frames [s]."""
+        return self.trajectory.time[self.indices]
+
+    @cached_property
+    def forces(self) -> Array:
+        """Forces (F, n, 2) on the contact nodes, [-R, F] [N]."""
+        return contact_forces(self.trajectory, self.indices)
+
+    @cached_property
+    def states(self) -> NDArray[np.int8]:
+        """States (F, n) of the contact nodes, as numbers of :attr:`state_names`."""
+        return np.minimum(self.trajectory.contact_state[self.indices], len(self.state_names) - 1)
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states: without any friction force a node is open or in contact."""
+        return state_names(self.trajectory)
+
+    @cached_property
+    def largest_force(self) -> float:
+        """Largest force on a contact node [N]."""
+        return float(np.linalg.norm(self.forces, axis=2).max(initial=0.0))
+
+    @cached_property
+    def scale(self) -> float:
+        """Factor of all displacements, a round number of at least one unless it was given."""
+        if self.given_scale is not None:
+            return float(self.given_scale)
+        extent = float(np.linalg.norm(np.ptp(self.field.nodes, axis=0)))
+        gap = self._gap
+        low, high = self.trajectory.system.ground.height_range
+        size = max(self._largest["shape"], 0.5 * (high - low), gap)
+        return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
+
+    @cached_property
+    def largest_colour(self) -> float:
+        """Upper end of the colour range, in SI units; the lower end is zero."""
+        return self._largest[self.colour]
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
+        low = np.minimum(self.field.nodes.min(axis=0), self._extremes[0])
+        high = np.maximum(self.field.nodes.max(axis=0), self._extremes[1])
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+    @cached_property
+    def ground_level(self) -> float:
+        """Drawn height of the flat ground: under the lowest contact node by its gap [m]."""
+        basis = self.trajectory.system.basis
+        heights = basis.positions[2 : 2 + basis.contact_nodes, 1]
+        return float(heights.min() - self.scale * self._gap)
+
+    def body(self, frame: int) -> tuple[Array, Array]:
+        """Drawn places (N, 2) of the nodes [m] and their colours (N,) in SI units."""
+        q = self._q(frame)
+        motion = displacement(self.field, q)[0]
+        colours = np.linalg.norm(motion, axis=1) if self.colour == "displacement" else \
+            von_mises(self.field, q)[0]
+        return self.field.nodes + self._scaled(motion[None], q)[0], colours
+
+    def contact_places(self, frame: int) -> Array:
+        """Drawn places (n, 2) of the contact nodes [m]."""
+        basis = self.trajectory.system.basis
+        q = self._q(frame)
+        motion = basis.contact_T[:, :2] @ q[0]
+        return basis.positions[2 : 2 + basis.contact_nodes] + self._scaled(motion[None], q)[0]
+
+    def ground(self, frame: int, x: Array) -> Array:
+        """Drawn heights (k,) of the ground at the drawn abscissae x (k,) [m]."""
+        height = self.trajectory.system.ground.height(x, float(self.times[frame]))
+        return self.ground_level + self.scale * height
+
+    @cached_property
+    def travel(self) -> Array:
+        """Drawn travel (F,) of the ground [m]."""
+        ground = self.trajectory.system.ground
+        return self._drift_scale * np.array([ground.travel(float(time)) for time in self.times])
+
+    @property
+    def _gap(self) -> float:
+        """Smallest gap of a contact node [m]."""
+        gap = self.trajectory.system.gap
+        return min(gap) if isinstance(gap, tuple) else float(cast(float, gap))
+
+    @property
+    def _drift_scale(self) -> float:
+        """Factor of the ground's travel and of the body's drift along it.
+
+        Both have the same factor, so that a node that sticks stays with the marks of the ground.
+        Over waves, which are drawn in their true length, the factor is one.
+        """
+        return 1.0 if self.trajectory.system.ground.wavy else self.scale
+
+    def _drift(self, q: Array) -> Array:
+        """Mean displacement (k,) of the contact nodes along the ground [m]."""
+        return np.asarray(q @ self.trajectory.system.basis.contact_T[:, 0].mean(axis=0))
+
+    def _scaled(self, motion: Array, q: Array) -> Array:
+        """Drawn motion (k, N, 2) from displacements (k, N, 2) at coordinates q (k, m)."""
+        drawn = self.scale * motion
+        drawn[..., 0] += (self._drift_scale - self.scale) * self._drift(q)[:, None]
+        return drawn
+
+    def _q(self, frame: int) -> Array:
+        which = self.indices[frame]
+        return self.trajectory.modal_coordinates[which : which + 1]
+
+    @cached_property
+    def _extremes(self) -> tuple[Array, Array]:
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        for which in blocks(self.indices, len(self.field.nodes)):
+            q = self.trajectory.modal_coordinates[which]
+            places = self.field.nodes + self._scaled(displacement(self.field, q), q)
+            low = np.minimum(low, places.min(axis=(0, 1)))
+            high = np.maximum(high, places.max(axis=(0, 1)))
+        return low, high
+
+    @cached_property
+    def _largest(self) -> dict[str, float]:
+        largest = dict.fromkeys((*COLOURS, "shape"), 0.0)
+        wavy = self.trajectory.system.ground.wavy
+        for which in blocks(self.indices, len(self.field.nodes)):
+            q = self.trajectory.modal_coordinates[which]
+            motion = displacement(self.field, q)
+            size = np.linalg.norm(motion, axis=2).max()
+            largest["displacement"] = max(largest["displacement"], float(size))
+            motion[..., 0] -= wavy * self._drift(q)[:, None]
+            size = np.linalg.norm(motion, axis=2).max()
+            largest["shape"] = max(largest["shape"], float(size))
+            if self.colour == "von_mises":
+                stress = float(von_mises(self.field, q).max())
+                largest["von_mises"] = max(largest["von_mises"], stress)
+        return largest

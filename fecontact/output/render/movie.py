@@ -1,0 +1,269 @@
+"""Moving pictures of a run: MP4, numbered PNG files, or a single still."""
+
+import glob
+import os
+import re
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.atomic_write import beside, put, replaced, unwritable
+from fecontact.core.checks import as_path, require_frame_rate
+from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.interrupts import held_back_interrupt
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.files.frames import frame_indices, require_field
+from fecontact.output.render.frames_data import Colour, Motion
+from fecontact.output.render.offscreen import require_rendering
+from fecontact.output.render.overlay import Furniture
+from fecontact.output.render.scene import Scene
+
+Image = NDArray[np.uint8]
+Progress = Callable[[int, int], None]
+
+_SMALLEST = (320, 180)
+_MOVING, _STILL = 2, 4  # pixels rendered for each of a movie and of a still, in both directions
+# In the head of a picture, by which it is known as one of this package's.
+_SOFTWARE = ("Software", "fecontact")
+_OURS = "\0".join(_SOFTWARE).encode()
+_STILL_FRAMES = 200  # whose range of colours and motion a still shares with a movie
+
+
+def render(
+    trajectory: Trajectory,
+    path: str | Path,
+    *,
+    frames: int = 200,
+    fps: float = 25,
+    size: tuple[int, int] = (960, 540),
+    colour: Colour = "displacement",
+    scale: float | None = None,
+    title: str | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Draw a run as a movie or as numbered pictures, whole or not at all.
+
+    One sees the body in scaled displacement and its undeformed outline, the ground, whose waves
+    are as high in scale, the contact nodes in the colour of their state, and the forces of the
+    ground on them, the longest arrow being the largest force of the movie. The marks on flat
+    ground travel in scale too, so that a node that sticks stays with them; over waves, whose
+    length is true, so are the travel of the ground and the drift of the body along it. Scale and
+    colour range hold for all frames. Above flat bodies stand the total contact forces over time.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Its modal basis must hold shapes over the body.
+    path : str or Path
+        ``NAME.mp4`` for a movie, ``NAME.png`` for ``NAME_0000.png`` and so on, or a folder for
+        ``frame_0000.png`` and so on in it. Earlier files of these names are replaced, and
+        pictures of an earlier call that made more of them are removed.
+    frames : int
+        Number of frames, evenly spaced, never more than there are output times.
+    fps : float
+        Frames per second of the movie.
+    size : (int, int)
+        Width and height in pixels, even, at least 320 x 180.
+    colour : "displacement" or "von_mises"
+        What the body is coloured by: the magnitude of the displacement [m] or the von Mises
+        stress [Pa].
+    scale : float, optional
+        Factor of the displacements; by default a round one that makes the largest visible.
+    title : str, optional
+        Shown at the top.
+    start, end : float, optional
+        Part of the run to draw [s].
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each frame.
+
+    Returns
+    -------
+    Path
+        The movie, the folder, or the first of the pictures.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, a basis without shapes, or a path that cannot be written.
+    MissingLibraryError
+        If this computer cannot render pictures or encode movies; the message says what to install.
+    """
+    path = as_path(path, "a movie")
+    movie = path.suffix.lower() == ".mp4"
+    if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
+        raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
+                         f"folder.")
+    require_frame_rate("A movie", fps)
+    _require_size(size)
+    require_field(trajectory)
+    indices = frame_indices(trajectory.time, frames, start, end)
+    if not len(indices):
+        raise InputError("frames = 0 makes no movie; give at least 1.")
+    motion = Motion(trajectory, indices, colour, scale)
+    lasting = float(motion.times[-1] - motion.times[0])
+    slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
+    require_rendering(size, _MOVING)
+    with (held_back_interrupt() as check,
+          _movie_file(path, size, fps) if movie else _numbered_files(path) as take):
+        for done, image in enumerate(_images(motion, size, title, slowness), start=1):
+            check()
+            take(image)
+            if progress is not None:
+                progress(done, len(indices))
+    if movie or path.suffix.lower() != ".png" or path.is_dir():
+        return path
+    return path.with_name(f"{path.stem}_0000.png")
+
+
+def picture(
+    trajectory: Trajectory,
+    path: str | Path,
+    *,
+    time: float | None = None,
+    size: tuple[int, int] = (960, 540),
+    colour: Colour = "displacement",
+    scale: float | None = None,
+    title: str | None = None,
+) -> Path:
+    """Draw a run at one time, as a frame of :func:`render` over the whole run.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Its modal basis must hold shapes over the body.
+    path : str or Path
+        ``NAME.png``.
+    time : float, optional
+        The nearest output time is drawn; the last by default [s].
+    size, colour, scale, title
+        See :func:`render`.
+
+    Returns
+    -------
+    Path
+        The picture.
+
+    Raises
+    ------
+    InputError, MissingLibraryError
+        See :func:`render`.
+    """
+    path = as_path(path, "a picture")
+    if path.suffix.lower() != ".png":
+        raise InputError(f"{path} must end in .png.")
+    _require_folder(path)
+    _require_size(size)
+    require_field(trajectory)
+    at = len(trajectory.time) - 1 if time is None else int(np.argmin(np.abs(trajectory.time
+                                                                            - time)))
+    chosen = frame_indices(trajectory.time, _STILL_FRAMES)
+    motion = Motion(trajectory, np.union1d(chosen, [at]), colour, scale)
+    require_rendering(size, _STILL)
+    frame = int(np.searchsorted(motion.indices, at))
+    (image,) = _images(motion, size, title, None, only=frame)
+    with replaced(path) as part:
+        _save(part, image)
+    return path
+
+
+def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: float | None,
+            only: int | None = None) -> Iterator[Image]:
+    """Pictures (height, width, 3) of all frames of a motion, or of one."""
+    furniture = Furniture(motion, *size, title, slowness)
+    scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
+                  fineness=_MOVING if only is None else _STILL)
+    with scene:
+        for frame in range(len(motion.indices)) if only is None else (only,):
+            yield furniture.around(scene.image(frame), frame)
+
+
+@contextmanager
+def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], Any]]:
+    """A function that adds a frame to a movie; the file appears when the block ends well."""
+    import imageio_ffmpeg
+
+    _require_folder(path)
+    try:
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise MissingLibraryError(f"There is no ffmpeg to encode movies with ({error}); reinstall "
+                                  f"imageio-ffmpeg, or write .png pictures.") from None
+    with replaced(path) as part:
+        writer = imageio_ffmpeg.write_frames(
+            # Names with colons or a leading hyphen would be protocols and options of ffmpeg.
+            os.path.abspath(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
+            pix_fmt_out="yuv420p", ffmpeg_log_level="error",
+            output_params=["-movflags", "+faststart"])
+        try:
+            writer.send(None)
+            yield lambda image: writer.send(np.ascontiguousarray(image))
+        finally:
+            writer.close()
+        _require_readable(imageio_ffmpeg.get_ffmpeg_exe(), part)
+
+
+@contextmanager
+def _numbered_files(path: Path) -> Iterator[Callable[[Image], Any]]:
+    """A function that adds a numbered picture; all appear when the block ends well.
+
+    Pictures of an earlier movie that had more of them are removed, others of such names are not.
+    """
+    folder, stem = (path, "frame") if path.is_dir() or not path.suffix else (path.parent, path.stem)
+    names: list[str] = []
+
+    try:
+        with beside(path) as part:
+            def take(image: Image) -> None:
+                names.append(f"{stem}_{len(names):04d}.png")
+                _save(part / names[-1], image)
+
+            yield take
+            folder.mkdir(exist_ok=True)
+            for name in names:
+                put(part / name, folder / name)
+        for old in folder.glob(f"{glob.escape(stem)}_*.png"):
+            if re.fullmatch(re.escape(stem) + r"_\d{4,}\.png", old.name) and (
+                    old.name not in names and _is_ours(old)):
+                old.unlink()
+    except OSError as error:
+        raise InputError(unwritable(folder, error)) from None
+
+
+def _is_ours(picture: Path) -> bool:
+    """Whether this package has drawn a picture."""
+    with picture.open("rb") as file:
+        return _OURS in file.read(1000)
+
+
+def _require_readable(ffmpeg: str, movie: Path) -> None:
+    """Raise OSError for a movie cut short: the encoder's exit status is not passed on."""
+    done = subprocess.run([ffmpeg, "-v", "error", "-i", os.path.abspath(movie), "-frames:v", "1",
+                           "-f", "null", "-"], capture_output=True, check=False,
+                          stdin=subprocess.DEVNULL)
+    if done.returncode != 0:
+        raise OSError("the encoder did not finish; the disk may be full")
+
+
+def _save(path: Path, image: Image) -> None:
+    from matplotlib.image import imsave
+
+    imsave(path, image, format="png", metadata=dict([_SOFTWARE]))
+
+
+def _require_folder(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
+
+
+def _require_size(size: tuple[int, int]) -> None:
+    if len(size) != 2 or any(not isinstance(side, int) or side % 2 or side < least
+                             for side, least in zip(size, _SMALLEST, strict=False)):
+        raise InputError(f"size = {size!r} must be an even width and height in pixels, at least "
+                         f"{_SMALLEST[0]} x {_SMALLEST[1]}.")

@@ -1,0 +1,193 @@
+"""The still part of a picture: title, time, scales and legends above and below the scene."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.units import quantity, suitable_unit
+from fecontact.output.render.force_chart import ForceChart
+from fecontact.output.render.frames_data import COLOURS, Motion
+from fecontact.output.render.scene import (
+    COLOUR_MAPS,
+    DARK,
+    FORCE_COLOUR,
+    NODE_COLOURS,
+    needed_height,
+)
+
+Image = NDArray[np.uint8]
+
+_DPI = 100
+_FONT = 10.5  # points at 960 x 540
+
+
+@dataclass(frozen=True, eq=False)
+class Furniture:
+    """Strips above and below the scene, in the size of the whole picture.
+
+    Attributes
+    ----------
+    motion : Motion
+    width, height : int
+        Size of the whole picture in pixels.
+    title : str or None
+    slowness : float or None
+        Seconds of the movie per second of the motion; None for pictures without a clock.
+    """
+
+    motion: Motion
+    width: int
+    height: int
+    title: str | None = None
+    slowness: float | None = None
+
+    @property
+    def size(self) -> float:
+        """Size of text and lines, one at 960 x 540."""
+        return min(self.width / 960.0, self.height / 540.0)
+
+    @property
+    def header_height(self) -> int:
+        """Height of the strip above the scene in pixels."""
+        return 2 * round(22 * self.size)
+
+    @property
+    def footer_height(self) -> int:
+        """Height of the strip below the scene in pixels."""
+        return 2 * round(34 * self.size)
+
+    @cached_property
+    def chart_height(self) -> int:
+        """Height of the chart of forces in pixels: of room that a flat body leaves, zero for none.
+
+        The scene keeps a third more than it needs, and at least half.
+        """
+        room = self.height - self.header_height - self.footer_height
+        left = min(room - 4.0 / 3.0 * needed_height(self.motion) * self.width, 0.5 * room)
+        return 2 * int(0.5 * left) if left >= 110.0 * self.size else 0
+
+    @property
+    def scene_height(self) -> int:
+        """What is left for the scene, in pixels."""
+        return self.height - self.header_height - self.footer_height - self.chart_height
+
+    def around(self, scene: Image, frame: int) -> Image:
+        """The whole picture (height, width, 3) from that of the scene."""
+        header = self._header.copy()
+        clock = self._clock(frame)
+        header[:, -clock.shape[1] :] = clock
+        chart = [self._chart.image(frame)] if self.chart_height else []
+        return np.concatenate([header, *chart, scene, self._footer])
+
+    @cached_property
+    def _chart(self) -> ForceChart:
+        return ForceChart(self.motion, self.width, self.chart_height, _FONT * self.size)
+
+    def _strip(self, width: int, height: int) -> tuple[Any, Any]:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
+        return figure, FigureCanvasAgg(figure)
+
+    def _text(self, figure: Any, x: float, y: float, text: str, **options: Any) -> Any:
+        options = {"fontsize": _FONT * self.size, "color": DARK, "va": "center",
+                   "family": "DejaVu Sans"} | options
+        return figure.text(x, y, text, **options)
+
+    @cached_property
+    def _header(self) -> Image:
+        figure, canvas = self._strip(self.width, self.header_height)
+        scale = self._text(figure, 0.81, 0.46, self._scales(), ha="right")
+        if self.title:
+            title = self._text(figure, 0.03, 0.46, self.title, fontsize=1.25 * _FONT * self.size)
+            room = scale.get_window_extent(canvas.get_renderer()).x0 - 0.05 * self.width
+            text = self.title
+            while title.get_window_extent(canvas.get_renderer()).width > room and len(text) > 1:
+                text = text[:-1]
+                title.set_text(text.rstrip() + "…")
+        return _pixels(canvas)
+
+    def _scales(self) -> str:
+        scale = self.motion.scale
+        parts = [f"deformation × {scale:g}" if scale != 1.0 else "true deformation"]
+        if self.slowness is not None and self.slowness >= 1.05:
+            parts.append(f"slowed down {_short(self.slowness)} ×")
+        elif self.slowness is not None and 0.0 < self.slowness <= 0.95:
+            parts.append(f"sped up {_short(1.0 / self.slowness)} ×")
+        return "     ".join(parts)
+
+    @cached_property
+    def _clock_parts(self) -> tuple[Any, Any, Any]:
+        figure, canvas = self._strip(round(0.17 * self.width), self.header_height)
+        text = self._text(figure, 1.0 - 0.03 / 0.17, 0.46, "", ha="right",
+                          fontsize=1.1 * _FONT * self.size)
+        return figure, canvas, text
+
+    def _clock(self, frame: int) -> Image:
+        times = self.motion.times
+        factor, symbol = suitable_unit(float(np.abs(times).max()), "s")
+        step = np.diff(times).min() / factor if len(times) > 1 else 0.001
+        decimals = int(np.clip(np.ceil(-np.log10(max(step, 1e-9)) + 0.3), 0, 4))
+        _, canvas, text = self._clock_parts
+        text.set_text(f"t = {times[frame] / factor:.{decimals}f} {symbol}")
+        return _pixels(canvas)
+
+    @cached_property
+    def _footer(self) -> Image:
+        figure, canvas = self._strip(self.width, self.footer_height)
+        self._colour_scale(figure)
+        self._legend(figure)
+        return _pixels(canvas)
+
+    def _colour_scale(self, figure: Any) -> None:
+        from matplotlib import colormaps
+        from matplotlib.ticker import MaxNLocator
+
+        name, unit = COLOURS[self.motion.colour]
+        largest = self.motion.largest_colour or 1.0
+        factor, symbol = suitable_unit(largest, unit)
+        axes = figure.add_axes((0.03, 0.42, 0.42, 0.17))
+        axes.imshow(np.linspace(0.0, 1.0, 256)[None], aspect="auto",
+                    cmap=colormaps[COLOUR_MAPS[self.motion.colour]],
+                    extent=(0.0, largest / factor, 0.0, 1.0))
+        axes.set_yticks([])
+        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+        axes.tick_params(labelsize=0.9 * _FONT * self.size, colors=DARK, length=3 * self.size,
+                         width=0.7 * self.size, pad=2 * self.size)
+        for spine in axes.spines.values():
+            spine.set(linewidth=0.7 * self.size, color=DARK)
+        self._text(figure, 0.03, 0.80, f"{name} [{symbol}]")
+
+    def _legend(self, figure: Any) -> None:
+        from matplotlib.lines import Line2D
+        from matplotlib.patches import FancyArrow
+
+        self._text(figure, 0.55, 0.80, "contact nodes")
+        x = 0.70
+        for name in self.motion.state_names:
+            figure.add_artist(Line2D([x], [0.80], marker="o", markersize=8.5 * self.size,
+                                     markerfacecolor=NODE_COLOURS[name], markeredgecolor=DARK,
+                                     markeredgewidth=0.8 * self.size, linestyle=""))
+            self._text(figure, x + 0.013, 0.80, name)
+            x += 0.09
+        force = self.motion.largest_force
+        self._text(figure, 0.55, 0.34, "contact force")
+        if force > 0.0:
+            figure.add_artist(FancyArrow(
+                0.69, 0.34, 0.045, 0.0, width=0.05, head_width=0.2, head_length=0.013,
+                length_includes_head=True, color=FORCE_COLOUR, linewidth=0.0))
+        self._text(figure, 0.745 if force > 0.0 else 0.69, 0.34,
+                   f"largest {quantity(force, 'N')}" if force > 0.0 else "none")
+
+
+def _short(value: float) -> str:
+    return f"{value:.2g}" if value < 100.0 else f"{float(f'{value:.2g}'):.0f}"
+
+
+def _pixels(canvas: Any) -> Image:
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

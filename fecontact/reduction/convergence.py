@@ -1,0 +1,116 @@
+"""Frequencies and contact compliance as the mesh is refined and modes are added."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.report import BasisReport
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ModeConvergence:
+    """What refinement and further modes change; ``str(...)`` is a table.
+
+    Attributes
+    ----------
+    unknowns : (L,) array
+        Degrees of freedom of each mesh; each has the cells of the one before cut into four.
+    frequencies_hz : (L, k) array
+        The lowest elastic frequencies on each mesh [Hz].
+    compliance : (L, 2) array
+        Elastic displacement in x and y per unit force there, the mean over the contact nodes,
+        of the whole finite-element body on each mesh [m/N].
+    modes : (K,) array
+        Numbers of modes, on the given mesh.
+    missing : (K, 2) array
+        Part of the contact nodes' compliance in x and y that is missing with so many modes, at
+        the worst node.
+    """
+
+    unknowns: NDArray[np.int64]
+    frequencies_hz: Array
+    compliance: Array
+    modes: NDArray[np.int64]
+    missing: Array
+
+    def __str__(self) -> str:
+        shown = self.frequencies_hz.shape[1]
+        lines = [" ".join([f"{'unknowns':>9s}", *(f"{f'f{i + 1} [Hz]':>11s}" for i in range(shown)),
+                           f"{'x [m/N]':>11s}", f"{'y [m/N]':>11s}"])]
+        lines += [" ".join([f"{unknowns:9d}", *(f"{f:11.6g}" for f in frequencies),
+                            *(f"{c:11.5g}" for c in compliance)])
+                  for unknowns, frequencies, compliance in zip(
+                      self.unknowns, self.frequencies_hz, self.compliance, strict=True)]
+        change = np.abs(self.frequencies_hz / self.frequencies_hz[-1] - 1.0)
+        if shown:
+            lines.append(f"On the given mesh these frequencies are off by up to "
+                         f"{change[0].max():.1e}, against the finest.")
+        lines += ["", f"{'modes':>9s} {'missing x':>11s} {'missing y':>11s}"]
+        lines += [f"{modes:9d} {missing[0]:11.2%} {missing[1]:11.2%}"
+                  for modes, missing in zip(self.modes, self.missing, strict=True)]
+        return "\n".join(lines)
+
+
+def mode_convergence(
+    body: ElasticBody,
+    build: Callable[[ElasticBody, int], ModalBasis],
+    modes: int,
+    *,
+    levels: int = 3,
+    progress: Callable[[int, int], None] | None = None,
+) -> ModeConvergence:
+    """Refine the mesh of a body, and add modes on its own mesh.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        On its coarsest mesh.
+    build : callable
+        ``build(body, modes)``, the modal basis to study.
+    modes : int
+        Number of modes; half, this, twice and four times as many are tried.
+    levels : int
+        Number of meshes, at least two.
+    progress : callable, optional
+        Called with the number of bases done, and of all.
+    """
+    require_kind("mode_convergence", ElasticBody, body=body)
+    unknowns = len(body.expansion.indptr) - 1
+    counts = [max(1, modes // 2), modes, 2 * modes, 4 * modes]
+    counts = sorted({count for count in counts if count <= unknowns // 2} | {modes})
+    steps = len(counts) + levels - 1
+    bases = []
+    for done, count in enumerate(counts):
+        bases.append(build(body, count))
+        if progress is not None:
+            progress(done + 1, steps)
+    own = bases[counts.index(modes)]
+    meshes, refined = [own], body
+    sizes = [unknowns]
+    for level in range(1, levels):
+        refined = replace(refined, mesh=refined.mesh.refined())
+        meshes.append(build(refined, modes))
+        sizes.append(len(refined.expansion.indptr) - 1)
+        if progress is not None:
+            progress(len(counts) + level, steps)
+    shown = min(6, own.modes - own.rigid_modes)
+    first = own.rigid_modes
+    return ModeConvergence(
+        unknowns=np.array(sizes),
+        frequencies_hz=np.array([basis.frequencies_hz[first : first + shown] for basis in meshes]),
+        compliance=np.array([_compliance(basis).mean(axis=0) for basis in meshes]),
+        modes=np.array(counts),
+        missing=np.array([BasisReport(basis).contact_error.max(axis=0) for basis in bases]),
+    )
+
+
+def _compliance(basis: ModalBasis) -> Array:
+    assert basis.quality is not None, "bases of bodies carry their quality"
+    return basis.quality.compliance[2 : 2 + basis.contact_nodes]

@@ -1,0 +1,98 @@
+"""Craig-Bampton reduction: fixed-interface modes and constraint modes, diagonalised again.
+
+The interface is the set of rows W of the points (displacements x and y of B, C and the contact
+nodes). Fixed-interface modes vibrate with W u = 0; a constraint mode is the static shape of one
+unit displacement of the interface with all others at zero. A body with rigid modes gets, beside
+these, its responses to interface forces that only its inertia balances, so that its static
+compliance at the interface is exact as well.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.reduction.eigenmodes import FreeSystem
+from fecontact.reduction.residual_vectors import Flexibility, diagonalised
+
+Array = NDArray[np.float64]
+
+
+def craig_bampton(system: FreeSystem, rows: Any, count: int) -> tuple[Array, Array]:
+    """Frequencies (m,) and mass-normalised shapes (f, m) of a Craig-Bampton basis.
+
+    Parameters
+    ----------
+    system : FreeSystem
+        The body.
+    rows : sparse (k, f) array
+        The interface; rows that depend on others, or do not move, are left out.
+    count : int
+        Number of fixed-interface modes, zero or more.
+
+    Returns
+    -------
+    w, shapes
+        First the rigid modes, with frequency exactly zero, then the modes of the reduced body;
+        m is at most ``count`` plus the numbers of independent rows and of rigid modes.
+    """
+    flexibility = Flexibility(system, rows)
+    patterns = _independent(flexibility)
+    motion = patterns.T @ (flexibility.rows @ system.rigid)
+    deflections = flexibility.deflections(patterns)
+    fixed = _fixed_interface_modes(system, flexibility.rows.T @ patterns, deflections, motion,
+                                   count)
+    squares, shapes = diagonalised(
+        system, system.without_rigid(np.hstack([deflections, fixed])))
+    rigid = system.rigid.shape[1]
+    return (np.concatenate([np.zeros(rigid), np.sqrt(squares)]),
+            np.hstack([system.rigid, shapes]))
+
+
+def _independent(flexibility: Flexibility) -> Array:
+    """Combinations (k, p) of the rows that are independent and of like compliance."""
+    motion = np.asarray(flexibility.rows @ flexibility.system.rigid)
+    elastic = flexibility.compliance
+    part = np.trace(elastic) / max(float((motion**2).sum()), 1e-300)
+    whole = elastic + part * motion @ motion.T
+    own = np.sqrt(np.diag(whole))
+    moves = own > 1e-7 * own.max()
+    scale = np.where(moves, 1.0 / np.where(moves, own, 1.0), 0.0)
+    values, directions = np.linalg.eigh(whole * np.outer(scale, scale))
+    real = values > 1e-11 * values[-1]
+    return np.asarray(scale[:, None] * directions[:, real] / np.sqrt(values[real]))
+
+
+def _fixed_interface_modes(
+    system: FreeSystem, held: Array, deflections: Array, motion: Array, count: int
+) -> Array:
+    """Shapes (f, count) of the lowest modes that do not move the interface.
+
+    ``held`` (f, p) are the interface's forces, ``deflections`` (f, p) the elastic response to
+    them, ``motion`` (p, r) what the rigid modes do to the interface. The response to a load is
+    that of the free body, with the interface's forces and the rigid motion that keep it still.
+    """
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    K, M = system.stiffness, system.mass
+    size, interface = K.shape[0], held.shape[1]
+    if not count:
+        return np.zeros((size, 0))
+    if isinstance(count, bool) or not isinstance(count, int) or not 0 < count <= (
+            size - interface - 2):
+        raise InputError(f"modes = {count!r} must be a whole number from 0 to "
+                         f"{size - interface - 2}: the body has {size} unknowns and its "
+                         f"interface {interface}.")
+    r = motion.shape[1]
+    saddle = np.block([[held.T @ deflections, motion], [motion.T, np.zeros((r, r))]])
+    inverse = np.linalg.pinv(saddle, rcond=1e-12, hermitian=True)
+    answers = np.hstack([deflections, system.rigid])
+
+    def still(force: Array) -> Array:
+        return np.asarray(system.deflection(force) - answers @ (inverse @ (answers.T @ force)))
+
+    start = still(M @ np.random.default_rng(0).standard_normal(size))
+    _, shapes = eigsh(K, k=count, M=M, sigma=0.0, v0=start, ncv=min(max(2 * count + 1, 20), size),
+                      OPinv=LinearOperator(K.shape, still, dtype=float))
+    return np.asarray(shapes)

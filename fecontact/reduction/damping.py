@@ -1,0 +1,96 @@
+"""Damping of the modes: what a user gives, as the modal damping matrix of the equations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, require_not_negative
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Damping matrix ``mass_factor * M + stiffness_factor * K``.
+
+    Its damping ratio is ``mass_factor / (2 w) + stiffness_factor w / 2``; rigid modes keep the
+    absolute damping ``mass_factor``.
+
+    Parameters
+    ----------
+    mass_factor : float
+        Factor of the mass [1/s], zero or above.
+    stiffness_factor : float
+        Factor of the stiffness [s], zero or above.
+    """
+
+    mass_factor: float = 0.0
+    stiffness_factor: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_not_negative("Rayleigh damping", mass_factor=self.mass_factor,
+                             stiffness_factor=self.stiffness_factor)
+
+
+@dataclass(frozen=True)
+class LossFactor:
+    """Damping ratios from the loss factor of the material: ``D = value / 2`` in every mode.
+
+    At resonance, the energy lost per cycle is ``2 pi value`` times the largest elastic energy.
+
+    Parameters
+    ----------
+    value : float
+        Zero or above.
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        require_not_negative("LossFactor", value=self.value)
+
+
+Damping = float | Rayleigh | LossFactor | Sequence[float] | NDArray[np.float64]
+
+
+def modal_damping(
+    damping: Damping, angular_frequencies: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Modal damping matrix (m, m) [1/s], so that ``q'' + damping q' + w^2 q = R``.
+
+    Parameters
+    ----------
+    damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
+        One damping ratio for all modes, one per mode, Rayleigh factors, a loss factor, or the
+        full matrix.
+        A ratio D gives ``2 D w``, so that it does nothing to rigid modes.
+    angular_frequencies : (m,) array
+        [rad/s].
+
+    Raises
+    ------
+    InputError
+        For negative ratios, values that are not finite, or another number of values than modes.
+    """
+    count = len(angular_frequencies)
+    if isinstance(damping, Rayleigh):
+        return np.diag(damping.mass_factor
+                       + damping.stiffness_factor * angular_frequencies**2)
+    if isinstance(damping, LossFactor):
+        damping = 0.5 * damping.value
+    try:
+        values = np.asarray(damping, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"Damping {damping!r} is not a number or an array of numbers.") from None
+    if not np.isfinite(values).all():
+        raise InputError(f"Damping {damping!r} is not finite.")
+    if values.shape == (count, count) and values.ndim == 2:
+        return values.copy()
+    if values.ndim > 1 or values.shape not in ((), (count,)):
+        raise InputError(
+            f"Damping must be one ratio, {count} ratios (one per mode), Rayleigh factors or a "
+            f"{count} x {count} matrix, not an array of shape {values.shape}."
+        )
+    if (values < 0).any():
+        raise InputError(f"Damping ratio {values.min()} must be zero or above.")
+    return np.diag(np.broadcast_to(2.0 * values * angular_frequencies, (count,)))

@@ -1,0 +1,290 @@
+"""Vibration modes of the finite-element body: rigid ones exactly, elastic ones by Lanczos."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.compiled import block, kernel, matrix, vector
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.reduction.factorisation import Factors, factorised
+
+Array = NDArray[np.float64]
+
+# Below this size, and for a large share of all modes, the dense solver is quicker and as exact.
+_DENSE = 600
+
+
+@dataclass(frozen=True, eq=False)
+class FreeSystem:
+    """Stiffness and mass over the free degrees of freedom, and the rigid modes among them.
+
+    Attributes
+    ----------
+    stiffness, mass : sparse (f, f) arrays
+        K, symmetric and positive semi-definite, and M, positive definite.
+    rigid : (f, r) array
+        Mass-normalised rigid modes: ``K rigid = 0``.
+    component_mass : sparse (f / 2, f / 2) array, optional
+        Mass of one component, where x and y alternate and have the same.
+    """
+
+    stiffness: Any
+    mass: Any
+    rigid: Array
+    component_mass: Any = None
+
+    @classmethod
+    def of(cls, body: ElasticBody) -> "FreeSystem":
+        """The free degrees of freedom of a body."""
+        E = body.expansion
+        rigid = rigid_modes(body)
+        if E.shape[0] == E.shape[1]:
+            return cls(body.stiffness, body.mass, rigid, body.component_mass)
+        if E.nnz == E.shape[1]:
+            free = E.indices
+            K, M = (a[free][:, free].tocsc() for a in (body.stiffness, body.mass))
+            return cls(K, M, rigid[free])
+        # The columns of E have no row in common, so that E^T E is diagonal.
+        return cls((E.T @ body.stiffness @ E).tocsc(), (E.T @ body.mass @ E).tocsc(),
+                   (E.T @ rigid) / E.multiply(E).sum(axis=0)[:, None])
+
+    @cached_property
+    def held(self) -> NDArray[np.int64]:
+        """Degrees of freedom not supported (f - r,): the other r hold the body isostatically."""
+        from scipy.linalg import qr
+
+        size, rigid = self.rigid.shape
+        if not rigid:
+            return np.arange(size)
+        pivots = qr(self.rigid.T, mode="r", pivoting=True)[1]
+        return np.setdiff1d(np.arange(size), pivots[:rigid])
+
+    @cached_property
+    def factors(self) -> Factors:
+        """Factors of the stiffness of the isostatically held body, which is positive definite."""
+        K = self.stiffness
+        if len(self.held) < K.shape[0]:
+            K = K[self.held][:, self.held]
+        return factorised(K)
+
+    @cached_property
+    def inertia(self) -> Array:
+        """M rigid (f, r)."""
+        return np.asarray(self.mass @ self.rigid)
+
+    @cached_property
+    def mass_product(self) -> Any:
+        """``M x`` of displacements x (f,), as quick as may be."""
+        from scipy.sparse.linalg import LinearOperator
+
+        if self.component_mass is None:
+            # By rows, the product is quicker.
+            return self.mass.T
+        # Both components at once, as the two parts of complex numbers.
+        both = self.component_mass.astype(complex)
+        return LinearOperator(
+            self.mass.shape, lambda x: (both @ x.reshape(-1).view(complex)).view(float),
+            dtype=float)
+
+    def without_rigid(self, shapes: Array) -> Array:
+        """The part of displacements (f,) or (f, k) that is mass-orthogonal to the rigid modes."""
+        return np.asarray(shapes - self.rigid @ (self.inertia.T @ shapes))
+
+    def deflection(self, forces: Array) -> Array:
+        """Elastic static response (f,) or (f, k) to forces.
+
+        Forces that are not self-balancing are balanced by the inertia of the rigid motion that
+        they cause; the response is mass-orthogonal to the rigid modes.
+        """
+        balanced = forces - self.inertia @ (self.rigid.T @ forces)
+        deflection = np.zeros_like(balanced)
+        deflection[self.held] = self.factors.solve(np.ascontiguousarray(balanced[self.held]))
+        return self.without_rigid(deflection)
+
+
+def eigenfrequencies_hz(body: ElasticBody, count: int = 20) -> Array:
+    """The lowest eigenfrequencies (m,) of a body [Hz], exactly zero for rigid modes.
+
+    Raises as :func:`eigenmodes`.
+    """
+    require_kind("eigenfrequencies_hz", ElasticBody, body=body)
+    return eigenmodes(body, count)[0] / (2.0 * np.pi)
+
+
+def eigenmodes(body: ElasticBody, count: int) -> tuple[Array, Array]:
+    """The lowest angular frequencies (m,) [rad/s] and mass-normalised shapes (2 N, m).
+
+    Rigid modes that the supports leave are built from the geometry: frequency exactly zero,
+    translation in x, in y, rotation (counter-clockwise). The elastic modes follow with ascending
+    frequency; a mode's first largest component is positive.
+
+    Raises
+    ------
+    InputError
+        For less than one mode, or more than there are unknowns.
+    AnalysisError
+        If a computed mode misses ``|K s - w^2 M s| < 1e-10 |K| |s|``.
+    """
+    w, free_shapes = free_modes(FreeSystem.of(body), count)
+    shapes = body.expansion @ free_shapes
+    elastic = w > 0.0
+    w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
+    return w, shapes
+
+
+def rigid_modes(body: ElasticBody) -> Array:
+    """Mass-normalised rigid modes (2 N, r) that the supports leave, r = 0 ... 3.
+
+    Translation in x, in y, and a counter-clockwise rotation about the place where the lines of
+    the held displacements meet, about the centre of mass where they leave it open.
+    """
+    M = body.mass
+    x, y = body.nodes.T
+    held_x, held_y = (body.fixed_dofs[body.fixed_dofs % 2 == axis] // 2 for axis in range(2))
+    centres = np.array([centre for _, centre in body.hinges]).reshape(-1, 2)
+    lines_x = np.concatenate([x[held_y], centres[:, 0]])
+    lines_y = np.concatenate([y[held_x], centres[:, 1]])
+    ones = np.zeros(2 * len(x))
+    ones[0::2] = 1.0
+    inertia = (M @ ones)[0::2] / (ones @ (M @ ones))
+    pivot_x = lines_x.mean() if lines_x.size else inertia @ x
+    pivot_y = lines_y.mean() if lines_y.size else inertia @ y
+    shapes = np.column_stack([ones, np.roll(ones, 1)])[:, [not lines_y.size, not lines_x.size]]
+    off = np.concatenate([lines_x - pivot_x, lines_y - pivot_y])
+    if np.abs(off).max(initial=0.0) <= 1e-9 * body.mesh.extent:
+        rotation = np.column_stack([pivot_y - y, x - pivot_x]).ravel()
+        rotation[body.fixed_dofs] = 0.0
+        shapes = np.column_stack([shapes, rotation])
+    for column in range(shapes.shape[1]):
+        for _ in range(2):
+            earlier = shapes[:, :column]
+            shapes[:, column] -= earlier @ (earlier.T @ (M @ shapes[:, column]))
+        shapes[:, column] /= np.sqrt(shapes[:, column] @ (M @ shapes[:, column]))
+    return shapes
+
+
+def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
+    """The same over the free degrees of freedom: frequencies (m,) and shapes (f, m)."""
+    unknowns = system.stiffness.shape[0]
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= unknowns:
+        raise InputError(f"modes = {count!r} must be a whole number from 1 to the number of "
+                         f"unknowns of the body, {unknowns}.")
+    rigid = system.rigid[:, :count]
+    elastic = count - rigid.shape[1]
+    if not elastic:
+        return np.zeros(count), rigid
+    squares, shapes = elastic_modes(system, elastic)
+    return (np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(squares)]),
+            np.hstack([rigid, shapes * fixed_signs(shapes)]))
+
+
+def strain_energies(body: ElasticBody, shapes: Array) -> Array:
+    """Strain energies (m,) [J] of displacement fields (2 N, m), from the strains in the elements.
+
+    The product with K would lose the digits by which the stiffest cells exceed the body as a
+    whole: all of them, for a slender body with cells strongly graded into its corners.
+    """
+    basis = body.basis
+    slopes = np.ascontiguousarray([function[0].grad for function in basis.basis])
+    functions, _, elements, points = slopes.shape
+    energies = np.empty(shapes.shape[1])
+    _strain_energies(slopes.reshape(2 * functions, elements, points),
+                     np.ascontiguousarray(basis.dx),
+                     np.ascontiguousarray(basis.element_dofs.T, dtype=np.int64),
+                     np.ascontiguousarray(shapes), np.array(body.elasticity), energies)
+    return energies * body.thickness
+
+
+@kernel(types.void(block, matrix, types.Array(types.int64, 2, "C"), matrix, vector, vector))
+def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):  # type: ignore[no-untyped-def]
+    """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions to x and to y."""
+    elements, points = dx.shape
+    corners, modes = nodes.shape[1], len(energies)
+    direct, lateral, shear = elasticity
+    strains = np.empty((3, modes))
+    energies[:] = 0.0
+    for e in range(elements):
+        for p in range(points):
+            strains[:] = 0.0
+            for k in range(1, corners):
+                # Only differences count: rigid displacements may be much larger.
+                x, y = slopes[2 * k, e, p], slopes[2 * k + 1, e, p]
+                node, first = 2 * nodes[e, k], 2 * nodes[e, 0]
+                for i in range(modes):
+                    along = shapes[node, i] - shapes[first, i]
+                    across = shapes[node + 1, i] - shapes[first + 1, i]
+                    strains[0, i] += x * along
+                    strains[1, i] += y * across
+                    strains[2, i] += y * along + x * across
+            for i in range(modes):
+                xx, yy, xy = strains[0, i], strains[1, i], strains[2, i]
+                energies[i] += 0.5 * dx[e, p] * (
+                    direct * (xx * xx + yy * yy) + 2.0 * lateral * xx * yy + shear * xy * xy)
+
+
+def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
+    """Squares of the lowest non-zero angular frequencies and their mass-normalised shapes.
+
+    Inverse Lanczos iteration with the elastic static response, which leaves out the rigid modes
+    exactly; the dense solver for few unknowns.
+    """
+    K, M = system.stiffness, system.mass
+    size = K.shape[0]
+    if size <= _DENSE or 3 * count > size:
+        from scipy.linalg import eigh
+
+        inertia = M @ system.rigid
+        # Lift the rigid modes above all others instead of removing them.
+        lifted = K.toarray() + (inertia @ inertia.T) * _largest(K, M)
+        squares, shapes = eigh(lifted, M.toarray(), subset_by_index=[0, count - 1])
+    else:
+        from scipy.sparse.linalg import LinearOperator, eigsh
+
+        start = np.random.default_rng(0).standard_normal(size)
+        squares, shapes = eigsh(
+            K, k=count, M=system.mass_product, sigma=0.0, v0=system.without_rigid(start),
+            ncv=min(size, max(20, 2 * count + 8)),
+            OPinv=LinearOperator(K.shape, system.deflection, dtype=float))
+    shapes = system.without_rigid(shapes)
+    shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))
+    # Rayleigh quotients do not carry the shift's round-off.
+    squares = (shapes * (K @ shapes)).sum(axis=0)
+    order = np.argsort(squares)
+    squares, shapes = squares[order], shapes[:, order]
+    error = backward_error(K, M, squares, shapes).max()
+    if not error < 1e-10 or squares[0] <= 0.0:
+        raise AnalysisError(
+            f"The eigenmodes are not accurate: the residual is {error:.1e} of |K| |mode|, and the "
+            f"lowest squared frequency {squares[0]:.3g}; look for nearly degenerate cells or parts "
+            f"that hang on a single node."
+        )
+    return squares, shapes
+
+
+def backward_error(K: Any, M: Any, squares: Array, shapes: Array) -> Array:
+    """``|K s - w^2 M s| / (|K| |s|)`` (m,) of each mode, with the 1-norm of K."""
+    residual = np.linalg.norm(K @ shapes - (M @ shapes) * squares, axis=0)
+    largest = float(abs(K).sum(axis=0).max())
+    return np.asarray(residual / (largest * np.linalg.norm(shapes, axis=0)))
+
+
+def _largest(K: Any, M: Any) -> float:
+    """An upper bound of the largest squared frequency, from element-like diagonal ratios."""
+    return float(10.0 * (K.diagonal() / M.diagonal()).max())
+
+
+def fixed_signs(shapes: Array) -> Array:
+    """Signs (m,) that make the first of the largest components of each column positive.
+
+    Components within one per cent of the largest count as equal to it, so that round-off
+    between the two ends of a symmetric body does not decide.
+    """
+    size = np.abs(shapes)
+    first = np.argmax(size >= 0.99 * size.max(axis=0), axis=0)
+    return np.where(shapes[first, np.arange(shapes.shape[1])] < 0.0, -1.0, 1.0)

@@ -1,0 +1,319 @@
+"""The modal basis of a mass and a stiffness matrix that come from another program."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
+from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs, free_modes
+from fecontact.reduction.matrix_files import AssembledMatrix
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.null_space import lowest_vectors, null_space, relative_energies
+from fecontact.reduction.restriction import GivenRows, gathered_rows
+
+Array = NDArray[np.float64]
+
+# Up to this size all modes are kept where no number is given.
+_ALL = 2000
+# As in fecontact.reduction.eigenmodes: here the dense solver is quicker and as exact.
+_DENSE = 600
+# Abaqus writes 1e36 on the diagonal of the stiffness where a boundary condition holds.
+_HELD = 1e35
+_ASYMMETRY = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A square symmetric matrix as given: its entries, and how to speak of it and its rows."""
+
+    name: str
+    matrix: Any
+    labels: NDArray[np.int64] | None
+
+    def dof(self, number: int) -> str:
+        """A degree of freedom in words."""
+        if self.labels is None:
+            return f"degree of freedom {number} (counted from 0)"
+        node, direction = self.labels[number]
+        return f"node {node}, direction {direction}"
+
+    def without(self, dofs: NDArray[np.bool_]) -> "Given":
+        """The matrix without the marked degrees of freedom."""
+        labels = None if self.labels is None else self.labels[~dofs]
+        return replace(self, matrix=self.matrix[~dofs][:, ~dofs].tocsc(), labels=labels)
+
+
+def basis_from_matrices(
+    mass: Any,
+    stiffness: Any,
+    rows: Mapping[str, Any],
+    *,
+    damping: Any = 0.0,
+    modes: int | None = None,
+    rigid: int | None = None,
+    contact_x: ArrayLike | None = None,
+    tributary: ArrayLike | None = None,
+) -> ModalBasis:
+    """Basis of given matrices, for bodies meshed elsewhere or chains of masses.
+
+    Rigid modes are the displacements that the stiffness does not resist; they get the
+    frequency zero. The first of the largest components of each mode is positive.
+
+    Parameters
+    ----------
+    mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
+        Symmetric; the mass positive definite [kg], the stiffness positive semi-definite
+        [N/m]. Degrees of freedom with a stiffness of 1e35 or more on the diagonal are held.
+    rows : mapping
+        ``contact``: displacements x, y and rotation of each of the n contact nodes from the d
+        degrees of freedom, as (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several
+        contact groups a mapping of their names to such rows. ``B``, ``C``
+        and further named points: dense or sparse (3, d); B and C are zero when left out.
+        Two rows, x and y, in the place of three mean no rotation.
+        :func:`fecontact.reduction.restriction.rows_from_dofs` makes them from numbers.
+    damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
+        Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
+        given degrees of freedom, dense, sparse or AssembledMatrix [N s/m].
+    modes : int, optional
+        Number m of modes, the rigid ones included, lowest first; all, up to d = 2000.
+    rigid : int, optional
+        Number of rigid modes, for stiffness matrices that carry few digits or were
+        condensed; found from the stiffness when left out.
+    contact_x, tributary : (n,) arrays, optional
+        Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes
+        [m].
+
+    Raises
+    ------
+    InputError
+        For matrices that are not square, of one size, finite, symmetric or definite as
+        required, and for rows of another width.
+    AnalysisError
+        If the modes cannot be computed accurately.
+    """
+    M, K = given_matrix("mass", mass), given_matrix("stiffness", stiffness)
+    same_dofs(M, K)
+    d = M.matrix.shape[0]
+    C = _damping_matrix(damping, M)
+    given = gathered_rows(rows, d)
+    held = K.matrix.diagonal() >= _HELD
+    if held.all():
+        raise InputError(f"{K.name} holds every degree of freedom (entries of 1e35 or more).")
+    if held.any():
+        M, K = M.without(held), K.without(held)
+        given = replace(given, restriction=given.restriction[:, ~held])
+        C = None if C is None else C[~held][:, ~held]
+        d = M.matrix.shape[0]
+    M, K = _symmetric(M), _symmetric(K)
+    _require_positive_mass(M)
+    w, shapes = _modes(K, M, _count(modes, d), rigid)
+    return assembled_basis(
+        w, shapes, given, contact_x=contact_x, tributary=tributary,
+        damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
+
+
+def assembled_basis(
+    w: Array, shapes: Array, rows: GivenRows, *, damping: Damping, contact_x: ArrayLike | None,
+    tributary: ArrayLike | None,
+) -> ModalBasis:
+    """The basis of modes (d, m) without geometry, at the rows."""
+    n = rows.contact_nodes
+    T = np.asarray(rows.restriction @ shapes).reshape(-1, 3, len(w))
+    positions = np.zeros((len(T), 2))
+    positions[2 : 2 + n, 0] = _per_node("contact_x", 0.0 if contact_x is None else contact_x, n)
+    return ModalBasis(
+        angular_frequencies=w,
+        damping=modal_damping(damping, w),
+        T=T,
+        positions=positions,
+        tributary=_per_node("tributary", 1.0 / n if tributary is None else tributary, n),
+        extra=rows.extra,
+        groups=rows.groups,
+    )
+
+
+def given_matrix(kind: str, given: Any) -> Given:
+    """A dense, sparse or read matrix as a sparse one.
+
+    Raises
+    ------
+    InputError
+        If it is complex, not square or not finite.
+    """
+    import scipy.sparse as sp
+
+    name, labels = f"The {kind} matrix", None
+    if isinstance(given, AssembledMatrix):
+        name, labels, given = f"{name} ({given.source})", given.labels, given.matrix
+    if not sp.issparse(given):
+        try:
+            given = np.asarray(given)
+            given = given if given.dtype.kind == "c" else given.astype(float)
+        except (TypeError, ValueError):
+            raise InputError(f"{kind} must be an array of real numbers or a sparse matrix, not "
+                             f"{type(given).__name__}.") from None
+    if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.shape[0]:
+        raise InputError(f"{name} must be square and not empty, not of shape {given.shape}.")
+    if given.dtype.kind == "c":
+        raise InputError(f"{name} is complex; give its real part (structural damping belongs into "
+                         f"damping).")
+    matrix = sp.csc_array(given, dtype=float)
+    matrix.sum_duplicates()
+    wrong = np.flatnonzero(~np.isfinite(matrix.data))
+    if wrong.size:
+        at = sp.coo_array(matrix)
+        row, column = at.row[wrong[0]], at.col[wrong[0]]
+        raise InputError(f"{name} holds values that are not finite, the first one in row {row}, "
+                         f"column {column} (counted from 0).")
+    return Given(name, matrix, labels)
+
+
+def same_dofs(first: Given, second: Given) -> None:
+    """Raise InputError unless both matrices have the same degrees of freedom."""
+    if first.labels is not None and second.labels is not None:
+        for owner, other in ((first, second), (second, first)):
+            alone = _named(owner) - _named(other)
+            if alone:
+                node, direction = min(alone)
+                raise InputError(f"{owner.name} has node {node}, direction {direction}, but "
+                                 f"{_inside(other)} has not; write both from one model.")
+        if (first.labels != second.labels).any():
+            raise InputError(f"{first.name} and {_inside(second)} have their degrees of freedom "
+                             f"in different orders.")
+    if first.matrix.shape != second.matrix.shape:
+        raise InputError(f"{second.name} must be square and of the mass matrix's size, "
+                         f"{first.matrix.shape}, not {second.matrix.shape}.")
+
+
+def _named(given: Given) -> set[tuple[int, ...]]:
+    labels = np.empty((0, 2), int) if given.labels is None else given.labels
+    return set(map(tuple, labels.tolist()))
+
+
+def _inside(given: Given) -> str:
+    """The name within a sentence."""
+    return given.name[0].lower() + given.name[1:]
+
+
+def _damping_matrix(damping: Any, mass: Given) -> Any:
+    """The damping matrix in the given degrees of freedom; None for ratios or factors."""
+    import scipy.sparse as sp
+
+    matrix = isinstance(damping, AssembledMatrix) or sp.issparse(damping) or np.ndim(damping) == 2
+    if not matrix or isinstance(damping, (Rayleigh, LossFactor)):
+        return None
+    given = given_matrix("damping", damping)
+    if given.matrix.shape != mass.matrix.shape:
+        raise InputError(f"{given.name} must have shape {mass.matrix.shape}, one row for each "
+                         f"given degree of freedom, not {given.matrix.shape}.")
+    same_dofs(mass, given)
+    return given.matrix
+
+
+def _symmetric(given: Given) -> Given:
+    """The symmetric part of a matrix that is symmetric but for its last digits."""
+    import scipy.sparse as sp
+
+    difference = sp.coo_array(abs(given.matrix - given.matrix.T))
+    largest = float(abs(given.matrix).max())
+    if not difference.nnz or not difference.data.max():
+        return given
+    worst = int(np.argmax(difference.data))
+    if difference.data[worst] > _ASYMMETRY * largest:
+        row, column = sorted((int(difference.row[worst]), int(difference.col[worst])))
+        raise InputError(
+            f"{given.name} is not symmetric: the entries in row {row}, column {column} "
+            f"({given.matrix[row, column]:.6g}) and in row {column}, column {row} "
+            f"({given.matrix[column, row]:.6g}), counted from 0, differ by "
+            f"{difference.data[worst] / largest:.1e} of the largest entry."
+        )
+    return replace(given, matrix=sp.csc_array(0.5 * (given.matrix + given.matrix.T)))
+
+
+def _require_positive_mass(mass: Given) -> None:
+    diagonal = mass.matrix.diagonal()
+    lowest = int(np.argmin(diagonal))
+    if diagonal[lowest] <= 0.0:
+        raise InputError(
+            f"{mass.name} is not positive definite: its diagonal entry at {mass.dof(lowest)} is "
+            f"{diagonal[lowest]:.6g}, as at {np.count_nonzero(diagonal <= 0.0) - 1} more; a "
+            f"massless degree of freedom must be condensed statically or be given a mass."
+        )
+    if _negative_pivots(mass.matrix):
+        raise InputError(f"{mass.name} is not positive definite, although its diagonal is.")
+
+
+def _negative_pivots(matrix: Any) -> bool:
+    """Whether a symmetric matrix with a positive diagonal is not positive definite."""
+    if matrix.nnz == matrix.shape[0]:
+        return False
+    if matrix.shape[0] <= _DENSE:
+        scale = 1.0 / np.sqrt(matrix.diagonal())
+        lowest = np.linalg.eigvalsh(matrix.toarray() * np.outer(scale, scale))[0]
+        return bool(lowest <= 1e-15 * len(scale))
+    from fecontact.reduction.null_space import symmetric_factors
+
+    return bool((symmetric_factors(matrix).U.diagonal() <= 0.0).any())
+
+
+def _count(modes: int | None, d: int) -> int:
+    if modes is None:
+        if d > _ALL:
+            raise InputError(f"modes = None keeps all modes, but there are {d} degrees of freedom, "
+                             f"more than {_ALL}; say how many of the lowest modes to keep.")
+        return d
+    if isinstance(modes, bool) or not isinstance(modes, (int, np.integer)) or not 1 <= modes <= d:
+        raise InputError(f"modes = {modes!r} must be a whole number from 1 to the number of "
+                         f"degrees of freedom, {d}.")
+    return int(modes)
+
+
+def _modes(stiffness: Given, mass: Given, count: int, rigid: int | None) -> tuple[Array, Array]:
+    """The lowest angular frequencies (m,) and mass-normalised shapes (d, m)."""
+    K, M = stiffness.matrix, mass.matrix
+    vectors = lowest_vectors(K, M, stiffness.name, rigid)
+    R = null_space(K, M, vectors)
+    R = R * fixed_signs(R)
+    if len(K.data) and R.shape[1] and relative_energies(K, R).max() > 1e-6:
+        raise InputError(f"rigid = {rigid} modes are asked for, but {_inside(stiffness)} "
+                         f"resists them.")
+    d = K.shape[0]
+    if d > _DENSE and 3 * count <= d:
+        return free_modes(FreeSystem(K, M, R), count)
+    elastic = count - R.shape[1]
+    if elastic <= 0:
+        return np.zeros(count), R[:, :count]
+    squares, shapes = _dense_elastic(K, M, R, elastic)
+    return (np.concatenate([np.zeros(R.shape[1]), np.sqrt(squares)]),
+            np.hstack([R, shapes * fixed_signs(shapes)]))
+
+
+def _dense_elastic(K: Any, M: Any, R: Array, count: int) -> tuple[Array, Array]:
+    """Squares (m,) and shapes (d, m) of the lowest modes that are mass-orthogonal to R."""
+    from scipy.linalg import eigh
+
+    mass, lifted = M.toarray(), K.toarray()
+    if R.shape[1]:
+        # The rigid modes are lifted above all others.
+        top = eigh(lifted, mass, eigvals_only=True, subset_by_index=[len(mass) - 1] * 2)[0]
+        inertia = M @ R
+        lifted += 2.0 * top * (inertia @ inertia.T)
+    shapes = eigh(lifted, mass, subset_by_index=[0, count - 1])[1]
+    shapes -= R @ ((M @ R).T @ shapes)
+    shapes /= np.sqrt((shapes * (M @ shapes)).sum(axis=0))
+    squares = (shapes * (K @ shapes)).sum(axis=0)
+    order = np.argsort(squares)
+    return squares[order], shapes[:, order]
+
+
+def _per_node(name: str, values: ArrayLike, n: int) -> Array:
+    """One value for each contact node, a single one for all."""
+    array = np.asarray(values, dtype=float)
+    if array.shape not in ((), (n,)):
+        raise InputError(f"{name} must have one value for each of the {n} contact nodes, not shape "
+                         f"{array.shape}.")
+    return np.array(np.broadcast_to(array, (n,)))

@@ -1,0 +1,202 @@
+"""Files of mass, stiffness and damping matrices."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import as_path
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
+from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
+
+_BANNER = b"%%MatrixMarket"
+
+
+@dataclass(frozen=True, eq=False)
+class AssembledMatrix:
+    """A matrix from a file.
+
+    Attributes
+    ----------
+    matrix : (d, d) array or sparse array
+        In the units of the file.
+    labels : (d, 2) integer array or None
+        Node and direction (1, 2, 3: displacements; 4, 5, 6: rotations) of each degree of freedom;
+        None where the file does not name them.
+    source : str
+        The file, for messages.
+    """
+
+    matrix: Any
+    labels: NDArray[np.int64] | None
+    source: str
+
+    def dof(self, node: int, direction: int) -> int:
+        """Number of a degree of freedom, counted from 0.
+
+        Raises
+        ------
+        InputError
+            If the file does not name degrees of freedom, or has no such one.
+        """
+        if self.labels is None:
+            raise InputError(f"{self.source}: the file does not name its degrees of freedom; give "
+                             f"them by number.")
+        found = np.flatnonzero((self.labels == (node, direction)).all(axis=1))
+        if not found.size:
+            here = self.labels[self.labels[:, 0] == node, 1].tolist()
+            what = f"node {node} has the directions {here}" if here else \
+                f"its nodes run from {self.labels[:, 0].min()} to {self.labels[:, 0].max()}"
+            raise InputError(f"{self.source}: there is no degree of freedom in direction "
+                             f"{direction} at node {node}; {what}.")
+        return int(found[0])
+
+
+def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
+    """Read a mass, stiffness or damping matrix, or mode shapes, from a file.
+
+    Matrix Market (.mtx, .mm), MATLAB (.mat up to version 7.3), NumPy and SciPy (.npy, .npz), and
+    the text files of Abaqus' ``*MATRIX OUTPUT`` (.mtx) in the formats COORDINATE and MATRIX
+    INPUT; the content of a .mtx file says which it is. Of a symmetric matrix one triangle is
+    enough.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    name : str, optional
+        Name of the matrix in a file that may hold several (.mat, .npz, MATRIX INPUT).
+
+    Raises
+    ------
+    InputError
+        If there is no such file or matrix, or the file is damaged or of another kind.
+    """
+    path = as_path(path, "a matrix")
+    readers = {".mtx": _read_mtx, ".mm": _read_mtx, ".mat": _read_mat, ".npz": _read_npz,
+               ".npy": _read_npy}
+    if path.suffix.lower() not in readers:
+        raise InputError(f"{path}: matrices are not read from files of this kind; the suffixes "
+                         f"that are: {', '.join(sorted(readers))}.")
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file.")
+    try:
+        matrix, labels = readers[path.suffix.lower()](path, name)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except MemoryError:
+        raise
+    except Exception as error:
+        # Damaged files make readers fail in every way there is.
+        detail = " ".join(str(error).split()).rstrip(".")
+        raise InputError(f"{path}: the file cannot be read, it is damaged or of another kind"
+                         f"{f' ({detail[:200]})' * bool(detail)}.") from error
+    return AssembledMatrix(_real(path, matrix), labels, str(path))
+
+
+def _read_mtx(path: Path, name: str | None) -> tuple[Any, NDArray[np.int64] | None]:
+    with path.open("rb") as stream:
+        first = stream.readline()
+    if not first.startswith(_BANNER):
+        return read_abaqus_matrix(path, name)
+    from scipy.io import mminfo, mmread
+
+    _require_no_name(name)
+    if b"pattern" in first.lower():
+        raise InputError("The Matrix Market file says where the matrix has entries, but not which "
+                         "(pattern); write it with values.")
+    rows, columns, entries, form, _, symmetry = mminfo(path)
+    if form == "array":
+        entries = rows * columns // (1 if symmetry == "general" else 2)
+    if 2 * entries > path.stat().st_size:  # a digit and a blank each, at least
+        raise InputError(f"The file is said to hold {entries} numbers, which it does not hold.")
+    return mmread(path), None
+
+
+def _read_mat(path: Path, name: str | None) -> tuple[Any, None]:
+    import h5py
+
+    if h5py.is_hdf5(path):
+        with h5py.File(path, "r") as file:
+            return _chosen({key: _from_hdf5(file[key]) for key in file
+                            if not key.startswith("#")}, name), None
+    from scipy.io import loadmat
+
+    variables = loadmat(path)
+    return _chosen({key: value for key, value in variables.items()
+                    if not key.startswith("__")}, name), None
+
+
+def _from_hdf5(item: Any) -> Any:
+    """A variable of a MATLAB 7.3 file: stored by columns, sparse ones as a group."""
+    import h5py
+    import scipy.sparse as sp
+
+    if isinstance(item, h5py.Dataset):
+        if item.attrs.get("MATLAB_class") in (b"char", b"cell"):
+            return None
+        value = values(item).T
+        return value["real"] + 1j * value["imag"] if value.dtype.names else value
+    if "MATLAB_sparse" not in item.attrs:
+        return None
+    starts = array(item, "jc", (None,), "i")
+    shape = (int(item.attrs["MATLAB_sparse"]), len(starts) - 1)
+    if "data" not in item:
+        return sp.csc_array(shape)
+    return sp.csc_array((values(item["data"]), array(item, "ir", (None,), "i"), starts),
+                        shape=shape)
+
+
+def _read_npz(path: Path, name: str | None) -> tuple[Any, None]:
+    import scipy.sparse as sp
+
+    arrays = npz_arrays(path)
+    if {"format", "shape", "data"} <= set(arrays):
+        _require_no_name(name)
+        return sp.load_npz(path), None
+    return _chosen(arrays, name), None
+
+
+def _read_npy(path: Path, name: str | None) -> tuple[Any, None]:
+    _require_no_name(name)
+    with path.open("rb") as stream:
+        return npy_array(stream, path.stat().st_size), None
+
+
+def _chosen(variables: Mapping[str, Any], name: str | None) -> Any:
+    """The variable of that name, or the only matrix among them."""
+    matrices = {key: value for key, value in variables.items()
+                if getattr(value, "ndim", 0) == 2 and value.dtype.kind in "biufc"}
+    if name is None:
+        large = {key: value for key, value in matrices.items() if min(value.shape) > 1} or matrices
+        if len(large) != 1:
+            raise InputError(f"Say which matrix to read by its name; the file holds: "
+                             f"{choices(large)}.")
+        return next(iter(large.values()))
+    if name not in matrices:
+        raise InputError(f"There is no matrix '{name}'{nearest(name, matrices)}; the file holds: "
+                         f"{choices(matrices)}.")
+    return matrices[name]
+
+
+def _require_no_name(name: str | None) -> None:
+    if name is not None:
+        raise InputError(f"The file holds one matrix without a name; leave out name = '{name}'.")
+
+
+def _real(path: Path, matrix: Any) -> Any:
+    import scipy.sparse as sp
+
+    if matrix.dtype.kind == "c":
+        raise InputError(f"{path}: the matrix is complex; write its real part.")
+    if matrix.ndim != 2 or matrix.dtype.kind not in "biuf":
+        raise InputError(f"{path}: the array of shape {matrix.shape} and type {matrix.dtype} is "
+                         f"no matrix of numbers.")
+    if not sp.issparse(matrix):
+        return np.asarray(matrix, float)
+    with reading(path, "no sound sparse matrix"):
+        return sp.csc_array(sound_sparse(matrix), dtype=float)

@@ -1,0 +1,206 @@
+"""The modal basis: eigenfrequencies, damping and the rows of T at the points of interest."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import as_floats, as_integers, require_kind
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.reduction.field import Field, Quality
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ModalBasis:
+    """Mass-normalised modes ``q`` of a body and its motion at the points of interest.
+
+    The equations of motion are ``q'' + damping q' + angular_frequencies^2 q = T^T f`` (4.1-1),
+    the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for each, x tangential to
+    the ground, y away from it, phi counter-clockwise.
+
+    Attributes
+    ----------
+    angular_frequencies : (m,) array
+        [rad/s], ascending; exactly zero for rigid modes.
+    damping : (m, m) array
+        Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D.
+    T : (P, 3, m) array
+        Rows of excitation point B, load point C, the n contact nodes and further named points.
+    positions : (P, 2) array
+        Reference places of these points [m].
+    tributary : (n,) array
+        Length of the contact face that each contact node stands for [m].
+    extra : tuple of str
+        Names of the points after the contact nodes.
+    field : Field or None
+        Modes over the whole body; None for a basis without geometry.
+    quality : Quality or None
+        How the basis relates to the body; None for a basis without one.
+    groups : tuple of (str, int)
+        Names of the contact groups and their numbers of nodes, in the order of the nodes; one
+        group 'contact' of all when left out.
+
+    Raises
+    ------
+    InputError
+        For arrays of another shape, values that are not finite, tributary lengths that are not
+        positive, and groups that do not make up the contact nodes.
+    """
+
+    angular_frequencies: Array
+    damping: Array
+    T: Array
+    positions: Array
+    tributary: Array
+    extra: tuple[str, ...] = ()
+    field: Field | None = None
+    quality: Quality | None = None
+    groups: tuple[tuple[str, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("angular_frequencies", "damping", "T", "positions", "tributary"):
+            array = np.array(getattr(self, name), dtype=float, order="C")
+            if not np.isfinite(array).all():
+                raise InputError(f"Modal basis: {name} holds values that are not finite.")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if not (self.tributary > 0.0).all():
+            raise InputError(f"Modal basis: tributary lengths must be above zero, not "
+                             f"{self.tributary.min()}.")
+        groups = tuple((str(name), int(count)) for name, count in self.groups)
+        groups = groups or (("contact", len(self.tributary)),)
+        if sum(count for _, count in groups) != len(self.tributary):
+            raise InputError(f"Modal basis: the contact groups {groups} do not make up the "
+                             f"{len(self.tributary)} contact nodes.")
+        object.__setattr__(self, "groups", groups)
+        m = len(self.angular_frequencies)
+        points = 2 + len(self.tributary) + len(self.extra)
+        for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2))):
+            if getattr(self, name).shape != shape:
+                raise InputError(f"Modal basis: {name} must have shape {shape}, not "
+                                 f"{getattr(self, name).shape}.")
+
+    @property
+    def modes(self) -> int:
+        """Number of modes m."""
+        return len(self.angular_frequencies)
+
+    @property
+    def contact_nodes(self) -> int:
+        """Number of contact nodes n."""
+        return len(self.tributary)
+
+    @property
+    def frequencies_hz(self) -> Array:
+        """Eigenfrequencies (m,) [Hz]."""
+        return self.angular_frequencies / (2.0 * np.pi)
+
+    @property
+    def rigid_modes(self) -> int:
+        """Number of modes of frequency zero; they come first."""
+        return int(np.count_nonzero(self.angular_frequencies == 0.0))
+
+    @property
+    def damping_ratios(self) -> Array:
+        """Damping ratios D (m,), zero for rigid modes; InputError if damping is not modal."""
+        diagonal = np.diag(self.damping)
+        if (self.damping != np.diag(diagonal)).any():
+            raise InputError("The damping matrix is not diagonal, so there are no damping ratios.")
+        w = self.angular_frequencies
+        return np.divide(diagonal, 2.0 * w, out=np.zeros_like(w), where=w > 0.0)
+
+    @property
+    def T_matrix(self) -> Array:
+        """T (3 (2 + n), m) in the order of (4.1-13): B, C, contact nodes."""
+        return self.T[: 2 + self.contact_nodes].reshape(-1, self.modes)
+
+    @property
+    def contact_T(self) -> Array:
+        """Rows (n, 3, m) of the contact nodes."""
+        return self.T[2 : 2 + self.contact_nodes]
+
+    @property
+    def contact_x(self) -> Array:
+        """Reference abscissae X (n,) of the contact nodes [m]."""
+        return self.positions[2 : 2 + self.contact_nodes, 0]
+
+    def point_index(self, point: str | int) -> int:
+        """Index into ``T`` of B, C, a further named point, or a contact node by its number.
+
+        InputError if there is none, with those that there are.
+        """
+        require_kind("A point", (str, int), point=point)
+        if isinstance(point, int):
+            if not 0 <= point < self.contact_nodes:
+                raise InputError(f"Contact node {point} does not exist; there are "
+                                 f"{self.contact_nodes}, counted from 0.")
+            return 2 + point
+        names = ("B", "C", *self.extra)
+        if point not in names:
+            raise InputError(f"There is no point '{point}'{nearest(point, names)}; the named "
+                             f"points are {choices(names)}, contact nodes go by number.")
+        index = names.index(point)
+        return index if index < 2 else index + self.contact_nodes
+
+    @property
+    def elastic_compliance(self) -> Array:
+        """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes."""
+        elastic = self.angular_frequencies > 0.0
+        rows = self.T[:, :2, elastic] / self.angular_frequencies[elastic]
+        return np.asarray((rows**2).sum(axis=2))
+
+    def with_dashpots(self, dashpots: Mapping[str | int, tuple[float, float]]) -> "ModalBasis":
+        """A copy with dashpots between points of the body and the inertial frame.
+
+        Parameters
+        ----------
+        dashpots : mapping of point to (b_x, b_y)
+            Points by name, contact nodes by number; damping in x and in y, zero or above
+            [N s/m]. ``b row^T row`` is added to the modal damping matrix, which they make full.
+
+        Raises
+        ------
+        InputError
+            For a point that does not exist, or a damping that is negative or not finite.
+        """
+        damping = np.array(self.damping)
+        require_kind("with_dashpots", Mapping, dashpots=dashpots)
+        for point, given in dashpots.items():
+            values = as_floats(given, f"Dashpot at {point!r}: damping")
+            if values.shape != (2,):
+                raise InputError(f"Dashpot at {point!r}: damping must be two numbers, b_x and b_y, "
+                                 f"not an array of shape {values.shape}.")
+            for row, b in zip(self.T[self.point_index(point)], values.tolist(), strict=False):
+                if not 0.0 <= b < np.inf:
+                    raise InputError(f"Dashpot at {point!r}: damping {b!r} must be finite and "
+                                     f"zero or above.")
+                damping += b * np.outer(row, row)
+        return replace(self, damping=damping)
+
+    def select(self, modes: Sequence[int]) -> "ModalBasis":
+        """A copy with the given modes alone, by number from 0, each once and in ascending order.
+
+        A block's tilting, say, is left out by leaving out its rigid rotation. Raises InputError
+        for a mode that does not exist.
+        """
+        chosen = np.unique(as_integers(modes, "The modes to select"))
+        if not chosen.size or len(chosen) != len(modes) or chosen[0] < 0 or (
+                chosen[-1] >= self.modes):
+            raise InputError(f"modes {list(modes)} must be different numbers from 0 to "
+                             f"{self.modes - 1}, at least one.")
+        field, quality = self.field, self.quality
+        return replace(
+            self,
+            angular_frequencies=self.angular_frequencies[chosen],
+            damping=self.damping[np.ix_(chosen, chosen)],
+            T=self.T[:, :, chosen],
+            field=None if field is None else replace(
+                field, shapes=field.shapes[..., chosen], stress=field.stress[..., chosen]),
+            quality=None if quality is None else replace(
+                quality, residuals=quality.residuals[chosen],
+                participation=quality.participation[:, chosen],
+                vibration_modes=int(np.count_nonzero(chosen < quality.vibration_modes))),
+        )

@@ -1,0 +1,207 @@
+"""From the finite-element body to its modal basis."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.fem.contact_face import contact_groups
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.points import Place, Rows, place_rows
+from fecontact.reduction.craig_bampton import craig_bampton
+from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
+from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
+from fecontact.reduction.field import Field, Quality
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.residual_vectors import Flexibility, residual_modes
+
+Array = NDArray[np.float64]
+
+
+Reduction = Literal["vibration", "residual", "craig-bampton"]
+
+
+def modal_basis(
+    body: ElasticBody,
+    modes: int = 20,
+    *,
+    contact: str | Sequence[str] = "contact",
+    contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]] = "all",
+    B: Place | None = None,
+    C: Place | None = None,
+    points: Mapping[str, Place] | None = None,
+    damping: Damping = 0.0,
+    reduction: Reduction = "vibration",
+    tolerance: float = 0.1,
+) -> ModalBasis:
+    """Mass-normalised modes, and T at B, C and the contact nodes.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        The finite-element body.
+    modes : int
+        Number of modes, the rigid ones included, lowest first.
+    contact : str or sequence of str
+        Boundary that touches the ground; its outward normal must point down, to -y. Several
+        boundaries are as many contact groups, which may have laws of their own.
+    contact_nodes : int or 'all', or one of them for each boundary
+        Number of equal segments of the contact boundary, each with a node in its middle that
+        moves with the segment's mean displacement; or every displacement node of the
+        boundary.
+    B, C : place, optional
+        Excitation and load point: the name of a point or boundary of the mesh, (x, y), or
+        :class:`~fecontact.fem.points.Patch`. Default: the mesh's point of that name; without
+        one, the rows are zero.
+    points : mapping of name to place, optional
+        Further points to observe.
+    damping : float, (m,) sequence, Rayleigh or (m, m) array
+        See :func:`fecontact.reduction.damping.modal_damping`; modes that complete the given number
+        take the last ratio.
+    reduction : 'vibration', 'residual' or 'craig-bampton'
+        The lowest vibration modes alone; these completed by residual vectors of forces at
+        B, C and the contact nodes, so that static deflections there are right; or that many
+        fixed-interface modes with constraint modes.
+    tolerance : float
+        For 'residual': the part of its own static compliance that may be missing at any of
+        these points, in x or y. Zero keeps all residual vectors; the larger, the fewer.
+
+    Raises
+    ------
+    InputError, MeshError
+        For names that do not exist, places outside the body, an upward contact face, more
+        modes than unknowns, more contact nodes than the boundary has.
+    """
+    import scipy.sparse as sp
+
+    require_kind("modal_basis", ElasticBody, body=body)
+    points = {} if points is None else points
+    require_kind("points", Mapping, points=points)
+    require_finite("modal_basis", tolerance=tolerance)
+    for name in points:
+        require_kind("points", str, name=name)
+        if name in ("B", "C"):
+            raise InputError(f"points: '{name}' is a name of its own; give it as {name}=...")
+    if reduction not in get_args(Reduction):
+        raise InputError(f"reduction = {reduction!r} must be one of {choices(get_args(Reduction))}"
+                         f"{nearest(str(reduction), get_args(Reduction))}.")
+    if not 0.0 <= tolerance < 1.0:
+        raise InputError(f"tolerance = {tolerance!r} must be zero or above, and below one.")
+    face = contact_groups(body, contact, contact_nodes)
+    named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
+    further = [place_rows(body, place, name) for name, place in points.items()]
+    restriction = sp.csr_array(sp.vstack(
+        [*(row.matrix for row in named), face.matrix, *(row.matrix for row in further)]))
+    system = FreeSystem.of(body)
+    # Forces act at B, C and the contact nodes in x and y; the rotation carries none.
+    loaded = np.flatnonzero(np.arange(restriction.shape[0]) % 3 < 2)
+    flexibility = Flexibility(system, sp.csr_array(restriction[loaded] @ body.expansion))
+    w, free_shapes, vibration = _modes(system, flexibility, modes, reduction, tolerance,
+                                       used=2 * (2 + len(face.tributary)))
+    shapes = body.expansion @ free_shapes
+    elastic = w > 0.0
+    w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
+    if not isinstance(damping, Rayleigh | LossFactor | float | int):
+        given = as_floats(damping, "The damping")
+        if given.shape == (modes,) and len(w) > modes:
+            damping = np.append(given, np.full(len(w) - modes, given[-1]))
+    return ModalBasis(
+        angular_frequencies=w,
+        damping=modal_damping(damping, w),
+        T=(restriction @ shapes).reshape(-1, 3, len(w)),
+        positions=np.array([*(row.position for row in named), *face.positions,
+                            *(row.position for row in further)]),
+        tributary=face.tributary,
+        extra=tuple(points),
+        field=Field(
+            nodes=body.nodes,
+            cells=linear_cells(body),
+            outline=_halved(body.edge_nodes(body.mesh.outline)),
+            shapes=shapes.reshape(-1, 2, len(w)),
+            stress=modal_stress(body, shapes),
+            restriction=restriction,
+        ),
+        quality=_quality(body, system, flexibility, w, free_shapes, vibration),
+        groups=face.groups,
+    )
+
+
+def _modes(
+    system: FreeSystem, flexibility: Flexibility, count: int, reduction: Reduction,
+    tolerance: float, used: int,
+) -> tuple[Array, Array, int]:
+    """Frequencies, shapes and the number of true eigenmodes among them."""
+    if reduction == "craig-bampton":
+        w, shapes = craig_bampton(system, flexibility.rows[:used], count)
+        return w, shapes, system.rigid.shape[1]
+    w, shapes = free_modes(system, count)
+    if reduction == "vibration":
+        return w, shapes, count
+    if count < system.rigid.shape[1]:
+        raise InputError(f"modes = {count} must be at least the number of rigid modes, "
+                         f"{system.rigid.shape[1]}, to be completed by residual vectors.")
+    more, completing = residual_modes(flexibility.of_first(used), w, shapes, tolerance)
+    return np.concatenate([w, more]), np.hstack([shapes, completing]), count
+
+
+def _quality(
+    body: ElasticBody, system: FreeSystem, flexibility: Flexibility, w: Array, shapes: Array,
+    vibration: int,
+) -> Quality:
+    inertia = system.mass @ shapes
+    ones = np.eye(2)[np.arange(2 * len(body.nodes)) % 2]
+    return Quality(
+        mass=float(body.mesh.area * body.thickness * body.material.density),
+        vibration_modes=vibration,
+        residuals=backward_error(system.stiffness, system.mass, w**2, shapes),
+        orthogonality=float(np.abs(shapes.T @ inertia - np.eye(len(w))).max()),
+        participation=(ones.T @ body.mass) @ (body.expansion @ shapes),
+        compliance=np.maximum(np.diag(flexibility.compliance), 0.0).reshape(-1, 2),
+    )
+
+
+def linear_cells(body: ElasticBody) -> NDArray[np.int64]:
+    """First-order cells between all displacement nodes, counter-clockwise."""
+    # Indices are 64-bit integers in files too.
+    dofs = body.basis.element_dofs.astype(np.int64)
+    if body.degree == 1:
+        cells = dofs.T
+    elif len(dofs) == 6:
+        a, b, c, ab, bc, ac = dofs
+        cells = np.concatenate([np.column_stack(cell) for cell in (
+            (a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac))])
+    else:
+        a, b, c, d, ab, bc, cd, ad, m = dofs
+        cells = np.concatenate([np.column_stack(cell) for cell in (
+            (a, ab, m, ad), (ab, b, bc, m), (m, bc, c, cd), (ad, m, cd, d))])
+    side = body.nodes[cells[:, :3]]
+    (ux, uy), (vx, vy) = (side[:, 1] - side[:, 0]).T, (side[:, 2] - side[:, 0]).T
+    return np.where((ux * vy - uy * vx < 0.0)[:, None], cells[:, ::-1], cells)
+
+
+def modal_stress(body: ElasticBody, shapes: Array) -> Array:
+    """Stresses xx, yy, zz, xy (N, 4, m) of displacement fields (2 N, m), means at nodes [Pa]."""
+    dx, dy = body.gradients
+    direct, lateral, shear = body.elasticity
+    u, v = shapes[0::2], shapes[1::2]
+    xx, yy, slide = dx @ u, dy @ v, dy @ u + dx @ v
+    sxx, syy = direct * xx + lateral * yy, lateral * xx + direct * yy
+    szz = body.material.poisson_ratio * (sxx + syy) * (body.plane == "strain")
+    return np.stack([sxx, syy, szz, shear * slide], axis=1)
+
+
+def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
+    import scipy.sparse as sp
+
+    if place is None:
+        if name in body.mesh.points or name in body.mesh.boundaries:
+            return place_rows(body, name, name)
+        return Rows(sp.csr_array((3, 2 * len(body.nodes))), np.zeros(2))
+    return place_rows(body, place, name)
+
+
+def _halved(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.concatenate([edges[:, i : i + 2] for i in range(edges.shape[1] - 1)])

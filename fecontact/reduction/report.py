@@ -1,0 +1,145 @@
+"""How good a modal basis is: frequencies, effective masses, compliance at the contact."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.reduction.modal_basis import ModalBasis
+
+Array = NDArray[np.float64]
+
+# Errors of static compliance below this need no remedy; contact laws are known less well.
+_GOOD = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class BasisReport:
+    """Figures of merit of a basis; ``str(report)`` is a table with a recommendation.
+
+    The figures that compare with the finite-element body are NaN for a basis without one.
+    """
+
+    basis: ModalBasis
+
+    @property
+    def effective_mass(self) -> Array:
+        """Share (2, m) of the body's mass that moves with each mode, in x and in y."""
+        quality = self.basis.quality
+        if quality is None:
+            return np.full((2, self.basis.modes), np.nan)
+        return np.asarray(quality.participation**2 / quality.mass)
+
+    @cached_property
+    def compliance_error(self) -> Array:
+        """Part (P, 2) of each point's elastic compliance, in x and in y, that the basis lacks.
+
+        Zero for points and directions that do not deflect.
+        """
+        quality = self.basis.quality
+        if quality is None:
+            return np.full((len(self.basis.T), 2), np.nan)
+        whole = quality.compliance
+        # Compliances are differences of rigid parts: smaller ones are round-off.
+        real = whole > 1e-10 * whole.max(initial=0.0)
+        error = 1.0 - np.divide(self.basis.elastic_compliance, whole, out=np.ones_like(whole),
+                                where=real)
+        return np.asarray(np.where(real, error, 0.0))
+
+    @property
+    def contact_error(self) -> Array:
+        """The same (n, 2) at the contact nodes."""
+        return self.compliance_error[2 : 2 + self.basis.contact_nodes]
+
+    @property
+    def orthogonality(self) -> float:
+        """Largest entry of ``shapes^T M shapes - 1``."""
+        return np.nan if self.basis.quality is None else self.basis.quality.orthogonality
+
+    @property
+    def residuals(self) -> Array:
+        """``|K s - w^2 M s| / (|K| |s|)`` of each mode (m,)."""
+        quality = self.basis.quality
+        return np.full(self.basis.modes, np.nan) if quality is None else quality.residuals
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """Highest frequency of the basis [Hz]."""
+        return float(self.basis.frequencies_hz[-1])
+
+    @property
+    def time_step(self) -> float:
+        """A twentieth of the shortest period [s], what resolving every mode takes."""
+        highest = self.highest_frequency_hz
+        return 0.05 / highest if highest > 0.0 else np.inf
+
+    @property
+    def recommendation(self) -> str:
+        """What to do about the basis, one or two sentences."""
+        if self.basis.quality is None:
+            return ("The basis came without a body, so its compliance at the contact cannot be "
+                    "judged; compare it with a static solution of the full model.")
+        if self.basis.rigid_modes == self.basis.modes:
+            return ("The basis is rigid: the body moves, but does not deform. Keep more modes "
+                    "where its vibration or its elasticity at the contact matters.")
+        error = self.contact_error
+        node, axis = np.unravel_index(int(np.argmax(error)), error.shape)
+        worst = float(error[node, axis])
+        if worst <= _GOOD:
+            return (f"Static deflections of the contact nodes are right to {100 * worst:.2g} %; "
+                    f"the basis can be used up to about {self._valid_hz:.4g} Hz.")
+        return (f"Contact node {node} is too stiff: {100 * worst:.0f} % of its elastic compliance "
+                f"in {'xy'[axis]} is missing. Complete the modes with reduction = \"residual\" "
+                f"(tolerance {_GOOD:g} or less), or keep more modes.")
+
+    @property
+    def _valid_hz(self) -> float:
+        quality = self.basis.quality
+        assert quality is not None
+        known = self.basis.frequencies_hz[: quality.vibration_modes]
+        elastic = known[known > 0.0]
+        if elastic.size:
+            return float(elastic[-1]) / 1.5
+        above = self.basis.frequencies_hz[self.basis.frequencies_hz > 0.0]
+        return float(above[len(above) // 2]) / 1.5 if above.size else 0.0
+
+    def _loaded_points(self) -> list[tuple[str, str, float]]:
+        """B in x and y, C in y, where they have rows."""
+        rows = np.asarray(np.abs(self.basis.T[:2, :2]).max(axis=2)) > 0.0
+        return [("BC"[point], "xy"[axis], float(self.compliance_error[point, axis]))
+                for point, axis in ((0, 0), (0, 1), (1, 1)) if rows[point, axis]]
+
+    def __str__(self) -> str:
+        basis, mass = self.basis, self.effective_mass
+        lines = [f"{'mode':>4s} {'frequency [Hz]':>15s} {'damping':>9s} {'mass x':>8s} "
+                 f"{'mass y':>8s}  kind"]
+        diagonal = np.diag(basis.damping)
+        for i, f in enumerate(basis.frequencies_hz):
+            w = basis.angular_frequencies[i]
+            ratio = f"{diagonal[i] / (2.0 * w):9.3%}" if w > 0.0 else f"{'-':>9s}"
+            shares = " ".join(f"{share:8.2%}" if np.isfinite(share) else f"{'-':>8s}"
+                              for share in mass[:, i])
+            lines.append(f"{i:4d} {f:15.6g} {ratio} {shares}  {self._kind(i)}")
+        error = self.contact_error
+        if np.isfinite(error).all() and error.size and basis.rigid_modes < basis.modes:
+            lines += ["", "missing static compliance at the contact nodes: "
+                          f"x {error[:, 0].max():.2%}, y {error[:, 1].max():.2%} at most, "
+                          f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
+                      *(f"missing static compliance at {name}: {axis} {error:.2%}"
+                        for name, axis, error in self._loaded_points()),
+                      f"effective mass kept: x {mass[0].sum():.2%}, y {mass[1].sum():.2%}",
+                      f"mass-orthogonality: {self.orthogonality:.1e}"]
+        if self.highest_frequency_hz > 0.0:
+            lines.append(f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by "
+                         f"steps of {self.time_step:.2g} s")
+        lines.append(self.recommendation)
+        return "\n".join(lines)
+
+    def _kind(self, mode: int) -> str:
+        if mode < self.basis.rigid_modes:
+            return "rigid"
+        quality = self.basis.quality
+        if quality is None or mode < quality.vibration_modes:
+            return "vibration"
+        return "reduced" if quality.vibration_modes == self.basis.rigid_modes else "completing"

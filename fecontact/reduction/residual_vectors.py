@@ -1,0 +1,133 @@
+"""What the kept modes leave out of the body's response to forces at its points.
+
+A force pattern f over the rows W of the points loads the free degrees of freedom with
+``W^T f``. Beside the kept modes Phi with squared frequencies L, the elastic static response is
+
+    W^T f -> Phi_e L_e^-1 Phi_e^T W^T f + Y f,       Y = (G - Phi_e L_e^-1 Phi_e^T) W^T
+
+where G, the elastic flexibility, acts on loads that the inertia of the rigid modes balances. Y
+holds the residual vectors of MacNeal and Rubin, ``W Y`` is the residual compliance.
+"""
+
+from copy import copy
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs
+from fecontact.reduction.substitution import SymmetricFactors
+
+Array = NDArray[np.float64]
+
+
+class Flexibility:
+    """Elastic static response of a free system to unit forces at the rows W (k, f), sparse."""
+
+    def __init__(self, system: FreeSystem, rows: Any) -> None:
+        self.system = system
+        self.rows = rows.tocsr()
+        self._factors = SymmetricFactors(system.factors)
+        self._places, self._half = self._factors.half_solved(self.rows[:, system.held])
+
+    def of_first(self, count: int) -> "Flexibility":
+        """The same for the first rows alone."""
+        part = copy(self)
+        part.rows, part._half = self.rows[:count], self._half[:, :count]
+        for name in ("compliance", "_balance"):
+            part.__dict__.pop(name, None)
+        return part
+
+    @cached_property
+    def _balance(self) -> tuple[Array, Array]:
+        """Response (f, r) of the held body to the rigid modes' inertia, and W rigid (k, r)."""
+        system = self.system
+        response = np.zeros_like(system.rigid)
+        if system.rigid.shape[1]:
+            response[system.held] = system.factors.solve(
+                np.ascontiguousarray(system.inertia[system.held]))
+        return response, np.asarray(self.rows @ system.rigid)
+
+    @cached_property
+    def compliance(self) -> Array:
+        """W G W^T (k, k): elastic displacements at the rows per unit force there [m/N]."""
+        response, motion = self._balance
+        held = self._half.T @ self._half
+        cross = np.asarray(self.rows @ response) @ motion.T
+        rigid = motion @ (self.system.inertia.T @ response) @ motion.T
+        return np.asarray(held - cross - cross.T + rigid)
+
+    def deflections(self, patterns: Array) -> Array:
+        """G W^T patterns (f, p): elastic displacements under force patterns (k, p) [m/N]."""
+        response, motion = self._balance
+        deflection = np.zeros((self.system.stiffness.shape[0], patterns.shape[1]))
+        deflection[self.system.held] = self._factors.completed(
+            self._places, self._half @ patterns)
+        deflection -= response @ (motion.T @ patterns)
+        return self.system.without_rigid(deflection)
+
+
+def modal_compliance(rows: Any, w: Array, shapes: Array) -> Array:
+    """Part (k, k) of the elastic compliance at the rows that modes (f, m) give [m/N]."""
+    at_rows = np.asarray(rows @ shapes[:, w > 0.0]) / w[w > 0.0]
+    return np.asarray(at_rows @ at_rows.T)
+
+
+def leading_patterns(whole: Array, kept: Array, tolerance: float) -> Array:
+    """Force patterns (k, p) whose residual vectors leave no more than ``tolerance``.
+
+    They are the leading singular vectors of the residual compliance ``whole - kept`` (k, k),
+    each row scaled by the square root of its whole elastic compliance; p is the least number for
+    which the part of any row's own compliance that is missing is at most ``tolerance`` of it.
+    """
+    own = np.diag(whole)
+    scale = np.where(own > 0.0, 1.0, 0.0) / np.sqrt(np.where(own > 0.0, own, 1.0))
+    values, patterns = np.linalg.eigh((whole - kept) * np.outer(scale, scale))
+    values, patterns = values[::-1], patterns[:, ::-1]
+    real = values > 1e-12 * len(values)
+    values, patterns = values[real], patterns[:, real]
+    part = values * patterns**2
+    missing = part.sum(axis=1)[:, None] - np.cumsum(np.hstack([0.0 * part[:, :1], part]), axis=1)
+    enough = np.flatnonzero((missing <= tolerance + 1e-13).all(axis=0))
+    count = int(enough[0]) if enough.size else len(values)
+    return np.asarray(patterns[:, :count] * scale[:, None])
+
+
+def residual_modes(
+    flexibility: Flexibility, w: Array, shapes: Array, tolerance: float
+) -> tuple[Array, Array]:
+    """Frequencies (p,) and shapes (f, p) that complete the modes (f, m) at the rows.
+
+    They span the residual vectors of the leading force patterns, are orthogonal to the modes and
+    to each other in mass and stiffness, and mass-normalised.
+    """
+    system = flexibility.system
+    kept = modal_compliance(flexibility.rows, w, shapes)
+    patterns = leading_patterns(flexibility.compliance, kept, tolerance)
+    if not patterns.shape[1]:
+        return np.zeros(0), np.zeros((len(shapes), 0))
+    vectors = flexibility.deflections(patterns)
+    inertia = system.mass @ shapes
+    for _ in range(2):
+        vectors -= shapes @ (inertia.T @ vectors)
+    squares, found = diagonalised(system, vectors)
+    return np.sqrt(squares), found
+
+
+def diagonalised(system: FreeSystem, vectors: Array) -> tuple[Array, Array]:
+    """Squared frequencies (p,) and mass-normalised shapes (f, p) of the span of some vectors."""
+    stiffness = vectors.T @ (system.stiffness @ vectors)
+    mass = vectors.T @ (system.mass @ vectors)
+    scale = 1.0 / np.sqrt(np.diag(stiffness))
+    values, directions = np.linalg.eigh(stiffness * np.outer(scale, scale))
+    kept = values > 1e-11 * values[-1]
+    span = scale[:, None] * directions[:, kept] / np.sqrt(values[kept])
+    inverse, turned = np.linalg.eigh(span.T @ mass @ span)
+    inverse, turned = inverse[::-1], turned[:, ::-1]
+    shapes = vectors @ (span @ (turned / np.sqrt(inverse)))
+    if inverse[0] * values[-1] > 1e6 * inverse[-1] * values[kept][0]:
+        # One symmetric step squares what round-off has left of the orthogonality.
+        gram = shapes.T @ (system.mass @ shapes)
+        shapes = shapes @ (1.5 * np.eye(len(gram)) - 0.5 * gram)
+    return 1.0 / inverse, shapes * fixed_signs(shapes)

@@ -1,0 +1,176 @@
+"""Rows of the points of interest over degrees of freedom that come from another program."""
+
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+
+Place = Sequence[int | None]
+
+
+@dataclass(frozen=True, eq=False)
+class GivenRows:
+    """Rows of all points in the basis' order: B, C, contact nodes, further points.
+
+    Attributes
+    ----------
+    restriction : sparse (3 P, d) array
+        Displacements x, y and rotation of the P points from the degrees of freedom.
+    contact_nodes : int
+    extra : tuple of str
+        Names of the further points.
+    groups : tuple of (str, int)
+        Names of the contact groups and their numbers of nodes.
+    """
+
+    restriction: Any
+    contact_nodes: int
+    extra: tuple[str, ...]
+    groups: tuple[tuple[str, int], ...]
+
+
+def rows_from_dofs(
+    d: int,
+    contact: Sequence[Place],
+    *,
+    B: Place | None = None,
+    C: Place | None = None,
+    points: Mapping[str, Place] | None = None,
+) -> dict[str, Any]:
+    """Rows for :meth:`basis_from_matrices` from numbers of degrees of freedom.
+
+    Parameters
+    ----------
+    d : int
+        Number of degrees of freedom, counted from 0.
+    contact : sequence of (ix, iy) or (ix, iy, iphi)
+        Degrees of freedom that are the displacements x and y (and the rotation) of each contact
+        node; None or -1 for one that the model does not have: the row is then zero.
+    B, C : (ix, iy) or (ix, iy, iphi), optional
+        Excitation and load point, likewise; left out, they do not move.
+    points : mapping of name to such places, optional
+        Further points to observe.
+
+    Returns
+    -------
+    dict of str to sparse array
+        ``contact`` (3 n, d), the others (3, d).
+
+    Raises
+    ------
+    InputError
+        For degrees of freedom that are not there, and places of another form.
+    """
+    if not len(contact):
+        raise InputError("rows_from_dofs: contact is empty; name the degrees of freedom (ix, iy) "
+                         "of at least one contact node.")
+    named = {name: place for name, place in (("B", B), ("C", C)) if place is not None}
+    rows = {"contact": _unit_rows(d, [(f"contact node {k}", place)
+                                      for k, place in enumerate(contact)])}
+    for name, place in {**named, **(points or {})}.items():
+        rows[name] = _unit_rows(d, [(f"point {name}", place)])
+    return rows
+
+
+def gathered_rows(rows: Mapping[str, Any], d: int) -> GivenRows:
+    """All rows as one sparse matrix; see :meth:`basis_from_matrices` for the forms.
+
+    Raises
+    ------
+    InputError
+        If ``contact`` is missing, or a block has another shape.
+    """
+    import scipy.sparse as sp
+
+    if "contact" not in rows:
+        raise InputError("rows must have an entry 'contact', of shape (n, 3, d) or (n, 2, d).")
+    given = rows["contact"]
+    named = given if isinstance(given, Mapping) and given else {"contact": given}
+    blocks = {name: _contact_block(block, d) for name, block in named.items()}
+    contact = sp.csr_array(sp.vstack(list(blocks.values())))
+    extra = tuple(name for name in rows if name not in ("B", "C", "contact"))
+    ends = [_point_block(name, rows[name], d) if name in rows else sp.csr_array((3, d))
+            for name in ("B", "C")]
+    restriction = sp.csr_array(sp.vstack(
+        [*ends, contact, *(_point_block(name, rows[name], d) for name in extra)]))
+    return GivenRows(restriction, contact.shape[0] // 3, extra,
+                     tuple((name, block.shape[0] // 3) for name, block in blocks.items()))
+
+
+def _unit_rows(d: int, places: Sequence[tuple[str, Place]]) -> Any:
+    import scipy.sparse as sp
+
+    where, columns = [], []
+    for k, (name, place) in enumerate(places):
+        if isinstance(place, (int, np.integer, str)) or len(place) not in (2, 3):
+            raise InputError(f"rows_from_dofs: {name} must be (ix, iy) or (ix, iy, iphi), not "
+                             f"{place!r}.")
+        for component, dof in enumerate(place):
+            if dof is None:
+                continue
+            try:
+                number = operator.index(dof)
+            except TypeError:
+                number = d
+            if number == -1:
+                continue
+            if not 0 <= number < d:
+                raise InputError(f"rows_from_dofs: {name} names degree of freedom {dof!r}, but "
+                                 f"there are {d}, counted from 0.")
+            where.append(3 * k + component)
+            columns.append(number)
+    return sp.csr_array((np.ones(len(where)), (where, columns)), shape=(3 * len(places), d))
+
+
+def _contact_block(given: Any, d: int) -> Any:
+    """Sparse (3 n, d) from (n, 3, d), (n, 2, d), (3 n, d), or a sequence of (3, d) or (2, d)."""
+    import scipy.sparse as sp
+
+    if isinstance(given, (list, tuple)) and any(sp.issparse(one) for one in given):
+        return sp.csr_array(sp.vstack([_point_block("contact", one, d) for one in given]))
+    if sp.issparse(given):
+        block = given
+    else:
+        block = _numbers("contact", given)
+        if block.ndim == 3 and block.shape[1] in (2, 3):
+            block = np.pad(block, ((0, 0), (0, 3 - block.shape[1]), (0, 0)))
+            block = block.reshape(-1, block.shape[2])
+        else:
+            block = np.zeros((0, 0))
+    if block.shape[1] != d or not block.shape[0] or block.shape[0] % 3:
+        raise _shape_error("contact", "(n, 3, d)", d, "(n, 2, d) or sparse (3 n, d)",
+                           np.shape(given))
+    return sp.csr_array(block, dtype=float)
+
+
+def _point_block(name: str, given: Any, d: int) -> Any:
+    """Sparse (3, d) from dense or sparse (3, d) or (2, d)."""
+    import scipy.sparse as sp
+
+    if not sp.issparse(given):
+        given = _numbers(name, given)
+        given = given[0] if given.ndim == 3 and len(given) == 1 else given
+    if given.ndim != 2 or given.shape[0] not in (2, 3) or given.shape[1] != d:
+        raise _shape_error(name, "(3, d)", d, "(2, d)", given.shape)
+    block = sp.csr_array(given, dtype=float)
+    return block if block.shape[0] == 3 else sp.csr_array(sp.vstack([block, sp.csr_array((1, d))]))
+
+
+def _numbers(name: str, given: Any) -> NDArray[np.float64]:
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"rows['{name}'] must hold real numbers in rows of one length, not "
+                         f"{type(given).__name__}.") from None
+
+
+def _shape_error(
+    name: str, shape: str, d: int, others: str, found: tuple[int, ...]
+) -> InputError:
+    return InputError(f"rows['{name}'] must have shape {shape} with d = {d} degrees of freedom, or "
+                      f"{others}, not {found}.")

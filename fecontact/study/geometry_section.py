@@ -1,0 +1,71 @@
+"""``[geometry]`` of a study file: a shape and its dimensions, or the file of a mesh."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+from fecontact.core.errors import InputError, choices, nearest, require_positive
+from fecontact.core.tables import from_table, shown, to_table
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.shapes import Beam, Block, Pendulum
+
+SHAPES: Mapping[str, type] = {"beam": Beam, "pendulum": Pendulum, "block": Block}
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """``[geometry]`` with the file of a mesh; see :func:`fecontact.fem.mesh_files.read_mesh`.
+
+    Parameters
+    ----------
+    file : str
+        The mesh, relative to the study file.
+    scale : float
+        Factor from the file's unit of length to m.
+    boundaries : mapping of name to name or box
+        Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1] [m].
+    points : mapping of name to name or place
+        Points to name: a group of the file, or the node nearest to [x, y] [m].
+    """
+
+    file: str
+    scale: float = 1.0
+    boundaries: Mapping[str, str | tuple[float, float, float, float]] = field(
+        default_factory=dict)
+    points: Mapping[str, str | tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_positive("MeshFile", scale=self.scale)
+
+    def mesh(self, folder: Path) -> Mesh:
+        """Read the mesh; ``folder`` is that of the study file."""
+        from fecontact.fem.mesh_files import read_mesh
+
+        return read_mesh(folder / self.file, scale=self.scale,
+                         boundaries=self.boundaries or None, points=self.points or None)
+
+
+Geometry = Beam | Pendulum | Block | MeshFile
+
+
+def geometry_from_table(table: Any, where: str) -> Geometry:
+    """Geometry of the table ``[geometry]``; raises as :func:`~fecontact.core.tables.from_table`."""
+    if not isinstance(table, Mapping) or ("shape" in table) == ("file" in table):
+        raise InputError(f"{where} must have either a shape ({choices(SHAPES)}) or the file of a "
+                         f"mesh.")
+    if "file" in table:
+        return from_table(MeshFile, table, where)
+    shape = table["shape"]
+    if not isinstance(shape, str) or shape not in SHAPES:
+        raise InputError(f"{where}: shape = {shown(shape)} must be one of {choices(SHAPES)}"
+                         f"{nearest(str(shape), SHAPES)}.")
+    dimensions = {key: value for key, value in table.items() if key != "shape"}
+    return cast(Geometry, from_table(SHAPES[shape], dimensions, where))
+
+
+def geometry_table(geometry: Geometry, *, defaults: bool = True) -> dict[str, Any]:
+    """The reverse, as :func:`fecontact.core.tables.to_table`."""
+    shape = {kind: name for name, kind in SHAPES.items()}.get(type(geometry))
+    table = to_table(geometry, defaults=defaults)
+    return table if shape is None else {"shape": shape, **table}

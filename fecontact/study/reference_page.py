@@ -1,0 +1,144 @@
+"""The keys of study files, from the classes that read them: ``docs/study.md``."""
+
+import inspect
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Any, get_args, get_type_hints
+
+from fecontact.core.docstrings import documented
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.tables import described
+from fecontact.laws.registry import is_kind, law_names
+from fecontact.study.geometry_section import SHAPES, MeshFile
+from fecontact.study.study import Study
+from fecontact.system.gap import Crown
+
+_HEAD = """# Study files
+
+Every section and key of a study file, with its type, default and meaning; units stand in brackets.
+This page is made from the code, by `fecontact keys > docs/study.md`; `fecontact keys SECTION`
+prints one section. A key without a default has to be given.
+"""
+
+
+def study_keys(section: str | None = None) -> str:
+    """The sections of study files and their keys, as Markdown.
+
+    Parameters
+    ----------
+    section : str, optional
+        One section, ``ground`` or ``ground.profile``; all when left out.
+
+    Raises
+    ------
+    InputError
+        If there is no such section, with those that there are.
+    """
+    parts = dict(_parts())
+    if section is None:
+        return "\n".join([_HEAD, *parts.values()]).rstrip() + "\n"
+    name = section.strip("[]")
+    if name not in parts:
+        raise InputError(f"Study files have no section [{name}]{nearest(name, parts)}; there are: "
+                         f"{choices(parts)}.")
+    return parts[name].rstrip() + "\n"
+
+
+def _parts() -> Iterator[tuple[str, str]]:
+    hints = get_type_hints(Study)
+    yield "gap", ("## `gap`\n\nAbove all sections: initial distance of the contact nodes from flat "
+                  "ground [m]; a number, a list with one per node, or a table for a face that is "
+                  "an arc:\n\n" + _table(Crown) + "\n")
+    shapes = [_table(cls, f'`shape = "{name}"`: {_summary(cls)}') for name, cls in SHAPES.items()]
+    yield "geometry", _section("geometry", "A shape and its dimensions, or the file of a mesh.",
+                               *shapes, _table(MeshFile, f"`file`: {_summary(MeshFile)}"))
+    printed: dict[Any, str] = {}
+    for entry in fields(Study):
+        name = entry.name.removesuffix("_settings")
+        if name in ("geometry", "gap", "path"):
+            continue
+        if name == "contact":
+            name = "contact.NAME"
+        yield from _sections(name, _inner(hints[entry.name]), printed)
+
+
+def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:
+    """A section, of one of some classes, and those of the laws and tables within it."""
+    known = tuple(classes)
+    if known in printed:
+        yield name, _section(name, f"As `[{printed[known]}]`.")
+        return
+    printed[known] = name
+    if is_kind(classes[0]):
+        yield name, _section(name, *_laws(classes[0]))
+        return
+    paragraphs = [_table(cls, _summary(cls)) for cls in classes]
+    yield name, _section(name, *paragraphs)
+    for cls in classes:
+        for key, hint in get_type_hints(cls).items():
+            if inner := _inner(hint):
+                yield from _sections(f"{name}.{key}", inner, printed)
+
+
+def _inner(hint: Any) -> list[Any]:
+    """The dataclasses in a type."""
+    if is_dataclass(hint):
+        return [hint]
+    return [cls for part in get_args(hint) for cls in _inner(part)]
+
+
+def _laws(kind: Any) -> Iterator[str]:
+    yield ("The key `law` names the law, the other keys are its parameters; `fecontact laws NAME` "
+           "prints one with its formula.")
+    names: Mapping[str, type] = law_names()[kind]
+    for name, cls in names.items():
+        yield _table(cls, f'`law = "{name}"`: {_summary(cls)}')
+
+
+def _section(name: str, *paragraphs: str) -> str:
+    return "\n\n".join([f"## `[{name}]`", *paragraphs]) + "\n"
+
+
+def _table(cls: Any, title: str = "") -> str:
+    hints, entries = get_type_hints(cls), {entry.name: entry for entry in fields(cls)}
+    rows = []
+    for names, meaning in documented(cls):
+        keys = [name for name in names if name in entries]
+        if not keys:
+            continue
+        types = dict.fromkeys(_cell(described(hints[key])) for key in keys)
+        defaults = [_default(entries[key]) for key in keys]
+        if len(set(defaults)) == 1:
+            defaults = defaults[:1]
+        rows.append(f"| {', '.join(f'`{key}`' for key in keys)} | {'; '.join(types)} | "
+                    f"{', '.join(defaults)} | {_cell(meaning)} |")
+    head = [title, ""] if title else []
+    if not rows:
+        return "\n".join(head).rstrip()
+    return "\n".join([*head, "| key | type | default | meaning |", "|---|---|---|---|", *rows])
+
+
+def _default(entry: Any) -> str:
+    value = entry.default_factory() if callable(entry.default_factory) else entry.default
+    if value is MISSING:
+        return ""
+    if value is None:
+        return "none"
+    if isinstance(value, float):
+        return f"`{value:g}`"
+    return f"`{json.dumps(list(value) if isinstance(value, tuple) else value)}`"
+
+
+def _summary(cls: Any) -> str:
+    text = (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " ")
+    text = re.sub(r"^``\[[\w.]+\]``:? ?(with )?", "", text)
+    return _cell(text[:1].upper() + text[1:])
+
+
+def _cell(text: str) -> str:
+    """Text of a docstring in a cell of a table: roles as code, bars escaped."""
+    text = re.sub(r":\w+:`~?([^`]*)`", lambda match: f"`{match[1].rpartition('.')[2]}`", text)
+    text = re.sub(r"``([^`]*)``", r"`\1`", text)
+    return re.sub(r"\\?\|", r"\\|", text)

@@ -1,0 +1,317 @@
+"""Sections of a study file that have no class of their own elsewhere in the package."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+from fecontact.core.checks import require_frame_rate, require_scale
+from fecontact.core.errors import (
+    InputError,
+    choices,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
+from fecontact.core.tables import located
+from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.points import Patch
+from fecontact.integrate.initial_state import RigidStart
+from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.reduce_body import modal_basis
+
+Place = str | tuple[float, float] | Patch
+Support = Literal["x", "y", "xy", "hinge"]
+
+
+@dataclass(frozen=True)
+class BodySettings:
+    """``[body]``: material, thickness and supports; see
+    :class:`fecontact.fem.elastic_body.ElasticBody`.
+
+    Parameters
+    ----------
+    material : str, optional
+        'steel' or 'aluminium'; its values may be replaced one by one. Steel when no material
+        value is given at all.
+    youngs_modulus, poisson_ratio, density : float, optional
+        [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
+    thickness : float
+        Out-of-plane thickness [m].
+    plane : 'stress' or 'strain'
+        Plane stress for thin bodies, plane strain for long ones.
+    degree : 1 or 2
+        Of the finite elements.
+    fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
+        Supports on boundaries and points of the mesh: the directions that are held, or a hole
+        that turns about its centre.
+    """
+
+    material: str | None = None
+    youngs_modulus: float | None = None
+    poisson_ratio: float | None = None
+    density: float | None = None
+    thickness: float = 1.0
+    plane: Literal["stress", "strain"] = "stress"
+    degree: Literal[1, 2] = 2
+    fixed: Mapping[str, Support] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_positive("BodySettings", thickness=self.thickness)
+        with located("BodySettings:", "Material"):
+            _ = self.elastic_material
+
+    @property
+    def elastic_material(self) -> Material:
+        """The material that the four keys describe."""
+        values = {"youngs_modulus": self.youngs_modulus, "poisson_ratio": self.poisson_ratio,
+                  "density": self.density}
+        given: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
+        if self.material is None and given and len(given) < len(values):
+            raise InputError(f"BodySettings: {choices(given)} alone does not describe a material; "
+                             f"give {choices(values.keys() - given.keys())} too, or a material.")
+        return replace(Material.named(self.material or "steel"), **given)
+
+    def body(self, mesh: Mesh) -> ElasticBody:
+        """The elastic body on a mesh."""
+        return ElasticBody(mesh, self.elastic_material, thickness=self.thickness,
+                           plane=self.plane, degree=self.degree, fixed=self.fixed)
+
+
+@dataclass(frozen=True)
+class Loss:
+    """``damping = { loss_factor = value }``; see :class:`fecontact.reduction.damping.LossFactor`.
+
+    Parameters
+    ----------
+    loss_factor : float
+        Twice the damping ratio of all modes, zero or above.
+    """
+
+    loss_factor: float
+
+    def __post_init__(self) -> None:
+        require_not_negative("Loss", loss_factor=self.loss_factor)
+
+
+@dataclass(frozen=True)
+class ContactLaws:
+    """``[contact.NAME]``: laws of the contact group NAME.
+
+    Parameters
+    ----------
+    normal, friction : law, optional
+        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``; totals in them are those of the
+        group.
+    """
+
+    normal: NormalLaw | None = None
+    friction: FrictionLaw | None = None
+
+
+@dataclass(frozen=True)
+class BasisSettings:
+    """``[basis]``: modes and points; see
+    :meth:`fecontact.fem.elastic_body.ElasticBody.modal_basis`.
+
+    Parameters
+    ----------
+    modes : int
+        Number of modes, the rigid ones included.
+    contact : str or list of str
+        Boundary that touches the ground, or several, each a contact group of that name.
+    contact_nodes : int or 'all', or list
+        Number of contact nodes, or every node of the mesh there; a list has one of them for each
+        boundary.
+    B, C : place, optional
+        Excitation and load point: name of a point or boundary, [x, y], or a patch
+        ``{at = name or [x, y], radius = r}``.
+    points : mapping of name to place
+        Further points to observe.
+    damping : float, list, Rayleigh or Loss
+        One damping ratio, one per mode, ``{mass_factor, stiffness_factor}`` or
+        ``{loss_factor}``.
+    reduction : 'vibration', 'residual' or 'craig-bampton'
+        What completes the vibration modes.
+    tolerance : float
+        For 'residual': part of the static compliance at the points that may be missing.
+    dashpots : mapping of point to [b_x, b_y]
+        Between points, or contact nodes by number, and the inertial frame [N s/m].
+    select : list, optional
+        Numbers of the modes to keep, from 0; all by default.
+    """
+
+    modes: int = 20
+    contact: str | tuple[str, ...] = "contact"
+    contact_nodes: int | Literal["all"] | tuple[int | Literal["all"], ...] = "all"
+    B: Place | None = None
+    C: Place | None = None
+    points: Mapping[str, Place] = field(default_factory=dict)
+    damping: float | tuple[float, ...] | Rayleigh | Loss = 0.0
+    reduction: Literal["vibration", "residual", "craig-bampton"] = "vibration"
+    tolerance: float = 0.1
+    dashpots: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    select: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.modes < 1:
+            raise InputError(f"BasisSettings: modes = {self.modes} must be at least 1.")
+        given = self.contact_nodes
+        counts = given if isinstance(given, tuple) else (given,)
+        if any(count != "all" and count < 1 for count in counts):
+            raise InputError(f"BasisSettings: contact_nodes = {self.contact_nodes} must be at "
+                             f"least 1, or \"all\".")
+        for name in self.points:
+            if name.isdigit():
+                raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
+                                 f"go by number; choose a name with a letter.")
+
+    def basis(self, body: ElasticBody) -> ModalBasis:
+        """The modal basis of a body."""
+        given = self.damping
+        damping: Damping = LossFactor(given.loss_factor) if isinstance(given, Loss) else given
+        basis = modal_basis(
+            body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
+            C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
+            damping=damping)
+        if self.dashpots:
+            basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
+                                         for point, values in self.dashpots.items()})
+        return basis if self.select is None else basis.select(self.select)
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """``[simulation]``: the run; see :func:`fecontact.integrate.simulate`.
+
+    Parameters
+    ----------
+    t_end : float, optional
+        End of the run [s]; needed for running only.
+    t_start : float
+        Start of the run [s].
+    outputs : int
+        Number of equally spaced output times, both ends included.
+    method : str
+        Integrator: 'Rodas5P', compiled; 'Radau', 'BDF', 'LSODA' of scipy; 'CVODE' of
+        scikit-sundae; 'set-valued' friction.
+    rtol : float
+        Relative tolerance.
+    max_step : float, optional
+        Longest step [s]; by default as long as the tolerance and what is given in time allow.
+    restitution : float, optional
+        For 'set-valued': rigid stops with this coefficient in place of the normal law.
+    static_coefficient : float, optional
+        For 'set-valued': limit of R/F in stick [-]; default that of the law.
+    scheme : str, optional
+        For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
+    events : bool
+        For 'Rodas5P': whether to locate touch-down, lift-off, stick and slip of every contact
+        node, and keep them with the result.
+    stop : list of str
+        Events at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
+    initial : 'rest', 'sliding' or RigidStart
+        Where it starts; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid
+        motion.
+    """
+
+    t_end: float | None = None
+    t_start: float = 0.0
+    outputs: int = 1001
+    method: str = "Rodas5P"
+    rtol: float = 1e-6
+    max_step: float | None = None
+    restitution: float | None = None
+    static_coefficient: float | None = None
+    scheme: str | None = None
+    events: bool = False
+    stop: tuple[str, ...] = ()
+    initial: Literal["rest", "sliding"] | RigidStart = "rest"
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.t_start):
+            raise InputError(f"SimulationSettings: t_start = {self.t_start!r} must be finite.")
+        if self.t_end is not None and not self.t_start < self.t_end < math.inf:
+            raise InputError(f"SimulationSettings: t_end = {self.t_end!r} must be a finite time "
+                             f"after t_start = {self.t_start!r}.")
+        if self.outputs < 2:
+            raise InputError(f"SimulationSettings: outputs = {self.outputs} must be at least 2.")
+        require_positive("SimulationSettings", rtol=self.rtol)
+        if self.max_step is not None:
+            require_positive("SimulationSettings", max_step=self.max_step)
+
+
+@dataclass(frozen=True)
+class OutputSettings:
+    """``[output]``: what a run writes.
+
+    Parameters
+    ----------
+    folder : str
+        Where, relative to the study file.
+    frames : int
+        Number of full displacement fields in the file, for ParaView; zero for none.
+    points : list
+        Points whose motion is plotted: 'B', 'C', further named points, contact nodes by their
+        number. Empty for B and C.
+    """
+
+    folder: str = "results"
+    frames: int = 200
+    points: tuple[str | int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.frames < 0:
+            raise InputError(f"OutputSettings: frames = {self.frames} must be zero or above.")
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """``[render]``: the moving picture; see :func:`fecontact.output.render.movie.render`.
+
+    Parameters
+    ----------
+    frames : int
+        Number of pictures.
+    fps : float
+        Pictures a second.
+    size : (int, int)
+        Width and height, even, at least 320 x 180 [pixels].
+    colour : 'displacement' or 'von_mises'
+        Quantity that colours the body.
+    scale : float, optional
+        Factor by which displacements are drawn larger; by default the largest is well visible.
+    title : str, optional
+        Shown at the top.
+    start, end : float, optional
+        Part of the run to draw [s].
+    """
+
+    frames: int = 200
+    fps: float = 25.0
+    size: tuple[int, int] = (960, 540)
+    colour: Literal["displacement", "von_mises"] = "displacement"
+    scale: float | None = None
+    title: str | None = None
+    start: float | None = None
+    end: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.frames < 1:
+            raise InputError(f"RenderSettings: frames = {self.frames} must be at least 1.")
+        require_frame_rate("RenderSettings", self.fps)
+        width, height = self.size
+        if width < 320 or height < 180 or width % 2 or height % 2:
+            raise InputError(f"RenderSettings: size = {list(self.size)} must be an even width and "
+                             f"height in pixels, at least [320, 180].")
+        if self.scale is not None:
+            require_scale("RenderSettings", self.scale)
+        for name in ("start", "end"):
+            if getattr(self, name) is not None:
+                require_finite("RenderSettings", **{name: getattr(self, name)})
+        if self.start is not None and self.end is not None and not self.start <= self.end:
+            raise InputError(f"RenderSettings: end = {self.end!r} must not be before start = "
+                             f"{self.start!r}.")

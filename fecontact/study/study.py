@@ -1,0 +1,341 @@
+"""A whole study in one TOML file: from the geometry to the run and its pictures."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from fecontact.bifurcation.diagram_options import BranchSettings
+from fecontact.core.checks import as_path, require_kind
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.tables import (
+    convert,
+    from_table,
+    located,
+    parsed,
+    plain,
+    require_readable,
+    shown,
+    to_table,
+)
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.mesh import Mesh
+from fecontact.integrate.events import ContactEvents
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.registry import PART_CLASSES, with_folder
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.study.geometry_section import Geometry, MeshFile, geometry_from_table, geometry_table
+from fecontact.study.sections import (
+    BasisSettings,
+    BodySettings,
+    ContactLaws,
+    OutputSettings,
+    RenderSettings,
+    SimulationSettings,
+)
+from fecontact.study.study_system import contact_system
+from fecontact.study.sweep_section import SweepSettings, flat_axes
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.gap import Crown
+
+Gap = float | tuple[float, ...] | Crown
+
+_SECTIONS: Mapping[str, type] = {
+    "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
+    "simulation": SimulationSettings, "branch": BranchSettings, "output": OutputSettings,
+    "render": RenderSettings,
+}
+_ATTRIBUTES = {name: name for name in _SECTIONS} | {"body": "body_settings",
+                                                     "basis": "basis_settings"}
+# What a study has made once, and the sections that it depends on.
+_MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body_settings"),
+              "_basis": ("geometry", "body_settings", "basis_settings")}
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: geometry, body, modes, laws, run and output, as in its TOML file.
+
+    Each attribute is a section of the file, the fields of its class are the keys of the section.
+
+    Attributes
+    ----------
+    geometry : Beam, Pendulum, Block or MeshFile
+        ``[geometry]``: a shape and its dimensions, ``shape = "beam"``, or a mesh,
+        ``file = "part.msh"``.
+    body_settings : BodySettings
+        ``[body]``
+    basis_settings : BasisSettings
+        ``[basis]``
+    normal, friction, ground, drive, load
+        ``[normal]``, ... : laws, ground, drive and load (what is in contact needs a normal law,
+        for which there is no default); see
+        :class:`~fecontact.system.contact_system.ContactSystem`.
+    contact : mapping of contact group to ContactLaws
+        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``: laws of single contact groups; the
+        others have those of ``[normal]`` and ``[friction]``.
+    gap : float, (n,) tuple or Crown
+        Initial distance of the contact nodes from flat ground [m], ``{radius, centre}`` for a
+        face that is an arc; stands above all sections.
+    simulation : SimulationSettings
+        ``[simulation]``
+    branch : BranchSettings
+        ``[branch]``
+    output : OutputSettings
+        ``[output]``
+    render : RenderSettings
+        ``[render]``
+    sweep : SweepSettings or None
+        ``[sweep]``: many cases of this study; see :func:`fecontact.sweep`.
+    path : Path or None
+        The file; other files are named relative to it.
+    """
+
+    geometry: Geometry
+    body_settings: BodySettings = field(default_factory=BodySettings)
+    basis_settings: BasisSettings = field(default_factory=BasisSettings)
+    normal: NormalLaw | None = None
+    friction: FrictionLaw | None = None
+    contact: Mapping[str, ContactLaws] = field(default_factory=dict)
+    ground: Ground = field(default_factory=Ground)
+    drive: Drive = field(default_factory=Drive)
+    load: Load = field(default_factory=Load)
+    gap: Gap = 0.0
+    simulation: SimulationSettings = field(default_factory=SimulationSettings)
+    branch: BranchSettings = field(default_factory=BranchSettings)
+    output: OutputSettings = field(default_factory=OutputSettings)
+    render: RenderSettings = field(default_factory=RenderSettings)
+    sweep: SweepSettings | None = None
+    path: Path | None = field(default=None, compare=False)
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Study":
+        """Read a study file.
+
+        Raises
+        ------
+        InputError
+            If there is no such file, it is not TOML, or it has unknown sections or keys, values
+            of the wrong type or out of range.
+        """
+        path = as_path(path, "a study")
+        try:
+            text = path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            # Endings are alike, so that only the names before them tell what was meant.
+            others = [other.stem for other in path.parent.glob("*.toml")]
+            hint = nearest(path.stem, others).replace("'?", ".toml'?")
+            raise InputError(f"{path} does not exist{hint}.") from None
+        except (OSError, UnicodeDecodeError):
+            raise InputError(f"{path} cannot be read as a study; give a text file in "
+                             f"TOML.") from None
+        return cls.from_toml(text, path)
+
+    @classmethod
+    def from_toml(cls, text: str, path: str | Path | None = None) -> "Study":
+        """A study from TOML text; ``path`` says where it stands, see :meth:`read`."""
+        path = None if path is None else as_path(path, "a study")
+        require_kind(_title(path), str, text=text)
+        return cls.from_tables(parsed(text, _title(path)), path)
+
+    @classmethod
+    def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
+        """A study from the tables of a TOML file; see :meth:`read`."""
+        title = _title(path)
+        folder = Path() if path is None else path.parent
+        if not isinstance(tables, Mapping):
+            raise InputError(f"{title} must be a table of sections, not {shown(tables)}.")
+        require_readable(tables, title)
+        tables = {name: table if name == "geometry" else with_folder(table, folder)
+                  for name, table in tables.items()}
+        for name in tables:
+            if name not in (valid := ("gap", "geometry", "contact", "sweep", *_SECTIONS)):
+                raise InputError(f"{title} has an unknown section or key '{name}'"
+                                 f"{nearest(name, valid)}; there are: {choices(valid)}.")
+        if "geometry" not in tables:
+            raise InputError(f"{title} lacks the section [geometry]; give a shape and its "
+                             f"dimensions, or the file of a mesh.")
+        return cls(
+            geometry_from_table(tables["geometry"], f"{title}: [geometry]"),
+            gap=_gap(tables.get("gap", 0.0), title),
+            contact=convert(tables.get("contact", {}), Mapping[str, ContactLaws], title,
+                            "contact"),
+            sweep=from_table(SweepSettings, flat_axes(tables["sweep"]), f"{title}: [sweep]")
+            if "sweep" in tables else None,
+            path=path,
+            **{_ATTRIBUTES[name]: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
+               for name, kind in _SECTIONS.items() if name in tables or name != "normal"},
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the file without its ending."""
+        return "study" if self.path is None else self.path.stem
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the file, from which other files are named."""
+        return Path() if self.path is None else self.path.parent
+
+    @property
+    def results(self) -> Path:
+        """Folder of the results."""
+        return self.folder / self.output.folder
+
+    @property
+    def t_end(self) -> float:
+        """End of the run [s]; InputError if the study does not say."""
+        if self.simulation.t_end is None:
+            raise InputError(f"{_title(self.path)}: [simulation] lacks the key 't_end', the end "
+                             f"of the run in s.")
+        return self.simulation.t_end
+
+    def tables(self, *, defaults: bool = True) -> dict[str, Any]:
+        """All sections as tables for TOML, with or without values equal to the defaults."""
+        sections = {name: to_table(getattr(self, attribute), defaults=defaults)
+                    for name, attribute in _ATTRIBUTES.items()
+                    if getattr(self, attribute) is not None}
+        contact = {"contact": plain(self.contact)} if self.contact else {}
+        if self.sweep is not None:
+            sections["sweep"] = to_table(self.sweep, defaults=defaults)
+        return {"gap": plain(self.gap),
+                "geometry": geometry_table(self.geometry, defaults=defaults),
+                **contact,
+                **{name: table for name, table in sections.items() if table or defaults}}
+
+    def to_toml(self) -> str:
+        """The resolved study as TOML text: every key, also where it has its default value.
+
+        ``Study.from_toml(study.to_toml(), study.path) == study``.
+        """
+        import tomli_w
+
+        return tomli_w.dumps(self.tables())
+
+    def with_(self, **changes: Any) -> "Study":
+        """A copy with other values, by the dotted names of the file.
+
+        ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``; members of lists go by
+        number, ``load.forces.0.signal.amplitude``. Mesh, body and modal basis are kept where
+        nothing that they depend on changes.
+
+        Raises
+        ------
+        InputError
+            If there is no such key (with the nearest), or the value is of the wrong type or out
+            of range.
+        """
+        tables = self.tables(defaults=False)
+        for name, value in changes.items():
+            *sections, key = name.split(".")
+            table: Any = tables
+            for depth, section in enumerate(sections, 1):
+                if isinstance(table, list):
+                    table = table[_number(section, table, name, _title(self.path))]
+                else:
+                    table = table.setdefault(section, {})
+                if not isinstance(table, dict | list):
+                    raise InputError(f"{_title(self.path)}: {name} cannot be set, because "
+                                     f"{'.'.join(sections[:depth])} = {shown(table)} is not a "
+                                     f"table.")
+            place = _number(key, table, name, _title(self.path)) if isinstance(table, list) else key
+            table[place] = plain(value)
+        study = self.from_tables(tables, self.path)
+        for made, needed in _MADE_FROM.items():
+            if made in vars(self) and all(getattr(study, section) == getattr(self, section)
+                                          for section in needed):
+                vars(study)[made] = vars(self)[made]
+        return study
+
+    def mesh(self) -> Mesh:
+        """The mesh, generated or read; the same object at every call, as in all of these."""
+        return self._mesh
+
+    def body(self) -> ElasticBody:
+        """The elastic body."""
+        return self._body
+
+    def basis(self) -> ModalBasis:
+        """The modal basis."""
+        return self._basis
+
+    def system(self) -> ContactSystem:
+        """The contact system.
+
+        Raises
+        ------
+        FecontactError
+            With the file and the section before the message, like all of these methods.
+        """
+        return contact_system(self, self.basis(), _title(self.path))
+
+    def run(
+        self, progress: Callable[[float], None] | None = None, checkpoint: Path | None = None
+    ) -> Trajectory:
+        """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
+
+        The checkpoint is left out for methods that have none. It stays when the run has ended:
+        remove it once the run is written.
+        """
+        settings, t_end, system = self.simulation, self.t_end, self.system()
+        with located(f"{_title(self.path)}: [output]:"):
+            # Found out after a long run, a wrong name would be found out too late.
+            for point in self.output.points:
+                system.basis.point_index(point)
+        with located(f"{_title(self.path)}: [simulation]:"):
+            return simulate(system, t_end, t_start=settings.t_start,
+                            initial=settings.initial, outputs=settings.outputs,
+                            method=settings.method, rtol=settings.rtol,
+                            max_step=settings.max_step,
+                            restitution=settings.restitution,
+                            static_coefficient=settings.static_coefficient,
+                            scheme=settings.scheme, progress=progress,
+                            events=(ContactEvents(settings.stop)
+                                    if settings.events or settings.stop else None),
+                            checkpoint=checkpoint if settings.method == "Rodas5P" else None,
+                            keep_checkpoint=True)
+
+    @cached_property
+    def _mesh(self) -> Mesh:
+        from fecontact.fem.generate import generate
+
+        with located(f"{_title(self.path)}: [geometry]:", type(self.geometry).__name__):
+            if isinstance(self.geometry, MeshFile):
+                return self.geometry.mesh(self.folder)
+            return generate(self.geometry)
+
+    @cached_property
+    def _body(self) -> ElasticBody:
+        mesh = self.mesh()
+        with located(f"{_title(self.path)}: [body]:", "ElasticBody"):
+            return self.body_settings.body(mesh)
+
+    @cached_property
+    def _basis(self) -> ModalBasis:
+        body = self.body()
+        with located(f"{_title(self.path)}: [basis]:"):
+            return self.basis_settings.basis(body)
+
+
+def _number(text: str, items: list[Any], name: str, title: str) -> int:
+    if not (text.isdigit() and int(text) < len(items)):
+        raise InputError(f"{title}: {name} cannot be set, because '{text}' is none of the "
+                         f"{len(items)} members, counted from 0.")
+    return int(text)
+
+
+def _title(path: Path | None) -> str:
+    return "The study" if path is None else str(path)
+
+
+def _gap(value: Any, title: str) -> Gap:
+    gap: Gap = convert(value, Gap, title, "gap")
+    numbers = () if isinstance(gap, Crown) else gap if isinstance(gap, tuple) else (gap,)
+    if not all(0.0 <= number < float("inf") for number in numbers):
+        raise InputError(f"{title}: gap = {shown(value)} must be finite and zero or above.")
+    return gap

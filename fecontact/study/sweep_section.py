@@ -1,0 +1,245 @@
+"""``[sweep]`` of a study file: which parameters take which values, and what is kept of a case."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from numbers import Real
+from types import NoneType
+from typing import Any, Literal
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices, require_positive
+
+_SUMMARIES = ("largest_displacement", "stick_fraction", "mean_normal_force", "peak_normal_force",
+              "friction_power")
+
+_MOST_PERIODS = 100_000  # that are kept of a case
+
+_PARAMETERS: Mapping[str, tuple[str, ...]] = {
+    "normal": ("mean", "std"),
+    "lognormal": ("mean", "std"),
+    "gamma": ("mean", "std"),
+    "truncated-normal": ("mean", "std", "low", "high"),
+    "uniform": ("low", "high"),
+    "loguniform": ("low", "high"),
+    "triangular": ("low", "mode", "high"),
+    "beta": ("a", "b", "low", "high"),
+    "weibull": ("shape", "scale"),
+}
+
+
+@dataclass(frozen=True)
+class Range:
+    """Values from ``start`` to ``end``, both included: ``{ start = 0.1, end = 1.0, count = 10 }``.
+
+    Parameters
+    ----------
+    start, end : float
+        In the unit of the parameter.
+    count : int, optional
+        Number of values, for grids and lists; drawn samples fill the range evenly.
+    spacing : 'linear' or 'log'
+        Equal differences or equal ratios.
+    """
+
+    start: float
+    end: float
+    count: int | None = None
+    spacing: Literal["linear", "log"] = "linear"
+
+    def __post_init__(self) -> None:
+        require_kind("Range", Real, start=self.start, end=self.end)
+        require_kind("Range", (int, NoneType), count=self.count)
+        if self.spacing not in ("linear", "log"):
+            raise InputError(f"Range: spacing = {self.spacing!r} must be 'linear' or 'log'.")
+        if not (math.isfinite(self.start) and math.isfinite(self.end)):
+            raise InputError(f"Range: start = {self.start!r} and end = {self.end!r} must be "
+                             f"finite.")
+        if self.spacing == "log" and not (self.start > 0.0 and self.end > 0.0):
+            raise InputError(f"Range: start = {self.start!r} and end = {self.end!r} must be above "
+                             f"zero for spacing = 'log'.")
+        if self.count is not None and self.count < 1:
+            raise InputError(f"Range: count = {self.count} must be at least 1.")
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """An uncertain parameter: ``{ distribution = "normal", mean = 0.5, std = 0.05 }``.
+
+    Parameters
+    ----------
+    distribution : str
+        'normal', 'gamma', 'lognormal' with mean, std; 'truncated-normal' with mean, std, low,
+        high; 'uniform', 'loguniform' with low, high; 'triangular' with low, mode, high; 'beta'
+        with a, b, low, high; 'weibull' with shape, scale.
+    mean, std : float, optional
+        Of the parameter itself, not of its logarithm; before it is cut off.
+    low, high : float, optional
+        Ends.
+    mode : float, optional
+        Most frequent value.
+    a, b, shape : float, optional
+        Dimensionless shapes.
+    scale : float, optional
+        In the unit of the parameter, as are all but the shapes.
+    """
+
+    distribution: str
+    mean: float | None = None
+    std: float | None = None
+    low: float | None = None
+    high: float | None = None
+    mode: float | None = None
+    a: float | None = None
+    b: float | None = None
+    shape: float | None = None
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        needed = _PARAMETERS.get(self.distribution)
+        if needed is None:
+            raise InputError(f"Distribution: distribution = '{self.distribution}' must be one of "
+                             f"{choices(_PARAMETERS)}.")
+        given = self.parameters
+        if set(given) != set(needed):
+            raise InputError(f"Distribution: '{self.distribution}' takes the keys "
+                             f"{choices(needed)}, not {choices(given)}.")
+        for name, value in given.items():
+            require_kind("Distribution", Real, **{name: value})
+            if not math.isfinite(value):
+                raise InputError(f"Distribution: {name} = {value!r} must be finite.")
+        require_positive("Distribution", **{name: value for name, value in given.items()
+                                            if name in ("std", "a", "b", "shape", "scale")})
+        if self.low is not None and self.high is not None:
+            if not self.low < self.high:
+                raise InputError(f"Distribution: high = {self.high!r} must lie above low = "
+                                 f"{self.low!r}.")
+            if self.mode is not None and not self.low <= self.mode <= self.high:
+                raise InputError(f"Distribution: mode = {self.mode!r} must lie between low = "
+                                 f"{self.low!r} and high = {self.high!r}.")
+        if self.distribution in ("lognormal", "gamma"):
+            require_positive("Distribution", mean=given["mean"])
+        if self.distribution == "loguniform":
+            require_positive("Distribution", low=given["low"])
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters that are given, by name."""
+        names = dict.fromkeys(name for needed in _PARAMETERS.values() for name in needed)
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
+
+
+@dataclass(frozen=True)
+class Strobing:
+    """Runs of which only the states once per period of the excitation are kept.
+
+    Parameters
+    ----------
+    transient : int
+        Periods that are left out.
+    keep : int
+        Periods after them.
+    point : str or int
+        Whose displacement is kept once per period: 'B', 'C', a named point, a contact node by its
+        number.
+    axis : 'x' or 'y'
+    """
+
+    transient: int = 100
+    keep: int = 64
+    point: str | int = "B"
+    axis: Literal["x", "y"] = "x"
+
+    def __post_init__(self) -> None:
+        require_kind("Strobing", int, transient=self.transient, keep=self.keep)
+        if self.transient < 0:
+            raise InputError(f"Strobing: transient = {self.transient} must be zero or above.")
+        if not 1 <= self.keep <= _MOST_PERIODS:
+            raise InputError(f"Strobing: keep = {self.keep} must be from 1 to {_MOST_PERIODS}.")
+
+
+Value = bool | int | float | str | tuple[float, ...]
+Axis = Range | Distribution | tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class SweepSettings:
+    """``[sweep]``: many cases of the study.
+
+    Parameters
+    ----------
+    axes : mapping of dotted name to Range, Distribution or list of values
+        ``[sweep.axes]``: the parameters that change, by the names of the study file:
+        ``ground.speed = [0.1, 0.2]``.
+    method : str
+        'grid': all combinations; 'list': the first values of all axes, the second ones, ...;
+        drawn: 'random', 'latin-hypercube', 'sobol' (a low-discrepancy sequence); 'sensitivity':
+        drawn so that Sobol indices follow.
+    samples : int, optional
+        Number of drawn cases. For 'sensitivity' a power of two: there are (d + 2) times as many
+        cases for d parameters.
+    seed : int
+        Of the drawn cases; the same seed draws the same.
+    summaries : list
+        Numbers to keep of each case, by name: see :mod:`fecontact.sweep.summaries`;
+        'FILE.py:FUNCTION' for a function of your own.
+    after : float, optional
+        Summaries count from this time on [s]; the whole run by default.
+    wear_coefficient : float, optional
+        Volume worn away per friction work [m^3/J], for the summaries of wear.
+    keep : 'none', 'histories' or 'fields'
+        Whether each case has a file of its own, with its motion alone or with fields for ParaView.
+    batch : int, optional
+        Cases computed in one go; by default up to 64, fewer when there are few.
+    strobe : Strobing, optional
+        ``strobe = { transient = 100, keep = 64 }``: faster runs without histories, over so many
+        periods of the excitation in the place of ``t_end``; the only summary is then 'periods'.
+    """
+
+    axes: Mapping[str, Axis] = field(default_factory=dict)
+    method: Literal["grid", "list", "random", "latin-hypercube", "sobol", "sensitivity"] = "grid"
+    samples: int | None = None
+    seed: int = 0
+    summaries: tuple[str, ...] = _SUMMARIES
+    after: float | None = None
+    wear_coefficient: float | None = None
+    keep: Literal["none", "histories", "fields"] = "none"
+    batch: int | None = None
+    strobe: Strobing | None = None
+
+    def __post_init__(self) -> None:
+        require_kind("SweepSettings", Mapping, axes=self.axes)
+        for name, count in (("samples", self.samples), ("batch", self.batch)):
+            if count is not None and count < 1:
+                raise InputError(f"SweepSettings: {name} = {count} must be at least 1.")
+        if self.seed < 0:
+            raise InputError(f"SweepSettings: seed = {self.seed} must be zero or above.")
+        if not self.summaries:
+            raise InputError("SweepSettings: summaries is empty; name at least one.")
+        if self.wear_coefficient is not None:
+            require_positive("SweepSettings", wear_coefficient=self.wear_coefficient)
+        if self.strobe is not None and (self.keep != "none" or self.after is not None
+                                        or self.summaries not in (_SUMMARIES, ("periods",))):
+            raise InputError("SweepSettings: strobe keeps no histories, so that keep, after and "
+                             "summaries other than 'periods' cannot stand beside it.")
+        if self.after is not None and not math.isfinite(self.after):
+            raise InputError(f"SweepSettings: after = {self.after!r} must be finite.")
+
+
+def flat_axes(table: Any) -> Any:
+    """``[sweep]`` with axes by dotted names, also where TOML reads them as tables in tables."""
+    if not isinstance(table, Mapping) or not isinstance(table.get("axes"), Mapping):
+        return table
+    return {**table, "axes": dict(_leaves(table["axes"], ""))}
+
+
+def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        # An axis that is a table holds numbers and texts alone.
+        if isinstance(value, Mapping) and any(isinstance(item, Mapping | list)
+                                              for item in value.values()):
+            found += _leaves(value, f"{prefix}{key}.")
+        else:
+            found.append((f"{prefix}{key}", value))
+    return found

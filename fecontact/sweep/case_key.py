@@ -1,0 +1,123 @@
+"""How a case is known: by the hash of all that its numbers follow from."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fecontact import __version__
+from fecontact.core.errors import InputError
+from fecontact.core.tables import shown
+from fecontact.study.study import Study
+from fecontact.sweep.case import BASIS_SECTIONS
+
+_DIGITS = 24  # of a hash that are kept: 96 bits
+_NOT_OF_THE_RUN = ("output", "render", "sweep")
+
+
+def case_keys(
+    study: Study, names: Sequence[str], rows: Sequence[Sequence[Any]], request: Mapping[str, Any]
+) -> tuple[list[str], list[str]]:
+    """Keys of all cases, and those of their modal bases.
+
+    A key is the hash of the resolved study with the case's values, of the files that it names, of
+    ``request`` (what is kept of a case) and of the version of the package: equal cases of
+    different sweeps have equal keys.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, or a value of the first case cannot be used.
+    """
+    digest = _digester(study.folder)
+    base = flat(study)
+    resolved = flat(study.with_(**dict(zip(names, rows[0], strict=True))))
+    convert = [_converter(name, [row[k] for row in rows], base) for k, name in enumerate(names)]
+    simple = all(convert)
+    keys, bases = [], []
+    seen: dict[str, str] = {}
+    for row in rows:
+        if simple:
+            for name, value, function in zip(names, row, convert, strict=True):
+                resolved[name] = function(value)  # type: ignore[misc]
+        else:
+            try:
+                resolved = flat(study.with_(**dict(zip(names, row, strict=True))))
+            except InputError:
+                # This case will fail; it is known by what was asked for.
+                resolved = base | dict(zip(names, row, strict=True))
+        body = {name: value for name, value in resolved.items()
+                if name.partition(".")[0] in BASIS_SECTIONS}
+        text = json.dumps(body, sort_keys=True)
+        if text not in seen:
+            seen[text] = digest({"basis": body})
+        bases.append(seen[text])
+        keys.append(digest({"study": resolved, "request": request}))
+    return keys, bases
+
+
+def flat(study: Study) -> dict[str, Any]:
+    """The resolved study without what a run does not depend on, by dotted names."""
+    return dict(_leaves({section: table for section, table in study.tables().items()
+                         if section not in _NOT_OF_THE_RUN}, ""))
+
+
+def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            found += _leaves(value, f"{prefix}{key}.")
+        else:
+            found.append((f"{prefix}{key}", value))
+    return found
+
+
+def _converter(
+    name: str, values: Sequence[Any], base: Mapping[str, Any]
+) -> Callable[[Any], Any] | None:
+    """What turns numbers of an axis into those of the resolved study; None if that takes more."""
+    present = base.get(name)
+    numbers = all(isinstance(value, int | float) and not isinstance(value, bool)
+                  for value in values)
+    if isinstance(present, bool) or not numbers:
+        return None
+    if isinstance(present, float):
+        return float
+    if isinstance(present, int) and all(isinstance(value, int) for value in values):
+        return int
+    return None
+
+
+def _digester(folder: Path) -> Callable[[Mapping[str, Any]], str]:
+    contents: dict[str, str] = {}
+
+    def stand_in(value: Any) -> Any:
+        """The content of a file in the place of its name."""
+        if isinstance(value, str):
+            if value not in contents:
+                contents[value] = _with_content(value, folder)
+            return contents[value]
+        if isinstance(value, list | tuple):
+            return [stand_in(item) for item in value]
+        if isinstance(value, Mapping):
+            return {key: stand_in(item) for key, item in value.items()}
+        return value
+
+    def digest(what: Mapping[str, Any]) -> str:
+        text = json.dumps({"version": __version__, **stand_in(what)}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
+
+    return digest
+
+
+def _with_content(text: str, folder: Path) -> str:
+    name, colon, rest = text.partition(".py:")
+    file = folder / (f"{name}.py" if colon else text)
+    try:
+        if not file.is_file():
+            return text
+        return f"{hashlib.sha256(file.read_bytes()).hexdigest()}{colon}{rest}"
+    except OSError as error:
+        raise InputError(f"{shown(text)} cannot be read "
+                         f"({(error.strerror or str(error)).lower()}).") from None

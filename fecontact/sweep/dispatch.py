@@ -1,0 +1,117 @@
+"""Giving work to an executor and taking results from it, whatever happens to its workers."""
+
+import queue
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from dataclasses import dataclass, replace
+from typing import Any
+
+from fecontact.core.errors import AnalysisError, FecontactError
+from fecontact.sweep.batch import Batch
+from fecontact.sweep.executors import Pool
+
+
+@dataclass(frozen=True)
+class Job:
+    """A function to call with a batch; ``breaks`` is 1 if a worker ended that may be its own."""
+
+    function: Callable[[Batch], Any]
+    batch: Batch
+    breaks: int = 0
+
+
+class LostError(FecontactError):
+    """The worker of a single case ended, again and again."""
+
+    def __init__(self) -> None:
+        super().__init__("The process that computed it ended without a word; it may have needed "
+                         "more memory than there is.")
+
+
+def results(waiting: deque[Job], pool: Pool) -> Iterator[tuple[Job, Any]]:
+    """Jobs with what they return, as it comes; jobs may be added to ``waiting`` meanwhile.
+
+    When workers end, the jobs that they may have been at run again, one by one to find the one
+    that is to blame, which is then split into its cases. A case that ends its worker when it runs
+    alone comes with a :class:`LostError`.
+
+    Raises
+    ------
+    FecontactError
+        As the functions do; and when the executor is no longer there.
+    """
+    flying: dict[Future[Any], Job] = {}
+    done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
+    try:
+        while waiting or flying:
+            broken = not _launch(waiting, flying, done, pool)
+            future = None if broken else done.get()
+            if future is not None:
+                job = flying.pop(future)
+                try:
+                    result = future.result()
+                except BrokenExecutor:
+                    flying[future] = job
+                    broken = True
+                except (FecontactError, KeyboardInterrupt):
+                    raise
+                except BaseException as error:
+                    if type(error).__name__ != "KilledWorker":
+                        raise _stopped(error) from error
+                    yield job, LostError()
+                else:
+                    yield job, result
+            if broken:
+                suspects = []
+                for future, job in flying.items():
+                    if future.done() and not future.cancelled() and future.exception() is None:
+                        yield job, future.result()
+                    else:
+                        suspects.append(job)
+                flying, done = {}, queue.SimpleQueue()
+                pool.renew()
+                for job in reversed(suspects):
+                    if not job.breaks:
+                        waiting.appendleft(replace(job, breaks=1))
+                    elif len(job.batch.cases) == 1:
+                        yield job, LostError()
+                    else:
+                        waiting.extendleft(
+                            replace(job, batch=replace(job.batch, cases=(case,)))
+                            for case in reversed(job.batch.cases))
+    finally:
+        for future in flying:
+            future.cancel()
+
+
+def _launch(
+    waiting: deque[Job], flying: "dict[Future[Any], Job]", done: "queue.SimpleQueue[Future[Any]]",
+    pool: Pool,
+) -> bool:
+    """Submit what may run now; False if the executor is broken."""
+    while waiting and len(flying) < pool.window:
+        alone = waiting[0].breaks or any(job.breaks for job in flying.values())
+        if alone and flying:
+            break
+        job = waiting.popleft()
+        try:
+            future = pool.submit(job.function, job.batch)
+        except BrokenExecutor:
+            waiting.appendleft(job)
+            return False
+        except RuntimeError as error:
+            raise _stopped(error) from error
+        flying[future] = job
+        future.add_done_callback(done.put)
+    return True
+
+
+def _stopped(error: BaseException) -> AnalysisError:
+    if isinstance(error, MemoryError):
+        reason = "a worker ran out of memory; take fewer workers"
+    elif isinstance(error, CancelledError):
+        reason = "the scheduler has gone"
+    else:
+        reason = f"{type(error).__name__}: {str(error).rstrip('.')}"
+    return AnalysisError(f"The sweep stopped: {reason}.")

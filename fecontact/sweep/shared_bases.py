@@ -1,0 +1,78 @@
+"""Modal bases of a sweep: computed once where several batches share one, kept, sent along."""
+
+import pickle
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from fecontact.core.errors import AnalysisError
+from fecontact.output.files.hdf5 import read_basis
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.study.study import Study
+from fecontact.sweep.batch import Batch, make_basis, packed, run_batch
+from fecontact.sweep.dispatch import Job, LostError
+from fecontact.sweep.store import Store
+
+
+class Bases:
+    """The modal bases that batches wait for.
+
+    A basis that only one batch needs is left to that batch. If all cases have the same one it is
+    computed here, where a study may have it already; others are computed by the workers.
+    """
+
+    def __init__(self, study: Study, store: Store, batches: Sequence[Batch]) -> None:
+        self.study, self.store = study, store
+        needed = [{case.basis for case in batch.cases} for batch in batches]
+        times = Counter(key for keys in needed for key in keys)
+        shared = {key for key, count in times.items() if count > 1 or len(times) == 1}
+        self.only = len(times) == 1
+        self.held = [(keys & shared, batch) for keys, batch in zip(needed, batches, strict=True)]
+        self.ready: dict[str, bytes | Path | str] = {}
+        self.makers = {case.basis: replace(batch, cases=(case,))
+                       for batch in batches for case in batch.cases if case.basis in shared}
+
+    def first(self) -> list[Job]:
+        """What can be started now: bases to compute, and batches that need not wait.
+
+        Raises
+        ------
+        FecontactError
+            If all cases have the same basis, and it cannot be computed.
+        """
+        jobs = []
+        for key, batch in self.makers.items():
+            if self.store.basis_file(key).exists():
+                self._put(key, read_basis(self.store.basis_file(key)), batch)
+            elif self.only:
+                self._put(key, self.study.with_(**batch.cases[0].basis_changes).basis(), batch)
+            else:
+                jobs.append(Job(make_basis, batch))
+        return jobs + self._released()
+
+    def made(self, batch: Batch, result: bytes | str | LostError) -> list[Job]:
+        """The batches that need not wait any longer, now that a worker has made a basis."""
+        key = batch.cases[0].basis
+        if isinstance(result, bytes):
+            self._put(key, pickle.loads(result), batch)
+        else:
+            self.ready[key] = str(result)
+        return self._released()
+
+    def _put(self, key: str, basis: ModalBasis, batch: Batch) -> None:
+        try:
+            self.store.keep_basis(key, basis)
+        except OSError as error:
+            raise AnalysisError(f"{self.store.basis_file(key)} cannot be written "
+                                f"({(error.strerror or str(error)).lower()}).") from None
+        # Fields are large; workers that write them see the folder anyway.
+        self.ready[key] = (self.store.basis_file(key).absolute() if batch.frames
+                           else packed(basis, shapes=False))
+
+    def _released(self) -> list[Job]:
+        free = [batch for keys, batch in self.held if keys <= self.ready.keys()]
+        self.held = [(keys, batch) for keys, batch in self.held if not keys <= self.ready.keys()]
+        return [Job(run_batch, replace(batch, bases={
+            key: self.ready[key] for case in batch.cases if (key := case.basis) in self.ready}))
+            for batch in free]

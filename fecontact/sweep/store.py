@@ -1,0 +1,145 @@
+"""The folder of a sweep: finished cases in shards, modal bases, a lock.
+
+A shard holds the rows of one batch and is named by the hash of their keys; it is written whole or
+not at all and never changed.
+"""
+
+import contextlib
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fecontact.core.atomic_write import clear_leftovers, replaced
+from fecontact.core.locks import locked
+from fecontact.core.stored import DamagedError, from_json, reading
+from fecontact.output.files.hdf5 import write_basis
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.sweep.batch import case_file
+from fecontact.sweep.case import Row
+
+_SUFFIXES = {"shards": ".json", "cases": ".vtkhdf", "bases": ".h5"}
+_OURS = re.compile(r"[0-9a-f]{24}")  # hashes, of rows, cases and bases
+
+
+@dataclass(frozen=True)
+class Store:
+    """What a sweep keeps on disk.
+
+    Attributes
+    ----------
+    folder : Path
+        ``shards/``, ``bases/`` and ``cases/`` lie in it.
+    files : bool
+        Whether a finished case has a file of its own.
+    """
+
+    folder: Path
+    files: bool = False
+
+    @property
+    def cases(self) -> Path:
+        """Folder of the files of single cases."""
+        return self.folder / "cases"
+
+    def rows(self) -> dict[str, Row]:
+        """All rows that are stored, by the keys of their cases.
+
+        Raises
+        ------
+        InputError
+            If a shard cannot be read.
+        """
+        found: dict[str, Row] = {}
+        for path in self.kept("shards"):
+            with reading(path, "damaged; remove it, and its cases are computed again"):
+                shard = from_json(path.read_text(encoding="utf-8"), dict, "the shard")
+                for row in shard["rows"]:
+                    _require_row(row)
+                    self._take(row, found)
+        return found
+
+    def _take(self, row: Row, found: dict[str, Row]) -> None:
+        key = row["case"]
+        if self.files and not row["reason"] and not case_file(self.cases, key).is_file():
+            return
+        if key not in found or found[key]["reason"]:
+            found[key] = row
+
+    def add(self, rows: Sequence[Row]) -> Path:
+        """Store the rows of a batch; the shard.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        keys = "".join(row["case"] for row in rows)
+        name = hashlib.sha256(keys.encode()).hexdigest()[:24]
+        path = self.folder / "shards" / f"{name}.json"
+        body = ",\n".join(json.dumps(row, sort_keys=True) for row in rows)
+        write_whole(path, f'{{"rows": [\n{body}\n]}}\n')
+        return path
+
+    def basis_file(self, key: str) -> Path:
+        """The file of a modal basis."""
+        return self.folder / "bases" / f"{key}.h5"
+
+    def keep_basis(self, key: str, basis: ModalBasis) -> None:
+        """Store a modal basis, unless it is there."""
+        path = self.basis_file(key)
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_basis(path, basis)
+
+    def kept(self, what: str) -> list[Path]:
+        """The files that sweeps have kept in ``shards``, ``cases`` or ``bases``, by their names."""
+        return sorted(path for path in (self.folder / what).glob(f"*{_SUFFIXES[what]}")
+                      if _OURS.fullmatch(path.stem))
+
+    def tidy(self) -> None:
+        """Remove what a killed sweep has left half written."""
+        for name in ("", "shards", "bases", "cases"):
+            clear_leftovers(self.folder / name)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other sweeps out of the folder; the system opens the lock when a process dies.
+
+        Raises
+        ------
+        InputError
+            If another sweep is at work there.
+        """
+        busy = (f"Another sweep is at work in {self.folder}; wait for it, or choose another "
+                f"folder.")
+        with locked(self.folder / ".lock", busy, keep=True):
+            yield
+
+
+def _require_row(row: Any) -> None:
+    """Raise DamagedError unless a stored row is a whole one."""
+    if not (isinstance(row, dict) and row.keys() >= Row.__required_keys__
+            and isinstance(row["case"], str) and isinstance(row["reason"], str)
+            and isinstance(row.get("warning", ""), str)
+            and isinstance(row["values"], dict) and isinstance(row.get("points", []), list)
+            and all(isinstance(value, int | float)
+                    for value in (*row["values"].values(), *row.get("points", [])))):
+        raise DamagedError("a row is not whole")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file whole or not at all, also when several processes do so at once.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    with contextlib.suppress(OSError):  # said by what follows
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with replaced(path) as part:
+        part.write_text(text, encoding="utf-8")

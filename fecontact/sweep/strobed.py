@@ -1,0 +1,96 @@
+"""Cases of which only states once per period are kept: batches as compiled ensembles."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.analysis.periodicity import count_periods
+from fecontact.core.errors import FecontactError
+from fecontact.integrate.ensemble import ensemble
+from fecontact.integrate.initial_state import initial_state
+from fecontact.integrate.trajectory import Status
+from fecontact.study.study import Study
+from fecontact.study.sweep_section import Strobing
+from fecontact.sweep.case import Case, Row
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.forcing_period import forcing_period
+
+Array = NDArray[np.float64]
+
+_PHASES = 8  # states per period, which show the size of the motion
+_AXES = ("x", "y")
+
+
+def strobed_rows(
+    cases: Sequence[Case], strobing: Strobing, study_of: Callable[[Case], Study]
+) -> list[Row]:
+    """Rows of cases, from ensembles of those whose states have the same size.
+
+    The numbers are those of :func:`fecontact.ensemble` for each case alone.
+    """
+    rows: dict[str, Row] = {}
+    groups: dict[tuple[int, float], list[tuple[Case, ContactSystem, Array, Array]]] = {}
+    for case in cases:
+        try:
+            study = study_of(case)
+            system, settings = study.system(), study.simulation
+            system.basis.point_index(strobing.point)
+            times = settings.t_start + strobe_times(forcing_period(system), strobing)
+            state = initial_state(system, settings.initial, settings.t_start)
+        except FecontactError as error:
+            rows[case.key] = Row(case=case.key, values={}, reason=str(error))
+        else:
+            groups.setdefault((system.size, settings.rtol), []).append(
+                (case, system, times, state))
+    for (_, rtol), members in groups.items():
+        found = ensemble([system for _, system, _, _ in members],
+                         np.array([times for _, _, times, _ in members]),
+                         initial=np.array([state for _, _, _, state in members]), rtol=rtol,
+                         workers=1)
+        for (case, system, _, _), states, status in zip(members, found.states, found.status,
+                                                        strict=True):
+            if status is Status.INTERRUPTED:
+                raise KeyboardInterrupt
+            rows[case.key] = (_row(case, system, states[strobing.transient > 0 :], strobing)
+                              if status is Status.FINISHED
+                              else Row(case=case.key, values={}, reason=status.value))
+    return [rows[case.key] for case in cases]
+
+
+def strobe_times(period: float, strobing: Strobing) -> Array:
+    """The start, and from the last period of the transient on eight times a period [s].
+
+    The last time is the last that is kept: ``transient + keep - 1`` periods.
+    """
+    phases = np.arange(-_PHASES + 1, _PHASES * (strobing.keep - 1) + 1)
+    later = (strobing.transient + phases / _PHASES) * period
+    return np.concatenate([[0.0], later[later > 0.0]])
+
+
+def _row(case: Case, system: ContactSystem, states: Array, strobing: Strobing) -> Row:
+    m = system.basis.modes
+    row = system.basis.T[system.basis.point_index(strobing.point), _AXES.index(strobing.axis)]
+    once = states[len(states) - 1 - _PHASES * (strobing.keep - 1) :: _PHASES]
+    return Row(case=case.key, values={"periods": _periods(states, once, system)}, reason="",
+               points=(once[:, :m] @ row).tolist())
+
+
+def _periods(states: Array, once: Array, system: ContactSystem) -> float:
+    """Number of periods after which the states repeat; 0 if they do not, NaN if too few are kept.
+
+    By displacements and velocities of B and the contact nodes, as
+    :func:`fecontact.analysis.periodicity.periodicity`.
+    """
+    basis, m = system.basis, system.basis.modes
+    rows = basis.T[[0, *range(2, 2 + basis.contact_nodes)], :2].reshape(-1, m).T
+    seen = np.hstack([states[:, :m] @ rows, states[:, m : 2 * m] @ rows])
+    size = np.ptp(seen, axis=0)
+    moves = np.concatenate([part > 1e-9 * part.max(initial=0.0) for part in np.split(size, 2)])
+    if not moves.any():
+        return 1.0
+    largest = min(16, len(once) // 3)
+    if len(once) < 11:
+        return float("nan")
+    points = np.hstack([once[:, :m] @ rows, once[:, m : 2 * m] @ rows])[:, moves]
+    return float(count_periods(points, size[moves], largest=largest).periods or 0)

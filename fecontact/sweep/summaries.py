@@ -1,0 +1,299 @@
+"""Numbers that say what a run was like: plain functions of a :class:`Trajectory`.
+
+Each is known by a name, to study files and in the columns of a sweep's table. ``NAME@POINT`` asks
+for another point than the usual one: ``amplitude_x@C``, ``amplitude_y@0`` for the first contact
+node. ``FILE.py:FUNCTION`` is a function of the user: it takes a Trajectory and returns a number.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import FecontactError, InputError, choices, nearest
+from fecontact.core.user_code import user_function
+from fecontact.integrate.trajectory import ContactState, Trajectory
+from fecontact.system.contact_energy import POWERS
+
+Point = str | int
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A number that is kept of each case: the function that takes it from a run, and its unit."""
+
+    function: Callable[..., float]
+    unit: str
+
+    @property
+    def text(self) -> str:
+        """What it is, for people."""
+        return (inspect.getdoc(self.function) or "").partition("\n")[0]
+
+
+def summarise(
+    trajectory: Trajectory, functions: Mapping[str, Callable[[Trajectory], float]],
+    after: float | None = None,
+) -> dict[str, float]:
+    """Summaries of a run from a time on [s]; see :func:`functions_for`.
+
+    Raises
+    ------
+    InputError
+        If fewer than two output times are left.
+    FecontactError
+        As the functions do; with the name of the summary.
+    """
+    late = trajectory if after is None else since(trajectory, after)
+    values = {}
+    for name, function in functions.items():
+        try:
+            values[name] = float(function(late))
+        except FecontactError as error:
+            raise type(error)(f"{name}: {error}") from None
+    return values
+
+
+def since(trajectory: Trajectory, after: float) -> Trajectory:
+    """The part of a run from a time on [s]."""
+    kept = trajectory.time >= after
+    if np.count_nonzero(kept) < 2:
+        raise InputError(f"The run ends at {trajectory.time[-1]:g} s and leaves no two output "
+                         f"times after {after:g} s; run it longer, or put after earlier.")
+    histories = ("time", "modal_coordinates", "modal_velocities", "memory", "held_normal_force",
+                 "held_friction_force")
+    changed = {name: value[kept] for name in histories
+               if (value := getattr(trajectory, name)) is not None}
+    for name in ("work", "node_friction_work"):  # from the first time
+        if (value := getattr(trajectory, name)) is not None:
+            changed[name] = value[kept] - value[kept][0]
+    return replace(trajectory, **changed)
+
+
+def functions_for(
+    names: Sequence[str], folder: Path | None = None, **known: Any
+) -> dict[str, Callable[[Trajectory], float]]:
+    """Functions of a Trajectory alone, by the names of summaries.
+
+    Parameters
+    ----------
+    names : sequence of str
+        As in ``[sweep]``.
+    folder : Path, optional
+        Where files of the user's functions are named from.
+    **known
+        What some summaries need besides the run: ``wear_coefficient`` [m^3/J], ``thickness`` [m].
+
+    Raises
+    ------
+    InputError
+        If there is no such summary, or it needs what is not known.
+    """
+    return {name: _function(name, folder or Path(), known) for name in names}
+
+
+def unit_of(name: str) -> str:
+    """Unit of a summary; empty for dimensionless ones and for the user's functions."""
+    found = SUMMARIES.get(name.partition("@")[0])
+    return "" if found is None else found.unit
+
+
+def _function(name: str, folder: Path, known: Mapping[str, Any]) -> Callable[[Trajectory], float]:
+    if ".py:" in name:
+        file, _, wanted = name.rpartition(":")
+        return user_function(folder / file, wanted)
+    bare, at, point = name.partition("@")
+    if bare not in SUMMARIES:
+        raise InputError(f"There is no summary '{bare}'{nearest(bare, SUMMARIES)}; there are: "
+                         f"{choices(SUMMARIES)}, or FILE.py:FUNCTION.")
+    function = SUMMARIES[bare].function
+    options: dict[str, Any] = {}
+    for key, parameter in list(inspect.signature(function).parameters.items())[1:]:
+        if key == "point":
+            continue
+        if known.get(key) is not None:
+            options[key] = known[key]
+        elif parameter.default is inspect.Parameter.empty:
+            raise InputError(f"The summary '{bare}' needs {key}; give it in [sweep].")
+    if at:
+        if "point" not in inspect.signature(function).parameters:
+            raise InputError(f"The summary '{bare}' is not one of a point; leave out "
+                             f"'@{point}'.")
+        options["point"] = int(point) if point.isdigit() else point
+    return partial(function, **options) if options else function
+
+
+def usual_point(trajectory: Trajectory) -> Point:
+    """B, or the contact node in the middle for a basis without B."""
+    basis = trajectory.system.basis
+    return "B" if basis.T[0].any() else basis.contact_nodes // 2
+
+
+def _duration(trajectory: Trajectory) -> float:
+    return float(trajectory.time[-1] - trajectory.time[0])
+
+
+def _mean(trajectory: Trajectory, values: NDArray[Any]) -> float:
+    return float(np.trapezoid(values, trajectory.time)) / _duration(trajectory)
+
+
+def _part(trajectory: Trajectory, state: ContactState) -> float:
+    lengths = trajectory.system.basis.tributary
+    return float((trajectory.contact_state == state).mean(axis=0) @ lengths / lengths.sum())
+
+
+def largest_displacement(trajectory: Trajectory) -> float:
+    """Largest displacement of B, C, the contact nodes and further points at any time."""
+    rows = trajectory.system.basis.T[:, :2]
+    moved = np.einsum("pkm,tm->tpk", rows, trajectory.modal_coordinates)
+    return float(np.hypot(moved[..., 0], moved[..., 1]).max())
+
+
+def amplitude_x(trajectory: Trajectory, point: Point | None = None) -> float:
+    """Half of the way from the lowest to the highest displacement x of a point."""
+    return 0.5 * float(np.ptp(_of_point(trajectory, point)[:, 0]))
+
+
+def amplitude_y(trajectory: Trajectory, point: Point | None = None) -> float:
+    """Half of the way from the lowest to the highest displacement y of a point."""
+    return 0.5 * float(np.ptp(_of_point(trajectory, point)[:, 1]))
+
+
+def rms_velocity(trajectory: Trajectory, point: Point | None = None) -> float:
+    """Root mean square of the velocity of a point, x and y together."""
+    velocity = trajectory.velocity(usual_point(trajectory) if point is None else point)
+    return float(np.sqrt(_mean(trajectory, (velocity[:, :2] ** 2).sum(axis=1))))
+
+
+def _of_point(trajectory: Trajectory, point: Point | None) -> NDArray[np.float64]:
+    return trajectory.displacement(usual_point(trajectory) if point is None else point)
+
+
+def stick_fraction(trajectory: Trajectory) -> float:
+    """Part of time and contact length that sticks."""
+    return _part(trajectory, ContactState.STICK)
+
+
+def slip_fraction(trajectory: Trajectory) -> float:
+    """Part of time and contact length that slips."""
+    return _part(trajectory, ContactState.SLIP)
+
+
+def open_fraction(trajectory: Trajectory) -> float:
+    """Part of time and contact length without contact."""
+    return _part(trajectory, ContactState.OPEN)
+
+
+def mean_normal_force(trajectory: Trajectory) -> float:
+    """Mean over time of the sum of the normal forces."""
+    return _mean(trajectory, trajectory.normal_force.sum(axis=1))
+
+
+def peak_normal_force(trajectory: Trajectory) -> float:
+    """Largest sum of the normal forces."""
+    return float(trajectory.normal_force.sum(axis=1).max())
+
+
+def mean_friction_force(trajectory: Trajectory) -> float:
+    """Mean over time of the sum of the friction forces; on the body they act in -x."""
+    return _mean(trajectory, trajectory.friction_force.sum(axis=1))
+
+
+def peak_friction_force(trajectory: Trajectory) -> float:
+    """Largest magnitude of the sum of the friction forces."""
+    return float(np.abs(trajectory.friction_force.sum(axis=1)).max())
+
+
+def peak_pressure(trajectory: Trajectory) -> float:
+    """Largest normal force per length of the contact face."""
+    return float(trajectory.pressure.max())
+
+
+def friction_power(trajectory: Trajectory) -> float:
+    """Mean power lost by friction between body and ground."""
+    return _power(trajectory, "friction")
+
+
+def belt_power(trajectory: Trajectory) -> float:
+    """Mean power that the moving ground puts in by dragging the body along."""
+    return _power(trajectory, "belt")
+
+
+def _power(trajectory: Trajectory, name: str) -> float:
+    work = trajectory.work[:, POWERS.index(name)]
+    return float(work[-1] - work[0]) / _duration(trajectory)
+
+
+def wear_depth(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:
+    """Depth worn away where it is largest: coefficient x friction work per area."""
+    return float(trajectory.wear_depth(wear_coefficient, thickness)[-1].max())
+
+
+def wear_rate(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:
+    """Depth worn away per time where it is largest: coefficient x friction power per area."""
+    return wear_depth(trajectory, wear_coefficient, thickness) / _duration(trajectory)
+
+
+def dominant_frequency(trajectory: Trajectory, point: Point | None = None) -> float:
+    """Frequency of the largest peak in the spectrum of a point's velocity (Hann window)."""
+    t = trajectory.time
+    velocity = trajectory.velocity(usual_point(trajectory) if point is None else point)[:, :2]
+    if len(t) < 8:
+        raise InputError(f"the frequency needs at least 8 output times, not {len(t)}.")
+    if not np.allclose(np.diff(t), t[1] - t[0], rtol=1e-6):
+        raise InputError("the frequency needs equally spaced output times.")
+    window = np.hanning(len(t))[:, None]
+    size = np.abs(np.fft.rfft((velocity - velocity.mean(axis=0)) * window, axis=0))
+    power = (size**2).sum(axis=1)
+    k = int(np.argmax(power[1:-1])) + 1
+    # The logarithm of a window's peak is close to a parabola.
+    low, middle, high = np.log(np.maximum(power[k - 1 : k + 2], 1e-300))
+    bend = low - 2.0 * middle + high
+    shift = 0.5 * (low - high) / bend if bend < 0.0 else 0.0
+    return float(k + shift) / (len(t) * float(t[1] - t[0]))
+
+
+def periods(trajectory: Trajectory) -> float:
+    """Number of drive periods after which the run repeats; 0 if it does not."""
+    from fecontact.analysis.periodicity import periodicity
+
+    found = periodicity(trajectory, start=float(trajectory.time[0]))
+    return float(found.periods or 0)
+
+
+def lyapunov_exponent(trajectory: Trajectory) -> float:
+    """Largest Lyapunov exponent, from a run as long again that starts from the first state."""
+    from fecontact.bifurcation.attractors.lyapunov import lyapunov_exponents
+
+    duration = _duration(trajectory)
+    found = lyapunov_exponents(trajectory.system, duration, initial=trajectory.states[0],
+                               transient=0.1 * duration)
+    return float(found.exponents[0])
+
+
+def end_time(trajectory: Trajectory) -> float:
+    """Time at which the run ended, at its end or by an event that stopped it."""
+    return float(trajectory.time[-1])
+
+
+def energy_imbalance(trajectory: Trajectory) -> float:
+    """Error of the energy balance relative to the largest energy in it."""
+    return trajectory.energies.imbalance
+
+
+SUMMARIES: Mapping[str, Summary] = {
+    function.__name__: Summary(function, unit) for function, unit in (
+        (largest_displacement, "m"), (amplitude_x, "m"), (amplitude_y, "m"),
+        (rms_velocity, "m/s"), (stick_fraction, ""), (slip_fraction, ""), (open_fraction, ""),
+        (mean_normal_force, "N"), (peak_normal_force, "N"), (mean_friction_force, "N"),
+        (peak_friction_force, "N"), (peak_pressure, "N/m"), (friction_power, "W"),
+        (belt_power, "W"), (wear_depth, "m"), (wear_rate, "m/s"), (dominant_frequency, "Hz"),
+        (periods, ""), (lyapunov_exponent, "1/s"), (end_time, "s"),
+        (energy_imbalance, ""),
+    )
+}

@@ -1,0 +1,283 @@
+"""Many cases of a study on all cores, or on a cluster, kept so that none is computed twice."""
+
+import contextlib
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import FecontactError, InputError
+from fecontact.core.tables import from_table, plain, require_known, to_table
+from fecontact.study.study import Study
+from fecontact.study.sweep_section import SweepSettings, flat_axes
+from fecontact.sweep.batch import Batch, make_basis
+from fecontact.sweep.case import Case, Row
+from fecontact.sweep.case_key import case_keys
+from fecontact.sweep.dispatch import LostError, results
+from fecontact.sweep.executors import opened, worker_count
+from fecontact.sweep.plan import Plan, plan
+from fecontact.sweep.shared_bases import Bases
+from fecontact.sweep.store import Store, write_whole
+from fecontact.sweep.summaries import functions_for
+from fecontact.sweep.table import SweepTable
+
+Progress = Callable[[int, int, int], None]
+
+_BATCHES, _LARGEST = 64, 64  # batches of a sweep at least, cases of a batch at most
+
+
+def sweep(
+    study: Study | str | Path,
+    axes: Mapping[str, Any] | None = None,
+    executor: Executor | None = None,
+    *,
+    folder: str | Path | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    retry: bool = False,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> SweepTable:
+    """Run many cases of a study.
+
+    ``sweep("study.toml", {"ground.speed": [0.1, 0.2], "friction.decay": Range(1.0, 9.0, 5)})``
+
+    Each case gives the numbers that ``study.with_(**changes).run()`` gives, to the last bit. It is
+    known by the hash of its resolved study; finished ones are kept in ``folder`` batch by batch,
+    so that a sweep that was stopped goes on where it was. Cases that fail have their reason in the
+    table and do not stop the others.
+
+    Parameters
+    ----------
+    study : Study or path
+        What all cases have in common.
+    axes : mapping, optional
+        Parameters that change, by dotted names, with a list of values, a
+        :class:`~fecontact.study.sweep_section.Range` or a
+        :class:`~fecontact.study.sweep_section.Distribution`; those of ``[sweep.axes]`` by default.
+    executor : concurrent.futures.Executor, optional
+        What runs the batches: the executor of a Dask client, of mpi4py.futures, of executorlib,
+        threads; by default processes on this machine, which end with the sweep.
+    folder : path, optional
+        Where finished cases are kept; ``NAME-sweep`` among the results of the study by default.
+    resume : bool
+        Go on with what is there, instead of complaining about it.
+    overwrite : bool
+        Remove what is there.
+    retry : bool
+        Compute cases again that have failed.
+    workers : int, optional
+        Number of processes on this machine; as many as cores by default.
+    progress : callable, optional
+        Called with the numbers of cases that are done, that failed and of all.
+    **settings
+        Other values for the keys of ``[sweep]``; see
+        :class:`~fecontact.study.sweep_section.SweepSettings`.
+
+    Returns
+    -------
+    SweepTable
+        Also in ``folder`` as ``index.csv``.
+
+    Raises
+    ------
+    InputError
+        If a parameter does not exist, an axis is empty or does not suit the method, a summary is
+        not known, the folder holds a sweep or cannot be written, another sweep is at work in it.
+    AnalysisError
+        If the executor cannot go on; finished cases are kept.
+    KeyboardInterrupt
+        After Ctrl-C; finished cases are kept.
+    """
+    study = study if isinstance(study, Study) else Study.read(study)
+    worker_count(workers)
+    wanted = _settings(study, axes, settings)
+    base = replace(study, sweep=None)
+    vars(base).update({name: value for name, value in vars(study).items() if name[0] == "_"})
+    if wanted.strobe is None:
+        _ = base.t_end
+    if wanted.after is not None and wanted.after >= base.t_end:
+        raise InputError(f"[sweep]: after = {wanted.after:g} must lie before the end of the run, "
+                         f"t_end = {base.t_end:g}.")
+    functions_for(wanted.summaries, base.folder, wear_coefficient=wanted.wear_coefficient,
+                  thickness=base.body_settings.thickness)
+    work = _Work.of(base, wanted, plan(wanted))
+    place = Path(folder) if folder is not None else base.results / f"{base.name}-sweep"
+    store = Store(place, files=wanted.keep != "none")
+    described = place / "sweep.toml"
+    if study.path is not None and described.exists() and (
+            study.path.exists() and described.samefile(study.path)):
+        raise InputError(f"The sweep would write {described} in the place of its study; choose "
+                         f"another folder, or another name for the study.")
+    with _folder(place), store.locked():
+        _clear_or_refuse(store, resume=resume, overwrite=overwrite)
+        write_whole(described, replace(study, sweep=wanted).to_toml())
+        rows = store.rows()
+        work.require_points(rows)
+        if retry:
+            rows = {key: row for key, row in rows.items() if not row["reason"]}
+        finished = False
+        try:
+            _compute(work, store, rows, executor, workers, progress)
+            finished = True
+        except FecontactError as error:
+            done = sum(case.key in rows for case in work.cases)
+            if not done:
+                raise
+            raise type(error)(f"{error} {done} of {len(work.cases)} cases are kept in {place}; go "
+                              f"on with --resume (resume=True).") from None
+        finally:
+            table = work.table(rows, place)
+            # Where something else went wrong, that is what must be said.
+            with contextlib.nullcontext() if finished else contextlib.suppress(InputError):
+                table.write(place / "index.csv")
+    return table
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """All cases of a sweep, and what to do with each."""
+
+    study: Study
+    settings: SweepSettings
+    plan: Plan
+    cases: tuple[Case, ...]
+
+    @classmethod
+    def of(cls, study: Study, settings: SweepSettings, cases: Plan) -> "_Work":
+        request = {"summaries": list(settings.summaries), "after": settings.after,
+                   "wear_coefficient": settings.wear_coefficient, "keep": settings.keep,
+                   "frames": study.output.frames if settings.keep == "fields" else 0,
+                   "strobe": None if settings.strobe is None else to_table(settings.strobe)}
+        keys, bases = case_keys(study, cases.names, cases.rows, request)
+        return cls(study, settings, cases, tuple(
+            Case(key, basis, dict(zip(cases.names, row, strict=True)))
+            for key, basis, row in zip(keys, bases, cases.rows, strict=True)))
+
+    def batches(self, store: Store) -> Iterator[Batch]:
+        """All cases in batches; the same ones for every run of the sweep."""
+        different = list({case.key: case for case in self.cases}.values())
+        first: dict[str, int] = {}
+        for case in different:
+            first.setdefault(case.basis, len(first))
+        different.sort(key=lambda case: first[case.basis])
+        size = self.settings.batch or min(max(len(different) // _BATCHES, 1), _LARGEST)
+        path = self.study.path
+        common = Batch(
+            self.study.tables(defaults=False), None if path is None else str(path.absolute()), (),
+            self.settings.summaries, self.settings.after, self.settings.wear_coefficient,
+            files=str(store.cases.absolute()) if store.files else None,
+            frames=self.study.output.frames if self.settings.keep == "fields" else 0,
+            strobe=self.settings.strobe)
+        for start in range(0, len(different), size):
+            yield replace(common, cases=tuple(different[start : start + size]))
+
+    def table(self, rows: Mapping[str, Row], folder: Path) -> SweepTable:
+        """The table of what is there."""
+        found = [rows.get(case.key) for case in self.cases]
+        nothing: dict[str, float] = {}
+        return SweepTable(
+            {name: tuple(row[k] for row in self.plan.rows)
+             for k, name in enumerate(self.plan.names)},
+            {name: np.array([(row["values"] if row else nothing).get(name, np.nan)
+                             for row in found]) for name in self.settings.summaries},
+            [case.key for case in self.cases],
+            [None if row is None else row["reason"] for row in found],
+            shape=self.plan.shape, folder=folder, strobed=self._strobed(found),
+            warnings=["" if row is None else row.get("warning", "") for row in found])
+
+    def require_points(self, rows: Mapping[str, Row]) -> None:
+        """Raise InputError if a stored case has another number of points than is kept of each."""
+        keep = 0 if self.settings.strobe is None else self.settings.strobe.keep
+        for case in self.cases:
+            points = rows[case.key].get("points") if case.key in rows else None
+            if points is not None and len(points) != keep:
+                raise InputError(f"The stored case {case.key} has {len(points)} displacements, one "
+                                 f"a period, not {keep}; compute it again with --overwrite "
+                                 f"(overwrite=True).")
+
+    def _strobed(self, rows: Sequence[Row | None]) -> NDArray[np.float64] | None:
+        if self.settings.strobe is None:
+            return None
+        nothing = [np.nan] * self.settings.strobe.keep
+        return np.array([row.get("points", nothing) if row else nothing for row in rows])
+
+
+def _settings(
+    study: Study, axes: Mapping[str, Any] | None, changes: Mapping[str, Any]
+) -> SweepSettings:
+    for name in changes:
+        require_known(name, [entry.name for entry in fields(SweepSettings)], "sweep()")
+    given = study.sweep or SweepSettings()
+    table: dict[str, Any] = {entry.name: getattr(given, entry.name)
+                             for entry in fields(given) if getattr(given, entry.name) is not None}
+    table |= {name: plain(value) for name, value in changes.items() if value is not None}
+    if axes is not None:
+        table["axes"] = {name: list(axis) if isinstance(axis, range) else axis
+                         for name, axis in axes.items()}
+    if table.get("strobe") is not None and "summaries" not in changes:
+        table["summaries"] = ("periods",)
+    return from_table(SweepSettings, flat_axes(table), "[sweep]")
+
+
+@contextlib.contextmanager
+def _folder(folder: Path) -> Iterator[None]:
+    from fecontact.core.folders import output_folder
+
+    with output_folder(folder):
+        yield
+
+
+def _clear_or_refuse(store: Store, *, resume: bool, overwrite: bool) -> None:
+    store.tidy()
+    if overwrite:
+        for what in ("shards", "cases", "bases"):
+            for path in store.kept(what):
+                path.unlink(missing_ok=True)
+    elif not resume and store.kept("shards"):
+        raise InputError(f"{store.folder} holds a sweep; go on with --resume (resume=True), begin "
+                         f"anew with --overwrite (overwrite=True), or choose another folder.")
+
+
+def _compute(
+    work: _Work, store: Store, rows: dict[str, Row], executor: Executor | None,
+    workers: int | None, progress: Progress | None,
+) -> None:
+    """Compute what is not in ``rows``, and put it there and into the store."""
+    total = len({case.key for case in work.cases})
+    done = sum(case.key in rows for case in {case.key: case for case in work.cases}.values())
+    failed = sum(bool(rows[key]["reason"]) for key in {case.key for case in work.cases}
+                 if key in rows)
+    missing = [replace(batch, cases=cases) for batch in work.batches(store)
+               if (cases := tuple(case for case in batch.cases if case.key not in rows))]
+
+    def take(found: Sequence[Row]) -> None:
+        nonlocal done, failed
+        store.add(found)
+        rows.update({row["case"]: row for row in found})
+        done += len(found)
+        failed += sum(bool(row["reason"]) for row in found)
+        if progress is not None:
+            progress(done, failed, total)
+
+    if progress is not None:
+        progress(done, failed, total)
+    if not missing:
+        return
+    with opened(executor, workers) as pool:
+        bases = Bases(work.study, store, missing)
+        waiting = deque(bases.first())
+        for job, result in results(waiting, pool):
+            if job.function is make_basis:
+                waiting.extend(bases.made(job.batch, result))
+            elif isinstance(result, LostError):
+                take([Row(case=case.key, values={}, reason=str(result))
+                      for case in job.batch.cases])
+            else:
+                take(result)

@@ -1,0 +1,191 @@
+"""The table of a sweep: parameters and summaries of all cases, in memory and as a CSV file."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import as_path
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.sweep.store import write_whole
+
+Array = NDArray[np.float64]
+
+_BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
+
+
+@dataclass(frozen=True, eq=False)
+class SweepTable:
+    """Parameters and summaries of the N cases of a sweep.
+
+    Attributes
+    ----------
+    parameters : mapping of dotted name to (N,) sequence
+        Values of the parameters that changed.
+    values : mapping of name to (N,) array
+        Summaries; NaN where a case failed or was not computed.
+    keys : (N,) sequence of str
+        By which a case is known on disk.
+    reasons : (N,) sequence of str or None
+        Why a case failed; empty for those that were computed, None for those that were not.
+    shape : tuple of int or None
+        Of a grid: numbers of values along the axes.
+    folder : Path or None
+        Where the sweep is kept.
+    strobed : (N, K) array or None
+        Displacements once per period, of a sweep that strobes; NaN for cases that failed.
+    warnings : (N,) sequence of str
+        Where runs leave what the model holds for; empty for those that do not.
+    """
+
+    parameters: Mapping[str, Sequence[Any]]
+    values: Mapping[str, Array]
+    keys: Sequence[str]
+    reasons: Sequence[str | None]
+    shape: tuple[int, ...] | None = None
+    folder: Path | None = field(default=None, compare=False)
+    strobed: Array | None = None
+    warnings: Sequence[str] = ()
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+    @property
+    def failed(self) -> dict[int, str]:
+        """Numbers of the cases that failed, with their reasons."""
+        return {k: reason for k, reason in enumerate(self.reasons) if reason}
+
+    @property
+    def missing(self) -> list[int]:
+        """Numbers of the cases that were not computed."""
+        return [k for k, reason in enumerate(self.reasons) if reason is None]
+
+    def changes(self, case: int) -> dict[str, Any]:
+        """What a case changes in the study: ``study.with_(**table.changes(3)).run()``."""
+        return {name: values[case] for name, values in self.parameters.items()}
+
+    def file(self, case: int) -> Path:
+        """The file of a case, of a sweep that keeps files."""
+        if self.folder is None:
+            raise InputError("The table does not know the folder of its sweep.")
+        return self.folder / "cases" / f"{self.keys[case]}.vtkhdf"
+
+    def column(self, name: str) -> Array:
+        """A parameter or summary (N,) as numbers.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name, or it does not hold numbers.
+        """
+        if name in self.values:
+            return self.values[name]
+        if name not in self.parameters:
+            names = (*self.parameters, *self.values)
+            raise InputError(f"The sweep has no column '{name}'{nearest(name, names)}; there are: "
+                             f"{choices(names)}.")
+        if not is_numeric(self.parameters[name]):
+            raise InputError(f"The column '{name}' of the sweep does not hold numbers.")
+        return np.array(self.parameters[name], dtype=float)
+
+    def grid(self, name: str) -> Array:
+        """A column in the shape of the grid.
+
+        Raises
+        ------
+        InputError
+            If the sweep is not a grid.
+        """
+        if self.shape is None:
+            raise InputError("The sweep is not a grid; its cases are columns of the table.")
+        return self.column(name).reshape(self.shape)
+
+    def write(self, path: str | Path) -> Path:
+        """Write the table as CSV: case, key, parameters, summaries, status, reason, warning.
+
+        Numbers have all their digits: reading gives them back to the last bit. Strobed
+        displacements go to ``NAME-strobed.csv``, one line a case.
+        """
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow([*_BEFORE, *self.parameters, *self.values, *_AFTER])
+        columns = [*self.parameters.values(), *(column.tolist() for column in self.values.values())]
+        for k, (key, reason) in enumerate(zip(self.keys, self.reasons, strict=True)):
+            status = "missing" if reason is None else "failed" if reason else "finished"
+            writer.writerow([k, key, *(_text(column[k]) for column in columns), status,
+                             reason or "", self.warnings[k] if self.warnings else ""])
+        write_whole(Path(path), text.getvalue())
+        if self.strobed is not None:
+            lines = "".join(f"{k},{','.join(map(_text, row))}\n"
+                            for k, row in enumerate(self.strobed.tolist()))
+            write_whole(_strobed_file(Path(path)), lines)
+        return Path(path)
+
+
+def _strobed_file(path: Path) -> Path:
+    return path.with_name(f"{path.stem}-strobed.csv")
+
+
+def is_numeric(values: Sequence[Any]) -> bool:
+    """Whether all values are numbers."""
+    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else repr(value)
+    return json.dumps(value)
+
+
+def read_table(path: str | Path) -> SweepTable:
+    """Read a table that :meth:`SweepTable.write` wrote.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is no such table.
+    """
+    path = as_path(path, "a table")
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            head, *rows = csv.reader(file)
+        first = head.index("status")
+        # Summaries have no dots before an '@', and dots name parameters; but 'gap' has none.
+        parameters = [name for name in head[2:first] if _is_parameter(name)]
+        columns = dict(zip(head, zip(*rows, strict=True), strict=True))
+        return SweepTable(
+            {name: tuple(json.loads(text) for text in columns[name]) for name in parameters},
+            {name: np.array([float(text or "nan") for text in columns[name]])
+             for name in head[2:first] if name not in parameters},
+            columns["key"],
+            [None if status == "missing" else reason
+             for status, reason in zip(columns["status"], columns["reason"], strict=True)],
+            folder=path.parent, strobed=_read_strobed(_strobed_file(path), len(rows)),
+            warnings=columns["warning"])
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; run the sweep first.") from None
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError, IndexError, csv.Error, RecursionError):
+        raise InputError(f"{path} is not the table of a sweep.") from None
+
+
+def _read_strobed(path: Path, count: int) -> Array | None:
+    if not path.is_file():
+        return None
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = [[float(text or "nan") for text in row[1:]] for row in csv.reader(file)]
+    if len(rows) != count:
+        raise InputError(f"{path} has {len(rows)} lines, not one for each of the {count} cases.")
+    return np.array(rows)
+
+
+def _is_parameter(name: str) -> bool:
+    return name == "gap" or ("." in name.partition("@")[0] and ".py:" not in name)

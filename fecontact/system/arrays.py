@@ -1,0 +1,118 @@
+"""A contact system as the compiled kernels take it."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import CompiledLaw
+from fecontact.core.errors import InputError
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.ground.ground import Ground
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.kernels import SystemArrays
+
+Array = NDArray[np.float64]
+
+_DIRECTIONS = ("x", "y", "moment")
+
+
+LawGroup = tuple[slice, Array, Any]
+
+
+def system_arrays(
+    basis: ModalBasis, normal_groups: Iterable[LawGroup], friction_groups: Iterable[LawGroup],
+    ground: Ground, drive: Drive, load: Load, gap: Array,
+) -> SystemArrays:
+    """Matrices, rows, parameters and addresses of the laws of a system.
+
+    The groups are contact nodes that share a law: their place, each one's part of their face, and
+    the law; see :meth:`fecontact.system.contact_system.ContactSystem.law_groups`.
+    """
+    B, C = basis.T[0], basis.T[1]
+    stiffness = np.diag(basis.angular_frequencies**2)
+    damping = basis.damping.copy()
+    for axis, c, b in ((0, drive.stiffness_x, drive.damping_x),
+                       (1, drive.stiffness_y, drive.damping_y)):
+        stiffness += c * np.outer(B[axis], B[axis])
+        damping += b * np.outer(B[axis], B[axis])
+    n, m = basis.contact_nodes, basis.modes
+    friction_groups = list(friction_groups)
+    normal, normal_parameters = _law_table(normal_groups)
+    friction, friction_parameters = _law_table(friction_groups)
+    memory = [np.full(nodes.stop - nodes.start, law.memory, dtype=np.int64)
+              for nodes, _, law in friction_groups]
+    loads = load.forces
+    load_shapes = [basis.T[basis.point_index(force.point), _DIRECTIONS.index(force.direction)]
+                   for force in loads]
+    scale = ground.friction_scale_kernel
+    return SystemArrays(
+        stiffness=stiffness,
+        damping=damping,
+        modal_damping=basis.damping.copy(),
+        constant_load=-load.normal * C[1],
+        drive_shapes=np.array([drive.stiffness_x * B[0], drive.stiffness_y * B[1]]),
+        drive_stiffness=np.array([drive.stiffness_x, drive.stiffness_y], dtype=float),
+        load_shapes=np.array(load_shapes, dtype=float).reshape(-1, m),
+        Tx=basis.contact_T[:, 0].copy(),
+        Ty=basis.contact_T[:, 1].copy(),
+        abscissa=basis.contact_x.copy(),
+        gap=np.array(np.broadcast_to(gap, n)),
+        normal_parameters=normal_parameters,
+        friction_parameters=friction_parameters,
+        profile_parameters=ground.profile_parameters(),
+        friction_scale_parameters=ground.friction_scale_parameters(),
+        ground_motion_parameters=ground.motion_parameters(),
+        drive_parameters=_rows([motion.parameters() for motion in drive.motions]),
+        load_parameters=_rows([force.signal.parameters() for force in loads]),
+        normal=normal,
+        friction=friction,
+        memory=np.concatenate(memory),
+        drive=_addresses(motion.kernel for motion in drive.motions),
+        load=_addresses(force.signal.kernel for force in loads),
+        profile=ground.profile_kernel.address,
+        friction_scale=0 if scale is None else scale.address,
+        ground_motion=ground.motion_kernel.address,
+    )
+
+
+def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
+    """InputError for a drive or load that could do no work, as no mode moves its point that way."""
+    acting: list[tuple[str, str | int, str]] = [
+        (f"Drive: {name} = {value!r}", "B", axis)
+        for axis, name, value in (("x", "stiffness_x", drive.stiffness_x),
+                                  ("x", "damping_x", drive.damping_x),
+                                  ("y", "stiffness_y", drive.stiffness_y),
+                                  ("y", "damping_y", drive.damping_y)) if value]
+    if load.normal:
+        acting.append((f"Load: normal = {load.normal!r}", "C", "y"))
+    acting += [(f"Load: a force at {force.point!r} in direction {force.direction!r}", force.point,
+                force.direction) for force in load.forces]
+    for what, point, direction in acting:
+        if not basis.T[basis.point_index(point), _DIRECTIONS.index(direction)].any():
+            turn = "turns" if direction == "moment" else f"moves along {direction}"
+            raise InputError(f"{what} has no effect, as {point!r} {turn} in no mode of the basis; "
+                             f"leave it out, or give the basis rows for that point.")
+
+
+def _law_table(law_groups: Iterable[LawGroup]) -> tuple[NDArray[np.int64], Array]:
+    """Addresses (n,) and parameters (n, k) of the laws of all nodes."""
+    groups = [(law, law.table(share)) for _, share, law in law_groups]
+    width = max(table.shape[1] for _, table in groups)
+    return (np.concatenate([np.full(len(table), law.kernel.address, dtype=np.int64)
+                            for law, table in groups]),
+            np.vstack([np.pad(table, ((0, 0), (0, width - table.shape[1])))
+                       for _, table in groups]))
+
+
+def _rows(parameters: list[Array]) -> Array:
+    """Parameters of several functions as one array, filled up with zeros."""
+    table = np.zeros((len(parameters), max((len(row) for row in parameters), default=1)))
+    for index, row in enumerate(parameters):
+        table[index, : len(row)] = row
+    return table
+
+
+def _addresses(kernels: Iterable[CompiledLaw]) -> NDArray[np.int64]:
+    return np.array([kernel.address for kernel in kernels], dtype=np.int64)

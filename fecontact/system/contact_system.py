@@ -1,0 +1,311 @@
+"""The contact system: a modal basis, laws at its contact nodes, drive and load."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.dotted_parameters import parameters_of, with_parameters
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.ground.ground import Ground
+from fecontact.laws.soundness import require_sound
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system import jacobian as contact_jacobian
+from fecontact.system import kernels
+from fecontact.system.arrays import require_motion, system_arrays
+from fecontact.system.gap import Gap, gap_values
+
+Array = NDArray[np.float64]
+
+NO_NORMAL_LAW = ("{}, the law of the normal force, which no default can replace; give a rough "
+                 "surface with its stiffness and roughness_height, or another law: `fecontact "
+                 "laws` lists them, `fecontact laws rough-surface` says how to choose.")
+
+NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a friction law with "
+                   "its coefficients, such as the exponential or the constant one (0 for no "
+                   "friction); `fecontact laws` lists them.")
+
+PARTS = ("normal", "friction", "ground", "drive", "load")
+
+_KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
+
+
+def needs_friction(basis: ModalBasis) -> bool:
+    """Whether a contact node can move along the ground, so that friction matters."""
+    return bool(basis.contact_T[:, 0].any())
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSystem:
+    """Reduced equations of an elastic body in contact with moving ground, (4.1-1) to (4.1-23).
+
+    ``q'' + D q' + w^2 q = T^T f`` with, at B, the drive's springs and dashpots, at C and other
+    points the loads, and at contact node j ``[-R_j, F_j, 0]`` from the normal and the friction
+    law. Immutable; see :meth:`with_`.
+
+    Attributes
+    ----------
+    basis : ModalBasis
+    normal : normal law, or mapping of contact group to normal law
+        Normal force F (on the body, upwards) from penetration and its rate.
+    friction : friction law, or mapping of contact group to friction law
+        Friction force R (on the body, against the slip velocity). Without one there is no
+        friction, which is refused where a contact node can move along the ground.
+    ground : Ground
+        Profile and motion of the ground.
+    drive : Drive
+        Base excitation of B.
+    load : Load
+        Loads at C and other points.
+    gap : float, (n,) sequence, Crown or function of x
+        Initial distance g_j of the contact nodes from flat ground, zero or above [m]; kept as
+        numbers.
+
+    Raises
+    ------
+    InputError
+        Without a normal law, or a friction law where it matters; for a part of another kind, laws
+        for groups that the basis lacks, parameters or gaps of another number than there are contact
+        nodes, laws that :func:`require_sound` refuses, and drives and loads at places that no mode
+        moves in their direction.
+    """
+
+    basis: ModalBasis
+    # Required, with a sentence that says more than Python's own.
+    normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
+    friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]
+    ground: Ground = field(default_factory=Ground)
+    drive: Drive = field(default_factory=Drive)
+    load: Load = field(default_factory=Load)
+    gap: Gap = 0.0
+
+    def __post_init__(self) -> None:
+        if self.normal is None:
+            raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
+        if self.friction is None:
+            if needs_friction(self.basis):
+                raise InputError(NO_FRICTION_LAW.format("ContactSystem lacks friction"))
+            object.__setattr__(self, "friction", ConstantFriction(0.0))
+        for name, kind in _KINDS.items():
+            if not isinstance(getattr(self, name), kind):
+                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} cannot serve as "
+                                 f"{name}; it must be a {kind.__name__}.")
+        for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
+            given = getattr(self, name)
+            if isinstance(given, Mapping):
+                self._require_groups(name, given)
+                object.__setattr__(self, name, MappingProxyType(dict(given)))
+            for one in getattr(self, name).values() if isinstance(given, Mapping) else (given,):
+                if not isinstance(one, law):
+                    raise InputError(f"ContactSystem: {name} = {one!r} cannot serve as {name}; it "
+                                     f"must be a {law.__name__}.")
+        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+        for part in (self.law_groups("normal"), self.law_groups("friction")):
+            for _, share, one in part:
+                one.table(share)
+                require_sound(one)
+        require_motion(self.basis, self.drive, self.load)
+        _ = self.arrays
+
+    def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
+        names = [group for group, _ in self.basis.groups]
+        for group in given:
+            if group not in names:
+                raise InputError(f"ContactSystem: {name} has a law for the contact group "
+                                 f"{group!r}{nearest(str(group), names)}, but the groups of "
+                                 f"the basis are: {choices(names)}.")
+        missing = [group for group in names if group not in given]
+        if missing:
+            raise InputError(f"ContactSystem: {name} lacks a law for the contact "
+                             f"group{'s' * (len(missing) > 1)} {choices(missing)}.")
+
+    def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
+        """Contact nodes that share a law: their place, each one's part of their face, the law.
+
+        The total of an extensive parameter is that of the whole face for a single law, and that
+        of the group for a law of a contact group.
+        """
+        given, tributary = getattr(self, kind), self.basis.tributary
+        if not isinstance(given, Mapping):
+            yield slice(0, len(tributary)), tributary / tributary.sum(), given
+            return
+        first = 0
+        for name, count in self.basis.groups:
+            nodes = slice(first, first + count)
+            yield nodes, tributary[nodes] / tributary[nodes].sum(), given[name]
+            first += count
+
+    @property
+    def share(self) -> Array:
+        """Part (n,) of the contact face that belongs to each node; their sum is one."""
+        return self.basis.tributary / self.basis.tributary.sum()
+
+    @property
+    def memory(self) -> int:
+        """Number s of internal variables that the state holds for each contact node."""
+        return int(self.arrays.memory.max())
+
+    @property
+    def size(self) -> int:
+        """Number of values of a state y = [q, q', z]: 2 m + n s."""
+        return 2 * self.basis.modes + self.basis.contact_nodes * self.memory
+
+    @property
+    def penetration_scale(self) -> float:
+        """Smallest penetration over which a normal law changes its character [m]."""
+        return min(law.penetration_scale for _, _, law in self.law_groups("normal"))
+
+    @property
+    def velocity_scale(self) -> float:
+        """Smallest slip velocity over which a friction force rises [m/s]."""
+        return min(law.velocity_scale for _, _, law in self.law_groups("friction"))
+
+    @property
+    def memory_scales(self) -> Array:
+        """Scale (n s,) of each internal variable of the state."""
+        scales = np.ones((self.basis.contact_nodes, self.memory))
+        for nodes, _, law in self.law_groups("friction"):
+            scales[nodes, : law.memory] = law.state_scale
+        return scales.reshape(-1)
+
+    def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
+        """Times between two [s] at which something given in time has a kink, ascending."""
+        given: tuple[Any, ...] = (
+            *self.drive.motions, *(force.signal for force in self.load.forces), self.ground)
+        return tuple(sorted({time for source in given
+                             for time in source.breakpoints(start, end)}))
+
+    def shortest_period(self, start: float, end: float) -> float:
+        """Shortest period of drive, loads, belt and waves under the body [s]; infinite without any.
+
+        Waves pass at the largest speed of the ground between two times [s].
+        """
+        given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
+        given += [force.signal for force in self.load.forces]
+        given += [self.ground.motion] if self.ground.motion is not None else []
+        periods = [source.shortest_period for source in given]
+        wavelength, speed = self.ground.shortest_wavelength, self.ground.largest_speed(start, end)
+        if wavelength is not None and speed > 0.0:
+            periods.append(wavelength / speed)
+        return float(min((period for period in periods if period is not None), default=np.inf))
+
+    def stored_energy(self, penetration: Array) -> Array:
+        """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""
+        energy = np.zeros(penetration.shape[:-1])
+        for nodes, share, law in self.law_groups("normal"):
+            energy += law.stored_energy(penetration[..., nodes], share).sum(axis=-1)
+        return energy
+
+    def sticks(
+        self, slip_velocity: Array, normal_force: Array, friction_force: Array
+    ) -> NDArray[np.bool_]:
+        """Whether nodes in contact stick, from their slip velocities, F and R, each (N, n)."""
+        return np.concatenate(
+            [law.sticks(slip_velocity[..., nodes], np.abs(normal_force[..., nodes]),
+                        friction_force[..., nodes])
+             for nodes, _, law in self.law_groups("friction")], axis=-1)
+
+    @cached_property
+    def arrays(self) -> kernels.SystemArrays:
+        """The system as the compiled kernels take it."""
+        return system_arrays(
+            self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
+            self.drive, self.load, np.asarray(self.gap, dtype=float))
+
+    def rhs(self, t: float, y: Array) -> Array:
+        """Rate y' (2 m + n s,) of the state y = [q, q', z]."""
+        out = np.empty(self.size)
+        kernels.right_hand_side(float(t), self._checked(y), self.arrays, out)
+        return out
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """Jacobian dy'/dy (2 m + n s, 2 m + n s)."""
+        out = np.empty((self.size, self.size))
+        contact_jacobian.jacobian(float(t), self._checked(y), self.arrays, out)
+        return out
+
+    def contact_history(self, times: Array, states: Array) -> Array:
+        """Contact quantities (N, n, 6) at N times and states (N, 2 m + n s).
+
+        The columns are normal force [N], friction force [N], penetration [m], its rate [m/s],
+        slip velocity [m/s] and the rate of the ground's height under the node [m/s]. InputError
+        for states of another shape.
+        """
+        times = np.ascontiguousarray(times, dtype=float)
+        states = np.ascontiguousarray(states, dtype=float)
+        if times.ndim != 1 or states.shape != (len(times), self.size):
+            raise InputError(f"The states at {times.size} times must have shape ({times.size}, "
+                             f"{self.size}), not {states.shape}.")
+        out = np.empty((len(times), self.basis.contact_nodes, kernels.STATE_COLUMNS))
+        kernels.contact_history(times, states, self.arrays, out)
+        return out
+
+    def with_(self, **changes: Any) -> "ContactSystem":
+        """A copy with other parameters, by their dotted names.
+
+        ``system.with_(**{"friction.static_coefficient": 0.7, "gap": 1e-6})``; a whole part can be
+        replaced too, ``system.with_(ground=Ground(speed=0.1))``.
+
+        Raises
+        ------
+        InputError
+            If there is no such parameter (with those that exist), or the value is out of range.
+        """
+        for name in changes:
+            if "." in name and _inner_name(name).partition(".")[0] not in PARTS:
+                raise self._unknown(name)
+        try:
+            return cast("ContactSystem", with_parameters(self, {
+                _inner_name(name): value for name, value in changes.items()}))
+        except KeyError as error:
+            raise self._unknown(error.args[0]) from None
+
+    def parameters(self) -> dict[str, Any]:
+        """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
+
+        Those of a contact group's laws are called ``contact.NAME.normal.stiffness``.
+        """
+        return {_outer_name(self, f"{part}.{name}"): value
+                for part in PARTS
+                for name, value in parameters_of(getattr(self, part)).items()}
+
+    def _checked(self, y: Array) -> Array:
+        state = np.ascontiguousarray(y, dtype=float)
+        if state.shape != (self.size,):
+            raise InputError(f"A state of this system has {self.size} values [q, q', z], "
+                             f"not shape {state.shape}.")
+        return state
+
+    def _unknown(self, name: str) -> InputError:
+        names = (*self.parameters(), "gap", *PARTS)
+        return InputError(f"The system has no parameter '{_outer_name(self, name)}'"
+                          f"{nearest(name, names)}; "
+                          f"its parameters are: {choices(names)}.")
+
+
+def _inner_name(name: str) -> str:
+    """``normal.NAME.stiffness`` for ``contact.NAME.normal.stiffness``."""
+    first, _, rest = name.partition(".")
+    group, _, parameter = rest.partition(".")
+    kind, _, last = parameter.partition(".")
+    if first != "contact" or kind not in ("normal", "friction"):
+        return name
+    return f"{kind}.{group}.{last}" if last else f"{kind}.{group}"
+
+
+def _outer_name(system: ContactSystem, name: str) -> str:
+    """The reverse, for laws of contact groups."""
+    kind, _, rest = name.partition(".")
+    if kind not in ("normal", "friction") or not isinstance(getattr(system, kind), Mapping):
+        return name
+    group, _, last = rest.partition(".")
+    if group not in getattr(system, kind):
+        return name
+    return f"contact.{group}.{kind}.{last}" if last else f"contact.{group}.{kind}"

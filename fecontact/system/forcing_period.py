@@ -1,0 +1,97 @@
+"""The period of what a contact system is given in time."""
+
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.laws.ground.fourier_series import FourierSeries
+from fecontact.laws.ground.measured_profile import Trace
+from fecontact.laws.ground.profile import Profile
+from fecontact.laws.ground.profiles import Sine
+from fecontact.laws.ground.random_roughness import RandomRoughness
+from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics
+from fecontact.system.contact_system import ContactSystem
+
+_REPEATING = (Harmonic, Harmonics)
+
+
+def common_period(system: ContactSystem) -> float | None:
+    """Common period [s] of all that is given in time; None for an autonomous system.
+
+    Raises
+    ------
+    AnalysisError
+        If something is not periodic, or the periods have no common multiple up to 1000 of the
+        longest.
+    """
+    require_kind("common_period", ContactSystem, system=system)
+    drive, ground = system.drive, system.ground
+    given: list[tuple[str, Any]] = [
+        (f"drive.motion_{axis}", motion)
+        for axis, stiffness, motion in zip("xy", (drive.stiffness_x, drive.stiffness_y),
+                                           drive.motions, strict=True) if stiffness]
+    given += [(f"load.forces.{k}", force.signal) for k, force in enumerate(system.load.forces)]
+    periods = []
+    for name, source in given:
+        if isinstance(source, Constant) or (isinstance(source, _REPEATING)
+                                            and source.shortest_period is None):
+            continue
+        if source.frequency_hz is None:
+            raise AnalysisError(f"{name} is not periodic; periodic orbits need a drive and loads "
+                                f"that repeat.")
+        periods.append(1.0 / source.frequency_hz)
+    if ground.motion is not None:
+        raise AnalysisError("ground.motion gives a speed that changes in time; periodic orbits "
+                            "are computed for constant speed.")
+    shapes = [("ground.friction_variation", ground.friction_variation)]
+    if ground.wavy:
+        shapes.append(("ground.profile", ground.profile or Sine(ground.amplitude,
+                                                                ground.wavelength)))
+    for name, shape in shapes:
+        if shape is not None and not shape.flat and ground.speed != 0.0:
+            periods.append(_repeat_length(name, shape) / abs(ground.speed))
+    return _common(periods)
+
+
+def forcing_period(system: ContactSystem) -> float:
+    """Period of what excites a system, that of :func:`common_period` [s].
+
+    Raises
+    ------
+    InputError
+        If nothing depends on time.
+    AnalysisError
+        As :func:`common_period`.
+    """
+    require_kind("forcing_period", ContactSystem, system=system)
+    period = common_period(system)
+    if period is None:
+        raise InputError("Nothing excites the system in time, so it has no period; give period, or "
+                         "a drive that repeats.")
+    return period
+
+
+def _repeat_length(name: str, shape: Profile) -> float:
+    if isinstance(shape, Sine | FourierSeries):
+        return float(shape.wavelength)
+    if isinstance(shape, RandomRoughness):
+        return float(shape.length)
+    if isinstance(shape, Trace) and shape.periodic:
+        return float(shape.abscissa_scale * (shape.abscissa[-1] - shape.abscissa[0]))
+    raise AnalysisError(f"{name} does not repeat; periodic orbits need ground that does, such as "
+                        f"a Sine, a FourierSeries or a periodic Trace.")
+
+
+def _common(periods: list[float]) -> float | None:
+    if not periods:
+        return None
+    longest = max(periods)
+    for count in range(1, 1001):
+        ratios = np.array([count * longest / period for period in periods])
+        if (np.abs(ratios - np.round(ratios)) <= 1e-9 * ratios).all():
+            return count * longest
+    listed = ", ".join(f"{period:.6g} s" for period in periods)
+    raise AnalysisError(f"The periods of drive, loads and ground ({listed}) have no common "
+                        f"multiple; choose frequencies in the ratio of whole numbers.")

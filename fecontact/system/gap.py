@@ -1,0 +1,73 @@
+"""The body's own distance from flat ground, before anything moves."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError, require_positive
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Crown:
+    """Gap below a face that is an arc of a circle, bulging towards the ground.
+
+    ``g(x) = R - sqrt(R^2 - (x - centre)^2)``, from the circle itself: the chords of a mesh with
+    edges of length h miss it by h^2 / (8 R), which is easily the height of the roughness.
+
+    Parameters
+    ----------
+    radius : float
+        R, positive [m].
+    centre : float
+        Abscissa of the lowest point [m].
+
+    Raises
+    ------
+    InputError
+        For a radius that is not positive, and when it is used, one that a contact node exceeds.
+    """
+
+    radius: float
+    centre: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive("Crown", radius=self.radius)
+
+    def __call__(self, x: Array) -> Array:
+        """Gap [m] at abscissae x [m]; InputError beyond the circle."""
+        away = np.asarray(x, dtype=float) - self.centre
+        if (np.abs(away) > self.radius).any():
+            raise InputError(f"Crown: radius = {self.radius!r} must be at least "
+                             f"{np.abs(away).max():g}, the distance of the farthest contact node "
+                             f"from centre = {self.centre!r}.")
+        return np.asarray(away**2 / (self.radius + np.sqrt(self.radius**2 - away**2)))
+
+
+Gap = float | Sequence[float] | Crown | Callable[[Array], Array]
+
+
+def gap_values(gap: Gap, abscissae: Array) -> float | tuple[float, ...]:
+    """One gap for all contact nodes, or one for each.
+
+    Raises
+    ------
+    InputError
+        For another number of values than nodes, or a value that is negative or not finite.
+    """
+    given = gap(abscissae) if callable(gap) else gap
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"gap = {given!r} must be a number, one per contact node, or a function "
+                         f"of x.") from None
+    if values.shape not in ((), abscissae.shape):
+        raise InputError(f"gap has {values.size} values for {abscissae.size} contact nodes; give "
+                         f"one number, one per node, or a function of x.")
+    if not np.isfinite(values).all() or (values < 0.0).any():
+        raise InputError(f"gap = {values.min() if values.size else values} must be finite and "
+                         f"zero or above.")
+    return tuple(values.tolist()) if values.ndim else float(values)

@@ -1,0 +1,102 @@
+"""Where a motion leaves what the model holds for: small displacements, shallow penetration.
+
+A wrong unit, or a load that nothing carries, shows in these first.
+"""
+
+import warnings
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import ModelWarning
+from fecontact.laws.base import NormalLaw
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import PENETRATION
+
+Array = NDArray[np.float64]
+
+# Penetration of a rough surface, in roughness heights, beyond which a wrong unit or stiffness is
+# likelier than a wish: its asperities are long crushed.
+DEEPEST = 100.0
+
+# Output times that are looked at together.
+_BLOCK = 4096
+
+
+def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple[str, ...]:
+    """Sentences on where states leave what the model holds for; none if they do not.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        What moves.
+    times : (N,) array
+        [s].
+    states : (N, 2 m + n s) array
+        y = [q, q', z].
+
+    Notes
+    -----
+    Displacements of B, C, the contact nodes and further points are compared with the extent of
+    these points and of the mesh, if there is one. How far all of them have moved along the ground
+    together does not count: a body may slide as far as it likes.
+    """
+    found = (_too_far(system, states), _too_deep(system, times, states))
+    return tuple(sentence for sentence in found if sentence)
+
+
+def warn_of_limits(sentences: Iterable[str], what: str) -> None:
+    """Give a ModelWarning for each of the sentences; ``what`` begins them: 'In this run'."""
+    for sentence in sentences:
+        warnings.warn(f"{what} {sentence}", ModelWarning, stacklevel=3)
+
+
+def _too_far(system: ContactSystem, states: Array) -> str | None:
+    basis = system.basis
+    used = np.abs(basis.T).any(axis=(1, 2))
+    places = basis.positions[used]
+    if basis.field is not None:
+        places = np.vstack([places, basis.field.nodes])
+    size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    # Masses without places have no size to compare with.
+    if size == 0.0:
+        return None
+    rows = basis.T[used, :2].reshape(-1, basis.modes).T
+    farthest = 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for first in range(0, len(states), _BLOCK):
+            moved = states[first : first + _BLOCK, : basis.modes] @ rows
+            moved = moved.reshape(len(moved), -1, 2)
+            moved[..., 0] -= moved[..., 0].mean(axis=1, keepdims=True)
+            farthest = max(farthest, float(np.hypot(moved[..., 0], moved[..., 1]).max()))
+    if farthest <= size:
+        return None
+    return (f"points of the body move by {farthest:.2g} m, more than its own size of {size:.2g} m; "
+            f"displacements have to stay small, so look whether something holds the body and "
+            f"whether the units of loads and stiffnesses are right.")
+
+
+def _too_deep(system: ContactSystem, times: Array, states: Array) -> str | None:
+    rough = [(nodes, law.roughness_height) for nodes, _, law in system.law_groups("normal")
+             if isinstance(law, NormalLaw) and hasattr(law, "roughness_height")]
+    if not rough:
+        return None
+    penetration = np.zeros(system.basis.contact_nodes)
+    for first in range(0, len(times), _BLOCK):
+        part = slice(first, first + _BLOCK)
+        history = system.contact_history(times[part], states[part])
+        penetration = np.maximum(penetration, history[:, :, PENETRATION].max(axis=0))
+    worst, node, worst_height = 0.0, 0, 1.0
+    for nodes, height in rough:
+        heights = np.broadcast_to(np.asarray(height, dtype=float), penetration[nodes].shape)
+        relative = penetration[nodes] / heights
+        if relative.max() > worst:
+            k = int(np.argmax(relative))
+            worst, node, worst_height = float(relative[k]), nodes.start + k, float(heights[k])
+    if worst <= DEEPEST:
+        return None
+    return (f"contact node {node} is {worst * worst_height:.2g} m deep in the ground, "
+            f"{worst:.2g} times its roughness height of {worst_height:.2g} m; above {DEEPEST:g} "
+            f"times the asperities are crushed, so look whether load, stiffness and units are "
+            f"right.")

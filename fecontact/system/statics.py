@@ -1,0 +1,324 @@
+"""Equilibria: a body resting on the ground, and steady sliding."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError
+from fecontact.laws.signals.harmonic import Constant
+from fecontact.laws.signatures import friction_law, signal
+from fecontact.system import kernels as kernels
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.jacobian import jacobian
+from fecontact.system.model_limits import limits_exceeded, warn_of_limits
+from fecontact.system.steady_memory import settled
+
+Array = NDArray[np.float64]
+
+# Part of the load that may be out of balance, however large the rounding of other forces is.
+_UNBALANCED = 1e-6
+
+
+@friction_law
+def _frictionless(v, F, p):  # type: ignore[no-untyped-def]
+    return 0.0, 0.0, 0.0
+
+
+@signal
+def _still(t, p):  # type: ignore[no-untyped-def]
+    return p[0], 0.0
+
+
+def static_equilibrium(
+    system: ContactSystem, *, friction: bool = False, time: float = 0.0
+) -> Array:
+    """Modal coordinates q (m,) of an equilibrium under the constant load.
+
+    Solves ``w^2 q = T^T f`` with the drive and the loads at their means, by Newton's method, with
+    continuation in the load where Newton's method alone does not get there.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Its ground is flat for steady sliding.
+    friction : bool
+        With friction, steady sliding: x' = 0 and slip velocity -V at every node; needs flat
+        ground. Without, the body at rest on the ground as it stands at ``time``.
+    time : float
+        Moment at which the ground is taken as it stands and moves [s].
+
+    Raises
+    ------
+    AnalysisError
+        If there is no equilibrium: it names the direction in which nothing holds the body, or
+        says that the load lifts or tips it; and for steady sliding on wavy ground.
+
+    Warns
+    -----
+    ModelWarning
+        If the body moves by more than its own size, or is pressed into the ground by more than a
+        hundred times the height of its roughness.
+    """
+    require_kind("static_equilibrium", ContactSystem, system=system)
+    q = equilibrium(system, friction, time)
+    state = np.concatenate([q, np.zeros(system.size - len(q))])
+    warn_of_limits(limits_exceeded(system, np.array([time]), state[None]), "In equilibrium")
+    return q
+
+
+def equilibrium(system: ContactSystem, friction: bool, time: float) -> Array:
+    """As :func:`static_equilibrium`, for callers that look at the limits of the model later."""
+    ground = system.ground
+    if friction and ground.wavy:
+        raise AnalysisError("There is no steady sliding on wavy ground; start from rest or "
+                            "flatten the ground.")
+    if friction and ground.friction_scale_kernel is not None:
+        raise AnalysisError("There is no steady sliding on ground whose friction varies along it "
+                            "(ground.friction_variation); start from rest.")
+    arrays = _at_mean(system)
+    if not friction:
+        arrays = arrays._replace(
+            friction=np.full_like(arrays.friction, _frictionless.address),
+            memory=np.zeros_like(arrays.memory),
+            ground_motion=_still.address,
+            ground_motion_parameters=np.array([ground.travel(time)], dtype=float),
+        )
+    problem = _Balance(arrays, time, system.penetration_scale)
+    origin = np.zeros(len(arrays.constant_load))
+    if not problem.force(origin, 1.0).any():
+        return origin
+    solution = problem.solve(problem.guess(1.0), 1.0)
+    if solution is None:
+        solution = problem.solve(problem.descend(problem.guess(1.0), 1.0), 1.0)
+    if solution is None:
+        solution = _continued(problem)
+    if solution is None:
+        raise AnalysisError(_reason(system, problem, friction))
+    return solution
+
+
+class _Balance:
+    """Out-of-balance modal forces of a resting or steadily sliding body."""
+
+    def __init__(self, arrays: kernels.SystemArrays, time: float, scale: float) -> None:
+        self.arrays = arrays
+        self.load = arrays.constant_load
+        self._time = time
+        n, m = arrays.Tx.shape
+        states = int(arrays.memory.max())
+        size = 2 * m + n * states
+        self._rate, self._matrix = np.empty(size), np.empty((size, size))
+        self._state = np.zeros(size)
+        # Stiffness of a face that is pressed well in, and its force on undisplaced nodes.
+        far = np.full(n, max(10.0 * scale, 2.0 * self._penetration(scale)))
+        values, self.face_stiffness = self.normal(far)
+        undisplaced = np.empty((n, kernels.STATE_COLUMNS))
+        kernels.contact_state(time, self._state, arrays, undisplaced)
+        self.face_force = values + self.face_stiffness * (
+            undisplaced[:, kernels.PENETRATION] - far)
+        tangential = (arrays.Tx**2).T @ self.face_stiffness
+        normal = (arrays.Ty**2).T @ self.face_stiffness
+        diagonal = np.diag(arrays.stiffness)
+        self.scale = diagonal + tangential + normal
+        self.scale[self.scale == 0.0] = 1.0
+
+    def _penetration(self, scale: float) -> float:
+        """Penetration of the whole face at which it carries the load, at most 1e6 scales."""
+        # In the direction of the contact nodes' mean rise, the load does this work.
+        rise = self.arrays.Ty.mean(axis=0)
+        wanted = abs(float(self.load @ rise)) / max(float(rise @ rise), 1e-300)
+        depth = scale
+        while depth < 1e6 * scale and self.normal(np.full(len(self.arrays.gap), depth))[0].sum() < (
+                wanted):
+            depth *= 2.0
+        return depth
+
+    def normal(self, penetration: Array) -> tuple[Array, Array]:
+        """Normal forces (n,) and their slopes at rest."""
+        force, slope = np.empty(len(penetration)), np.empty(len(penetration))
+        kernels.normal_values(self.arrays.normal, penetration, np.zeros(len(penetration)),
+                              self.arrays.normal_parameters, force, slope)
+        return force, slope
+
+    def force(self, q: Array, load: float) -> Array:
+        """Out-of-balance force (m,) under a part of the load."""
+        m = len(q)
+        part = self.arrays._replace(constant_load=load * self.load)
+        kernels.right_hand_side(self._time, self._settled(q), part, self._rate)
+        return self._rate[m : 2 * m].copy()
+
+    def gradient(self, q: Array) -> Array:
+        """Derivative (m, m) of the force."""
+        m = len(q)
+        jacobian(self._time, self._settled(q), self.arrays, self._matrix)
+        gradient = self._matrix[m : 2 * m, :m].copy()
+        if len(self._matrix) > 2 * m:
+            # The internal variables follow the displacements: z' = 0.
+            follow = np.linalg.pinv(self._matrix[2 * m :, 2 * m :]) @ self._matrix[2 * m :, :m]
+            gradient -= self._matrix[m : 2 * m, 2 * m :] @ follow
+        return gradient
+
+    def _settled(self, q: Array) -> Array:
+        self._state[: len(q)] = q
+        self._state = settled(self._time, self._state, self.arrays)
+        return self._state
+
+    def guess(self, load: float) -> Array:
+        """Equilibrium of a face that is all in contact, and that could also pull."""
+        arrays = self.arrays
+        stiffness = arrays.stiffness + (arrays.Ty.T * self.face_stiffness) @ arrays.Ty
+        force = load * self.load + arrays.Ty.T @ self.face_force
+        return self._solve(stiffness, force, 1e-10)
+
+    def solve(self, q: Array, load: float) -> Array | None:
+        """Newton's method with a shift that grows when a step does not help; None if it fails."""
+        shift = 1e-10
+        force = self.force(q, load)
+        best = self._size(force)
+        settled = 0
+        for _ in range(200):
+            gradient = self.gradient(q)
+            for _ in range(40):
+                step = self._solve(-gradient, force, shift)
+                trial = q + step
+                trial_force = self.force(trial, load)
+                size = self._size(trial_force)
+                if size < best or (shift <= 1e-10 and size <= self._noise(trial, load)):
+                    break
+                shift = max(10.0 * shift, 1e-8)
+                if shift > 1e8:
+                    return q if best <= self._noise(q, load) else None
+            q, force, best = trial, trial_force, size
+            shift = max(0.1 * shift, 1e-10)
+            if best <= self._noise(q, load):
+                settled += 1
+                if settled == 3:
+                    return q
+        return None
+
+    def descend(self, q: Array, load: float) -> Array:
+        """Newton steps, each as long as the body is pushed along it.
+
+        Without friction there is a convex potential, which falls to its minimum this way, however
+        far the ground is and whichever nodes come into contact. Ends where it does not go on.
+        """
+        for _ in range(200):
+            force = self.force(q, load)
+            step = self._solve(self._upright(q), force, 1e-10)
+            low, high = 0.0, 1.0
+            if force @ step <= 0.0 or self._size(force) <= self._noise(q, load):
+                return q
+            while self.force(q + high * step, load) @ step < 0.0:
+                low, high = (0.0, 0.1 * high) if low == 0.0 else (low, high)
+                if high < 1e-14:
+                    return q
+                if self.force(q + high * step, load) @ step >= 0.0:
+                    low, high = high, 10.0 * high
+                    break
+            if low > 0.0:
+                for _ in range(30):
+                    middle = 0.5 * (low + high)
+                    pushed = self.force(q + middle * step, load) @ step >= 0.0
+                    low, high = (middle, high) if pushed else (low, middle)
+                high = low
+            q = q + high * step
+        return q
+
+    def _upright(self, q: Array) -> Array:
+        """Stiffness (m, m) at q, symmetric: of ground that is level under each node."""
+        arrays = self.arrays
+        self._state[: len(q)] = q
+        state = np.empty((len(arrays.gap), kernels.STATE_COLUMNS))
+        kernels.contact_state(self._time, self._state, arrays, state)
+        slope = self.normal(state[:, kernels.PENETRATION].copy())[1]
+        return np.asarray(arrays.stiffness + (arrays.Ty.T * slope) @ arrays.Ty)
+
+    def loose(self, q: Array) -> Array | None:
+        """Direction (m,) in which the body is pushed at q and nothing holds it, if there is one."""
+        root = np.sqrt(self.scale)
+        scaled = -self.gradient(q) / np.outer(root, root)
+        _, values, rows = np.linalg.svd(scaled)
+        loose = rows[values < 1e-9]
+        force = self.force(q, 1.0) / root
+        push = loose.T @ (loose @ force)
+        if np.linalg.norm(push) <= 1e-9 * np.linalg.norm(force):
+            return None
+        return np.asarray(push / root)
+
+    def _solve(self, stiffness: Array, force: Array, shift: float) -> Array:
+        return np.asarray(np.linalg.solve(stiffness + np.diag(shift * self.scale), force))
+
+    def _size(self, force: Array) -> float:
+        return float(np.linalg.norm(force / np.sqrt(self.scale)))
+
+    def _noise(self, q: Array, load: float) -> float:
+        """Size of the out-of-balance force that counts as rounding.
+
+        A body that runs away under a load that nothing balances has larger and larger forces with
+        their rounding; the load itself may not disappear in it.
+        """
+        arrays = self.arrays
+        terms = np.abs(arrays.stiffness) @ np.abs(q) + np.abs(load * self.load)
+        contact = self.force(q, load) - load * self.load + arrays.stiffness @ q
+        rounding = 1e-11 * self._size(terms + np.abs(contact))
+        applied = self._size(load * self.load)
+        return min(rounding, _UNBALANCED * applied) if applied > 0.0 else rounding
+
+
+def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
+    """The system's arrays with the means of drive and loads as constant loads.
+
+    Of what is given in time only what is constant has a mean to speak of.
+    """
+    arrays = system.arrays
+    load = arrays.constant_load.copy()
+    given = [*zip(arrays.drive_shapes, system.drive.motions, strict=True),
+             *zip(arrays.load_shapes, (force.signal for force in system.load.forces), strict=True)]
+    for shape, source in given:
+        if isinstance(source, Constant):
+            load += source.value * shape
+    return arrays._replace(
+        constant_load=load, drive_shapes=np.zeros_like(arrays.drive_shapes),
+        load_shapes=np.zeros_like(arrays.load_shapes))
+
+
+def _continued(problem: _Balance) -> Array | None:
+    """Follow the equilibrium from a small load up, halving the step in load where it fails."""
+    load, step = 1e-3, 0.1
+    q = problem.solve(problem.guess(load), load)
+    if q is None:
+        return None
+    while load < 1.0:
+        trial = min(1.0, load + step)
+        found = problem.solve(q, trial)
+        if found is None:
+            step *= 0.5
+            if step < 1e-4:
+                return None
+            continue
+        q, load, step = found, trial, 2.0 * step
+    return q
+
+
+def _reason(system: ContactSystem, problem: _Balance, friction: bool) -> str:
+    kind = "steady sliding" if friction else "static equilibrium"
+    direction = problem.loose(problem.guess(1.0))
+    if direction is not None:
+        return (f"There is no {kind}: nothing holds the body against "
+                f"{_named(system, direction)}; give it a spring at B (drive.stiffness_x, "
+                f"drive.stiffness_y) or a support.")
+    return (f"There is no {kind}: under load.normal = {system.load.normal:g} N the body lifts off "
+            f"or tips over; check the sign and place of the load, and the length of the contact.")
+
+
+def _named(system: ContactSystem, direction: Array) -> str:
+    basis = system.basis
+    x, y, turn = np.abs(basis.contact_T @ direction).max(axis=0)
+    size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
+    if turn * size > 0.1 * max(x, y):
+        return "a rotation"
+    if x > 10.0 * y:
+        return "a translation along the ground (x)"
+    if y > 10.0 * x:
+        return "a translation away from the ground (y)"
+    return "a translation"

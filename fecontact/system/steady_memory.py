@@ -1,0 +1,47 @@
+"""Internal variables of friction with memory at rest in steady sliding."""
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from fecontact.core.compiled import f8, kernel, vector
+from fecontact.laws.signatures import signal_at
+from fecontact.system.kernels import SYSTEM, SystemArrays, memory_of, node_forces, node_motion
+
+Array = NDArray[np.float64]
+
+
+@kernel(types.void(f8, vector, SYSTEM))
+def _settle(t, y, s):  # type: ignore[no-untyped-def]
+    """Move the z of each node to where z' = 0, by implicit Euler steps that grow without end."""
+    n = len(s.Tx)
+    states = s.memory.max()
+    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    for j in range(n):
+        count = s.memory[j]
+        if count == 0:
+            continue
+        x, height, x_rate, height_rate = node_motion(j, y, s)
+        z = memory_of(j, y, s)
+        step = 1e-9
+        while step < 1e12:
+            node_forces(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates)
+            matrix = np.empty((count, count))
+            for k in range(count):
+                for other in range(count):
+                    matrix[k, other] = -step * rates[k, 3 + other]
+                matrix[k, k] += 1.0
+            z += np.linalg.solve(matrix, step * rates[:count, 0].copy())
+            step *= 2.0
+
+
+def settled(t: float, y: Array, arrays: SystemArrays) -> Array:
+    """The state y with the internal variables that belong to its slip velocities and forces.
+
+    Where nothing slips they stay as they are.
+    """
+    state = np.array(y, dtype=float)
+    if arrays.memory.any():
+        _settle(t, state, arrays)
+    return state
