@@ -39,7 +39,7 @@ from fecontact import (
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.branches import orbits_beyond, orbits_from_hopf
-from fecontact.bifurcation.orbits.orbit_output import amplitude, orbit_history
+from fecontact.bifurcation.orbits.samples import amplitude, orbit_history
 from fecontact.output.plots.basins import plot_basins
 from fecontact.output.plots.bifurcation_diagram import plot_branches
 from fecontact.output.plots.style import COLOURS, new_figure, save_figure

@@ -15,13 +15,16 @@ from .bifurcation.equilibria.stability_map import stability_map
 from .bifurcation.fields.contact_field import contact_field
 from .bifurcation.fields.function_field import vector_field
 from .bifurcation.fields.vector_field import VectorField
-from .bifurcation.orbits.branches import orbits_beyond, orbits_from_hopf, orbits_from_motion
+from .bifurcation.orbits.branches import (
+    orbits_beyond,
+    orbits_by_shooting,
+    orbits_from_hopf,
+    orbits_from_motion,
+)
 from .bifurcation.orbits.codim2 import orbit_curve
 from .bifurcation.orbits.from_run import SettledMotion, settled_motion
-from .bifurcation.orbits.orbit_output import amplitude, orbit_history, quantity_range
 from .bifurcation.orbits.period_doubling import doubled_by_shooting, hopf_orbits_by_shooting
-from .bifurcation.orbits.samples import motion_of, observe
-from .bifurcation.orbits.shooting_branch import orbits_by_shooting
+from .bifurcation.orbits.samples import amplitude, motion_of, observe, orbit_history, quantity_range
 from .core.errors import FecontactError, InputError, ModelWarning
 from .fem.elastic_body import ElasticBody, Material
 from .fem.generate import Beam, Block, Pendulum, generate
@@ -39,11 +42,12 @@ from .laws.base import FrictionLaw, NormalLaw, PerNode
 from .laws.check import check_law
 from .laws.excitation import Drive, Load, PointLoad
 from .laws.friction.bristle import BoucWenFriction, DahlFriction, LuGreFriction
-from .laws.friction.friction_minimum import CubicFriction, GalvanettoFriction
 from .laws.friction.maxwell_slip import IwanFriction, JenkinsFriction
 from .laws.friction.stribeck import (
     ConstantFriction,
+    CubicFriction,
     ExponentialFriction,
+    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,
@@ -52,7 +56,7 @@ from .laws.ground.fourier_series import FourierSeries
 from .laws.ground.ground import Ground
 from .laws.ground.measured_profile import Trace
 from .laws.ground.motion import HarmonicSpeed, SpeedRamp
-from .laws.ground.profiles import Flat, Sine
+from .laws.ground.profile import Flat, Sine
 from .laws.ground.random_roughness import RandomRoughness
 from .laws.normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .laws.normal.measured_surface import MeasuredSurface

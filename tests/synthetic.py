@@ -7,8 +7,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.friction.stribeck import ExponentialFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.field import Field
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.modal_basis import Field, ModalBasis
 from fecontact.system.contact_system import ContactSystem
 
 YOUNGS_MODULUS = 2.1e11

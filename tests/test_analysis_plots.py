@@ -13,7 +13,7 @@ from fecontact.core.errors import InputError
 from fecontact.integrate.simulate import simulate
 from fecontact.laws.excitation import Drive
 from fecontact.output.files.case import write_case
-from fecontact.output.plots import analysis_figures
+from fecontact.output.plots import analysis
 
 
 @pytest.fixture(scope="module")
@@ -48,17 +48,17 @@ def test_spectrum_shows_peaks_in_suitable_units(trajectory):
     q[:, 0] = 1e-5 * np.sin(2.0 * np.pi * 2000.0 * trajectory.time)
     q[:, 1:] = 0.0
     swinging = replace(trajectory, modal_coordinates=q)
-    panel = analysis_figures.spectrum_figure(swinging, "displacement", 1, "x").axes[0]
+    panel = analysis.spectrum_figure(swinging, "displacement", 1, "x").axes[0]
     assert panel.get_ylabel() == "amplitude [µm]"
     assert panel.get_title() == "displacement x of contact node 1"
     assert panel.lines[0].get_ydata().max() == pytest.approx(10.0, rel=1e-2)
     assert [float(text.get_text()) for text in panel.texts] == pytest.approx([2000.0], rel=1e-3)
-    density = analysis_figures.spectrum_figure(trajectory, density=True)
+    density = analysis.spectrum_figure(trajectory, density=True)
     assert density.axes[0].get_ylabel() == "density [(m/s)²/Hz]"
 
 
 def test_friction_work_per_length(trajectory):
-    upper, lower = analysis_figures.friction_work_figure(trajectory).axes
+    upper, lower = analysis.friction_work_figure(trajectory).axes
     length = trajectory.system.basis.tributary
     heights = np.array([bar.get_height() for bar in upper.patches])
     scale = {"mJ/m": 1e-3, "µJ/m": 1e-6, "J/m": 1.0}[upper.get_ylabel().split("[")[1][:-1]]
@@ -70,7 +70,7 @@ def test_friction_work_per_length(trajectory):
 
 
 def test_poincare_section_takes_one_point_a_period(trajectory):
-    figure = analysis_figures.poincare_figure(trajectory, "B", "x", period=0.005)
+    figure = analysis.poincare_figure(trajectory, "B", "x", period=0.005)
     points = figure.axes[0].lines[1]
     times = np.arange(5) * 500
     x = trajectory.displacement("B")[times, 0]
@@ -83,7 +83,7 @@ def test_response_figure_names_its_curves(trajectory):
     f = np.linspace(10.0, 3000.0, 50)
     one = frequency_response(body, f, [("B", "x")])
     two = frequency_response(body, f, [("B", "x")], [("C", "y"), (2, "y")])
-    figure = analysis_figures.response_figure([one, two], ["drive", "other"])
+    figure = analysis.response_figure([one, two], ["drive", "other"])
     names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert names == ["drive", "other, C y by B x", "other, contact node 2 y by B x"]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), np.abs(one.values[:, 0, 0]))

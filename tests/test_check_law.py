@@ -10,8 +10,8 @@ import pytest
 import fecontact as fc
 from fecontact.cli import execute
 from fecontact.laws.base import FrictionLaw, NormalLaw
-from fecontact.laws.cycles import cycle_work
 from fecontact.laws.registry import law_names
+from fecontact.laws.sampling import cycle_work
 
 NEEDED = {
     fc.RoughSurface: (1e6, 1e-5, 3.0), fc.ParabolicSurface: (1e6, 1e-5, 3.0),

@@ -171,7 +171,7 @@ def test_too_many_elements_name_an_element_size_that_works() -> None:
         generate(shape)
     enough = float(str(caught.value).split("at least ")[1].split()[0])
     from fecontact.fem.generate import MAX_CELLS, _count_cells
-    from fecontact.fem.grids import grid_of
+    from fecontact.fem.shapes import grid_of
 
     assert 0.2 * MAX_CELLS < _count_cells(shape, grid_of(shape), enough) <= MAX_CELLS
     with pytest.raises(InputError, match="more than 2000000"):

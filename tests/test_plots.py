@@ -8,15 +8,15 @@ from synthetic import basis, run
 from fecontact import basis_from_matrices
 from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Energies, Trajectory
-from fecontact.output.plots import figures
+from fecontact.output.plots import run as figures
 from fecontact.output.plots import run as plots
-from fecontact.output.plots.figures import (
+from fecontact.output.plots.modes import modes_figure
+from fecontact.output.plots.run import (
     contact_map_figure,
     energies_figure,
     history_figure,
     phase_figure,
 )
-from fecontact.output.plots.modes import modes_figure
 from fecontact.system import kernels as kernels
 
 

@@ -15,7 +15,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.linear import LinearContact
 from fecontact.laws.normal.rough_surface import RoughSurface
 from fecontact.laws.signals.harmonic import Harmonic
-from fecontact.output.plots.analysis_figures import response_figure
+from fecontact.output.plots.analysis import response_figure
 from fecontact.reduction.from_matrices import basis_from_matrices
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.system.contact_system import ContactSystem

@@ -13,9 +13,9 @@ from fecontact.core.errors import InputError
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.eigenmodes import FreeSystem, eigenfrequencies_hz
+from fecontact.reduction.factorisation import SymmetricFactors
 from fecontact.reduction.report import BasisReport
 from fecontact.reduction.residual_vectors import Flexibility
-from fecontact.reduction.substitution import SymmetricFactors
 
 modal_basis = partial(fecontact.modal_basis, contact="bottom")
 

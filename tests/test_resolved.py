@@ -10,8 +10,8 @@ from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
 from fecontact.laws.normal.linear import LinearContact
 from fecontact.output.files.case import read_case, write_case
-from fecontact.output.plots.analysis_figures import friction_work_figure
-from fecontact.output.plots.figures import contact_map_figure, history_figure, phase_figure, thinned
+from fecontact.output.plots.analysis import friction_work_figure
+from fecontact.output.plots.run import contact_map_figure, history_figure, phase_figure, thinned
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 0.3
 

@@ -18,8 +18,8 @@ from fecontact.output.files import pvd
 from fecontact.output.files.case import read_case, write_case
 from fecontact.output.files.frames import frame_indices, von_mises
 from fecontact.output.files.pvd import export_pvd
-from fecontact.reduction.field import Field
 from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact.reduction.modal_basis import Field
 
 LENGTH, HEIGHT = 0.2, 0.02
 

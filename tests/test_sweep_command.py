@@ -15,7 +15,7 @@ from fecontact.cli import execute
 from fecontact.cli.commands import sweep as command
 from fecontact.cli.sweep_progress import clock, note
 from fecontact.core.errors import InputError
-from fecontact.sweep import executors, sweep_figures
+from fecontact.sweep import executors, plots
 from fecontact.sweep.statistics import Estimate, SobolIndices
 
 SWEEP = """
@@ -166,7 +166,7 @@ def grid_table():
 
 
 def test_a_map_shows_each_case_in_its_place():
-    figure = sweep_figures.sweep_figure(grid_table(), "friction_power")
+    figure = plots.sweep_figure(grid_table(), "friction_power")
     axes = figure.axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == (
         "ground speed [m/s]", "load normal [N]")
@@ -187,12 +187,12 @@ def test_curves_scatter_and_names_on_axes():
     few = SweepTable(
         {"friction.law": ("a", "b") * 5, "ground.speed": tuple(np.repeat(np.arange(5.0), 2))},
         {"amplitude_x": np.arange(10.0)}, [f"{k}" for k in range(10)], [""] * 10, shape=(5, 2))
-    figure = sweep_figures.sweep_figure(few, "amplitude_x")
+    figure = plots.sweep_figure(few, "amplitude_x")
     curves = [line for line in figure.axes[0].lines if len(line.get_xdata()) == 5]
     assert [curve.get_label() for curve in curves] == ["a", "b"]
     assert curves[1].get_ydata().tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
     loose = SweepTable(grid.parameters, grid.values, grid.keys, grid.reasons)
-    figure = sweep_figures.sweep_figure(loose, "friction_power")
+    figure = plots.sweep_figure(loose, "friction_power")
     assert [axes.get_xlabel() for axes in figure.axes] == [
         "ground speed [m/s]", "load normal [N]", "cases"]
     assert figure.axes[2].patches

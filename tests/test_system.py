@@ -15,8 +15,8 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.rough_surface import RoughSurface
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import kernels as kernels
-from fecontact.system.contact_energy import POWERS, powers
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import POWERS, powers
 
 R = 10e-6
 

@@ -176,9 +176,8 @@ def _orbits(
     field: ContactField, wanted: "BranchSettings", initial: Any, settings: Settings
 ) -> Branch:
     """The orbit on which a run settles, over the parameter."""
-    from fecontact.bifurcation.orbits.branches import orbits_from_motion
+    from fecontact.bifurcation.orbits.branches import orbits_by_shooting, orbits_from_motion
     from fecontact.bifurcation.orbits.from_run import settled_motion
-    from fecontact.bifurcation.orbits.shooting_branch import orbits_by_shooting
 
     low, high = wanted.bounds
     motion = settled_motion(field.system(), initial=initial, transient=wanted.transient,

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from fecontact.cli.console import loading, progress_bar
 from fecontact.cli.templates import TEMPLATES, template
+from fecontact.core.atomic_write import output_folder, write_text
 from fecontact.core.errors import MissingLibraryError
-from fecontact.core.folders import output_folder, write_text
 
 SHOWN = ("beam", "pendulum")
 

@@ -7,8 +7,7 @@ from typing import Any
 from cyclopts import CycloptsError
 
 from fecontact.cli.app import app
-from fecontact.cli.console import INTERRUPTED, ending_signals, interrupted_code
-from fecontact.cli.printing import complain
+from fecontact.cli.console import INTERRUPTED, complain, ending_signals, interrupted_code
 from fecontact.core.errors import FecontactError, ModelWarning
 
 

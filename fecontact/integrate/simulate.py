@@ -16,9 +16,8 @@ from fecontact.core.memory import require_memory
 from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.system.contact_energy import POWERS
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import PENETRATION
+from fecontact.system.kernels import PENETRATION, POWERS
 from fecontact.system.model_limits import warn_of_limits
 
 Array = NDArray[np.float64]

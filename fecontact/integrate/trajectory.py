@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fecontact.core.errors import InputError
 from fecontact.integrate.events import Events
 from fecontact.system import kernels as kernels
-from fecontact.system.contact_energy import POWERS
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import POWERS
 
 Array = NDArray[np.float64]
 
@@ -124,7 +124,7 @@ class Trajectory:
     modal_coordinates, modal_velocities : (N, m) arrays
         q and q'.
     work : (N, 8) array
-        Integrals of the powers :data:`fecontact.system.contact_energy.POWERS` from the first time
+        Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
         [J].
     status : Status
         How the run ended.

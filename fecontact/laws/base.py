@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.laws.friction_curve import stick_velocity
-from fecontact.laws.potential import stored_energy
+from fecontact.laws.sampling import stored_energy
 
 PerNode = float | tuple[float, ...]
 

@@ -26,9 +26,10 @@ from fecontact.laws.signals.base import Signal
 def law_names() -> Mapping[type, Mapping[str, type]]:
     """Classes by name, for each kind of law (the base class)."""
     from fecontact.laws.friction import bristle as memory
-    from fecontact.laws.friction import friction_minimum, maxwell_slip
+    from fecontact.laws.friction import maxwell_slip
     from fecontact.laws.friction import stribeck as friction
-    from fecontact.laws.ground import fourier_series, profiles, random_roughness
+    from fecontact.laws.friction import stribeck as friction_minimum
+    from fecontact.laws.ground import fourier_series, profile, random_roughness
     from fecontact.laws.ground import measured_profile as trace
     from fecontact.laws.ground import motion as ground_motion
     from fecontact.laws.normal import linear as normal_stop
@@ -70,8 +71,8 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "bouc-wen": memory.BoucWenFriction,
         },
         Profile: {
-            "flat": profiles.Flat,
-            "sine": profiles.Sine,
+            "flat": profile.Flat,
+            "sine": profile.Sine,
             "fourier-series": fourier_series.FourierSeries,
             "trace": trace.Trace,
             "random-roughness": random_roughness.RandomRoughness,

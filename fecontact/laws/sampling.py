@@ -4,7 +4,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import block, i8, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, i8, kernel, matrix, vector
 from fecontact.laws.signatures import friction_at, memory_at, normal_at
 
 Array = NDArray[np.float64]
@@ -54,3 +54,104 @@ def memory_values(address: int, p: Array, v: Array, F: Array, z: Array) -> Array
 
 def _floats(values: Array) -> Array:
     return np.ascontiguousarray(values, dtype=float)
+
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+
+
+def stored_energy(
+    address: int, penetration: NDArray[np.float64], parameters: NDArray[np.float64], scale: float
+) -> NDArray[np.float64]:
+    """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u.
+
+    Gauss-Legendre quadrature with 16 points in each interval between 0 and 1, 3, 9, 27, ... times
+    the scale; laws with joints elsewhere give a closed form instead.
+
+    Parameters
+    ----------
+    address : int
+        Address of the compiled function of the law.
+    penetration : (..., n) array
+        u of the contact nodes [m]. Below zero the energy is that of the way from 0 down to u.
+    parameters : (n, k) array
+        Parameters of the law at each node.
+    scale : float
+        Penetration over which the law changes its character [m].
+    """
+    given = np.asarray(penetration, dtype=float)
+    rows = np.ascontiguousarray(given.reshape(-1, len(parameters)))
+    energy = np.empty_like(rows)
+    _energy(address, rows, parameters, scale, energy)
+    return energy.reshape(given.shape)
+
+
+@kernel(types.void(i8, matrix, matrix, f8, matrix))
+def _energy(address, penetration, p, scale, out):  # type: ignore[no-untyped-def]
+    """Fill out (N, n) from penetrations (N, n) and parameters (n, k)."""
+    force = normal_at(address)
+    for i in range(penetration.shape[0]):
+        for j in range(penetration.shape[1]):
+            end = penetration[i, j]
+            direction = 1.0 if end > 0.0 else -1.0
+            total, low, high = 0.0, 0.0, scale
+            while low < abs(end):
+                half, mean = 0.5 * (min(high, abs(end)) - low), 0.5 * (min(high, abs(end)) + low)
+                for k in range(len(_POINTS)):
+                    u = direction * (mean + half * _POINTS[k])
+                    total += direction * half * _WEIGHTS[k] * force(u, 0.0, p[j])[0]
+                low, high = high, 3.0 * high
+            out[i, j] = total if end == end else end
+
+
+_CYCLES, _STEPS = 6, 1000
+
+
+@kernel(types.void(i8, vector, f8, vector, vector, f8, vector))
+def _cycles(address, p, F, travel, z, step, work):  # type: ignore[no-untyped-def]
+    """Fill work with R v dt of every step: z by implicit Euler, forces at the middle of it."""
+    s = len(z)
+    force, rates = np.empty(3 + s), np.empty((s, 3 + s))
+    A, residual, after = np.empty((s, s)), np.empty(s), np.empty(s)
+    for k in range(len(work)):
+        moved = travel[k + 1] - travel[k]
+        v = moved / step
+        after[:] = z
+        for _ in range(30):
+            memory_at(address)(v, F, after, p, force, rates)
+            for i in range(s):
+                residual[i] = after[i] - z[i] - step * rates[i, 0]
+                for j in range(s):
+                    A[i, j] = -step * rates[i, 3 + j]
+                A[i, i] += 1.0
+            change = np.linalg.solve(A, residual)
+            largest = 0.0
+            for i in range(s):
+                after[i] -= change[i]
+                largest = max(largest, abs(change[i]) / (abs(after[i]) + 1e-300))
+            if largest < 1e-10:
+                break
+        for i in range(s):
+            residual[i] = 0.5 * (z[i] + after[i])
+        memory_at(address)(v, F, residual, p, force, rates)
+        work[k] = force[0] * moved
+        z[:] = after
+
+
+def cycle_work(
+    address: int, memory: int, p: NDArray[np.float64], normal_force: float, speed: float,
+    reach: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Work (6,) of friction in each of six cycles of slip from z = 0 [J], and that of its size.
+
+    The cycles are of two harmonics with the largest velocity ``speed`` [m/s]; the first one
+    has the amplitude ``reach`` [m]. Passive friction never gives off more than it has taken.
+    """
+    t = np.linspace(0.0, _CYCLES, _CYCLES * _STEPS + 1)
+    travel = -(np.cos(2.0 * np.pi * t) + 0.4 * np.cos(6.0 * np.pi * t + 1.0))
+    rate = np.max(np.abs(np.diff(travel))) * _STEPS
+    period = reach * rate / speed
+    work = np.empty(len(t) - 1)
+    _cycles(address, p, normal_force, travel * reach,
+            np.zeros(memory), period / _STEPS, work)
+    cycles = work.reshape(_CYCLES, _STEPS)
+    return cycles.sum(axis=1), np.abs(cycles).sum(axis=1)

@@ -1,11 +1,16 @@
 """Factors of a sparse symmetric positive definite matrix: CHOLMOD where installed, else SuperLU."""
 
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
+from fecontact.core.compiled import kernel, matrix, vector
 from fecontact.core.errors import AnalysisError
 
 Array = NDArray[np.float64]
@@ -87,3 +92,102 @@ def factorised(matrix: Any) -> Factors:
     except CholmodNotPositiveDefiniteError:
         raise AnalysisError(trouble) from None
     return CholmodFactors(factors)
+
+
+_index = types.Array(types.int32, 1, "C")
+_flags = types.Array(types.boolean, 1, "C")
+
+# Columns treated at once: enough to vectorise, few enough for the cache.
+_BLOCK = 32
+
+
+@kernel(types.void(_index, _index, vector, matrix, _flags), nogil=True)
+def _forward(indptr, indices, data, x, active):  # type: ignore[no-untyped-def]
+    """Solve L x = b in place, L unit lower triangular by columns; zero rows are passed over."""
+    n, width = x.shape
+    for j in range(n):
+        if active[j]:
+            for p in range(indptr[j], indptr[j + 1]):
+                i = indices[p]
+                if i != j:
+                    active[i] = True
+                    entry = data[p]
+                    for c in range(width):
+                        x[i, c] -= entry * x[j, c]
+
+
+@kernel(types.void(_index, _index, vector, matrix), nogil=True)
+def _backward(indptr, indices, data, x):  # type: ignore[no-untyped-def]
+    """Solve L^T x = b in place."""
+    n, width = x.shape
+    for j in range(n - 1, -1, -1):
+        for p in range(indptr[j], indptr[j + 1]):
+            i = indices[p]
+            if i != j:
+                entry = data[p]
+                for c in range(width):
+                    x[j, c] -= entry * x[i, c]
+
+
+class SymmetricFactors:
+    """Substitutions with the factors ``A = P^T L D L^T P`` of a positive definite matrix.
+
+    The forward substitution of sparse right-hand sides touches only the rows that they reach,
+    a small part for loads on a boundary. It alone gives ``W A^-1 W^T`` for all of them; the
+    backward substitution is done for the few combinations that are wanted in full.
+    """
+
+    def __init__(self, factors: Factors) -> None:
+        L, diagonal, order = factors.triangle()
+        self.L = (L.indptr.astype(np.int32), L.indices.astype(np.int32),
+                  np.ascontiguousarray(L.data))
+        self.diagonal, self.order = np.asarray(diagonal), order
+
+    def half_solved(self, rows: Any) -> tuple[NDArray[np.int64], Array]:
+        """``D^-1/2 L^-1 P W^T`` of sparse rows W (k, n): the places of its non-zero rows (r,)
+        and these rows (r, k).
+        """
+        size, count = len(self.order), rows.shape[0]
+        columns = rows.tocsr()
+
+        def solved(first: int) -> tuple[NDArray[np.int64], Array]:
+            part = columns[first : first + _BLOCK].tocoo()
+            x = np.zeros((size, part.shape[0]))
+            x[self.order[part.coords[1]], part.coords[0]] = part.data
+            active = np.zeros(size, dtype=bool)
+            active[self.order[part.coords[1]]] = True
+            _forward(*self.L, x, active)
+            reached = np.flatnonzero(active)
+            return reached, x[reached]
+
+        blocks = _in_threads(solved, range(0, count, _BLOCK))
+        places = np.zeros(size, dtype=bool)
+        for reached, _ in blocks:
+            places[reached] = True
+        kept = np.flatnonzero(places)
+        result = np.zeros((len(kept), count))
+        column = 0
+        for reached, block in blocks:
+            result[np.searchsorted(kept, reached), column : column + block.shape[1]] = block
+            column += block.shape[1]
+        return kept, result / np.sqrt(self.diagonal[kept, None])
+
+    def completed(self, places: NDArray[np.int64], half: Array) -> Array:
+        """``A^-1 W^T C`` (n, p) from combinations ``half @ C`` (r, p) of half-solved columns."""
+        scaled = half / np.sqrt(self.diagonal[places, None])
+        result = np.empty((len(self.order), half.shape[1]))
+
+        def solve(first: int) -> None:
+            part = scaled[:, first : first + _BLOCK]
+            x = np.zeros((len(self.order), part.shape[1]))
+            x[places] = part
+            _backward(*self.L, x)
+            result[:, first : first + _BLOCK] = x[self.order]
+
+        _in_threads(solve, range(0, half.shape[1], _BLOCK))
+        return result
+
+
+def _in_threads(work: Callable[[int], Any], items: Iterable[int]) -> list[Any]:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(work, items))

@@ -14,8 +14,7 @@ from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
-from fecontact.reduction.field import Field, Quality
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.modal_basis import Field, ModalBasis, Quality
 from fecontact.reduction.residual_vectors import Flexibility, residual_modes
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs
-from fecontact.reduction.substitution import SymmetricFactors
+from fecontact.reduction.factorisation import SymmetricFactors
 
 Array = NDArray[np.float64]
 

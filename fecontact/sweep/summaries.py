@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.user_code import user_function
 from fecontact.integrate.trajectory import ContactState, Trajectory
-from fecontact.system.contact_energy import POWERS
+from fecontact.system.kernels import POWERS
 
 Point = str | int
 

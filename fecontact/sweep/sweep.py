@@ -228,7 +228,7 @@ def _settings(
 
 @contextlib.contextmanager
 def _folder(folder: Path) -> Iterator[None]:
-    from fecontact.core.folders import output_folder
+    from fecontact.core.atomic_write import output_folder
 
     with output_folder(folder):
         yield

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
-from fecontact.laws.soundness import require_sound
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels

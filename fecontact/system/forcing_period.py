@@ -8,8 +8,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws.ground.fourier_series import FourierSeries
 from fecontact.laws.ground.measured_profile import Trace
-from fecontact.laws.ground.profile import Profile
-from fecontact.laws.ground.profiles import Sine
+from fecontact.laws.ground.profile import Profile, Sine
 from fecontact.laws.ground.random_roughness import RandomRoughness
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics
 from fecontact.system.contact_system import ContactSystem

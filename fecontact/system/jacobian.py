@@ -3,9 +3,23 @@
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, borrowed, f8, kernel, matrix, vector
+from fecontact.core.compiled import block, borrowed, f8, helper, kernel, matrix, vector
 from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import SYSTEM, memory_of, node_gradients, node_motion
+from fecontact.system.kernels import (
+    SYSTEM,
+    body_rates,
+    given_at,
+    memory_of,
+    node_gradients,
+    node_motion,
+    rates_under,
+)
+from fecontact.system.parameter_derivatives import (
+    given_rates,
+    laws_beside,
+    moves,
+    node_rates,
+)
 
 
 @kernel(types.i8(f8, vector, SYSTEM, block, matrix, matrix))
@@ -72,3 +86,124 @@ def jacobian(t, y, s, out):  # type: ignore[no-untyped-def]
         end = 2 * m
         out[m:end, :m] += np.dot(Tx, gradients[0, :count]) + np.dot(Ty, gradients[1, :count])
         out[m:end, m:end] += np.dot(Tx, gradients[2, :count]) + np.dot(Ty, gradients[3, :count])
+
+
+@helper
+def _fill_rates(t, x, s, load, force, rates, f):  # type: ignore[no-untyped-def]
+    t, x, s, f = borrowed(t), borrowed(x), borrowed(s), borrowed(f)
+    load, force, rates = borrowed(load), borrowed(force), borrowed(rates)
+    travel, speed = 0.0, 0.0
+    for c in range(len(t)):
+        if c == 0 or t[c] != t[c - 1]:
+            travel, speed = given_at(t[c], s, load)
+        rates_under(load, travel, speed, x[c], s, force, rates, f[c])
+
+
+@kernel(types.void(vector, matrix, SYSTEM, matrix))
+def batch_rates(t, x, s, f):  # type: ignore[no-untyped-def]
+    """Fill f (N, 2 m + n s) with y' at times t (N,) and states x (N, 2 m + n s)."""
+    states = s.memory.max()
+    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    load = np.empty(s.Tx.shape[1])
+    _fill_rates(t, x, s, load, force, rates, f)
+
+
+@helper
+def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):  # type: ignore[no-untyped-def]
+    # What is made in this call is borrowed too: counting references costs as much as the laws.
+    t, x, s, f, J = borrowed(t), borrowed(x), borrowed(s), borrowed(f), borrowed(J)
+    r, P, laws = borrowed(r), borrowed(P), borrowed(laws)
+    load, load_p, force, room, memory, shifts = borrowed(vectors)
+    rates, room_rates, partial, gradient = borrowed(matrices)
+    n, m = s.Tx.shape
+    states = len(rates)
+    differs = len(P) > 0
+    travel, speed, travel_p, speed_p = 0.0, 0.0, 0.0, 0.0
+    body_moves = differs and (moves(r.stiffness) or moves(r.damping))
+    basis_moves = differs and (moves(r.Tx) or moves(r.Ty))
+    for c in range(len(t)):
+        y, out, A = x[c], f[c], J[c]
+        if c == 0 or t[c] != t[c - 1]:
+            travel, speed = given_at(t[c], s, load)
+            if differs:
+                travel_p, speed_p = given_rates(t[c], s, r, h, laws, load_p)
+        A[:, :] = 0.0
+        body_rates(load, y, s, out)
+        for i in range(m):
+            A[i, m + i] = 1.0
+            for k in range(m):
+                A[m + i, k] = -s.stiffness[i, k]
+                A[m + i, m + k] = -s.damping[i, k]
+        if differs:
+            P[c, :] = 0.0
+            if body_moves:
+                body_rates(load_p, y, r, P[c])
+                P[c, :m] = 0.0
+            else:
+                P[c, m : 2 * m] = load_p
+        for j in range(n):
+            along, height, along_rate, height_rate = node_motion(j, y, s)
+            z = memory_of(j, y, s)
+            F, R = node_gradients(j, along, height, along_rate, height_rate, z,
+                                  travel, speed, s, force, rates, partial)
+            first = 2 * m + j * states
+            for k in range(s.memory[j]):
+                row = first + k
+                out[row] = rates[k, 0]
+                for i in range(m):
+                    tx, ty = s.Tx[j, i], s.Ty[j, i]
+                    A[row, i] = rates[k, 2] * (partial[2, 0] * tx + partial[2, 1] * ty)
+                    A[row, m + i] = rates[k, 1] * tx + rates[k, 2] * (partial[2, 2] * tx
+                                                                      + partial[2, 3] * ty)
+                    A[m + i, row] = -force[3 + k] * tx
+                for other in range(s.memory[j]):
+                    A[row, first + other] = rates[k, 3 + other]
+            if differs:
+                if basis_moves:
+                    shifts[0], shifts[1], shifts[2], shifts[3] = node_motion(j, y, r)
+                else:
+                    shifts[:] = 0.0
+                shifts[0] += r.abscissa[j] - travel_p
+                shifts[1] += r.gap[j]
+                shifts[2] -= speed_p
+                F_p, R_p, slip_p, pressing_p = node_rates(
+                    j, s.abscissa[j] + along - travel, along_rate - speed, height, height_rate, z,
+                    F, shifts, s, r, h, laws, force, partial, room, room_rates, memory)
+                for i in range(m):
+                    P[c, m + i] += s.Ty[j, i] * F_p - s.Tx[j, i] * R_p
+                if basis_moves and F != 0.0:
+                    for i in range(m):
+                        P[c, m + i] += r.Ty[j, i] * F - r.Tx[j, i] * R
+                for k in range(s.memory[j]):
+                    P[c, first + k] = rates[k, 1] * slip_p + rates[k, 2] * pressing_p + memory[k]
+            if F == 0.0:
+                continue
+            for k in range(m):
+                tx, ty = s.Tx[j, k], s.Ty[j, k]
+                for part in range(2):
+                    gradient[0, part * m + k] = (-partial[1, 2 * part] * tx
+                                                 - partial[1, 2 * part + 1] * ty)
+                    gradient[1, part * m + k] = (partial[0, 2 * part] * tx
+                                                 + partial[0, 2 * part + 1] * ty)
+            for i in range(m):
+                tx, ty = s.Tx[j, i], s.Ty[j, i]
+                out[m + i] += ty * F - tx * R
+                for k in range(2 * m):
+                    A[m + i, k] += tx * gradient[0, k] + ty * gradient[1, k]
+
+
+@kernel(types.void(vector, matrix, SYSTEM, SYSTEM, f8, matrix, block, matrix))
+def batch_derivatives(t, x, s, r, h, f, J, P):  # type: ignore[no-untyped-def]
+    """As :func:`batch_rates`, and fill J (N, d, d), d = 2 m + n s, with dy'/dy and P with dy'/dp.
+
+    r holds the derivatives of all arrays to the parameter p, h is the step of differences in it,
+    for laws; P is (N, d), or (0, 0) where no derivative to a parameter is wanted.
+    """
+    m = s.Tx.shape[1]
+    states = s.memory.max()
+    step = h if len(P) > 0 else 0.0
+    _fill_derivatives(t, x, s, r, step, laws_beside(s, r, step),
+                      (np.empty(m), np.empty(m), np.empty(3 + states), np.empty(3 + states),
+                       np.empty(states), np.empty(4)),
+                      (np.empty((states, 3 + states)), np.empty((states, 3 + states)),
+                       np.empty((3, 4)), np.empty((2, 2 * m))), f, J, P)

@@ -244,3 +244,64 @@ def normal_values(addresses, u, v, p, force, slope):  # type: ignore[no-untyped-
     """Fill force and dF/du (k,) of the normal laws of k nodes at their penetrations and rates."""
     for j in range(len(u)):
         force[j], slope[j], _ = normal_at(addresses[j])(u[j], v[j], p[j])
+
+
+# Columns of `powers`: put in by the drive's springs, the ground's lifting, the belt and the loads;
+# lost in the modes, in the dashpots at B, in the contact's damping, by friction.
+POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "contact_damping",
+          "friction")
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, vector))
+def powers(t, y, s, out, friction):  # type: ignore[no-untyped-def]
+    """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
+    n = len(s.Tx)
+    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
+    state = np.empty((n, 6))
+    contact_state(t, y, s, state)
+    body_powers(t, y, s, out)
+    for j in range(n):
+        force, tangential, v, slip = state[j, 0], state[j, 1], state[j, 3], state[j, 4]
+        elastic = normal_at(s.normal[j])(state[j, 2], 0.0, s.normal_parameters[j])[0]
+        out[1] += force * state[j, 5]
+        out[2] -= tangential * speed
+        out[6] += (force - elastic) * v
+        friction[j] = tangential * slip
+        out[7] += friction[j]
+
+
+@helper
+def body_powers(t, y, s, out):  # type: ignore[no-untyped-def]
+    """Fill out (8,) with the powers outside the contact, the others with zero."""
+    m = s.Tx.shape[1]
+    out[:8] = 0.0
+    for axis in range(2):
+        value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
+        pull = s.drive_stiffness[axis] * value
+        for i in range(m):
+            pull -= s.drive_shapes[axis, i] * y[i]
+        out[0] += pull * rate
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
+        for i in range(m):
+            out[3] += value * s.load_shapes[k, i] * y[m + i]
+    for i in range(m):
+        out[3] += s.constant_load[i] * y[m + i]
+        for k in range(m):
+            product = y[m + i] * y[m + k]
+            out[4] += s.modal_damping[i, k] * product
+            out[5] += (s.damping[i, k] - s.modal_damping[i, k]) * product
+
+
+@helper
+def drive_jump(before, after, y, s):  # type: ignore[no-untyped-def]
+    """Work that the drive puts in where its motions jump, between two times on both sides [J]."""
+    work = 0.0
+    for axis in range(2):
+        old = signal_at(s.drive[axis])(before, s.drive_parameters[axis])[0]
+        new = signal_at(s.drive[axis])(after, s.drive_parameters[axis])[0]
+        pull = 0.5 * s.drive_stiffness[axis] * (old + new)
+        for i in range(s.Tx.shape[1]):
+            pull -= s.drive_shapes[axis, i] * y[i]
+        work += pull * (new - old)
+    return work

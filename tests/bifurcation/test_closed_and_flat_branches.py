@@ -16,7 +16,7 @@ from fecontact.bifurcation.orbits.branches import (
     orbits_from_hopf,
     orbits_from_motion,
 )
-from fecontact.cli.commands.branch_results import special_table
+from fecontact.cli.commands.branch import special_table
 
 
 def island(t, x, p, out):

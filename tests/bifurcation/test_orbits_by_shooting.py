@@ -22,18 +22,17 @@ from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.orbits.branches import (
     orbits_beyond,
+    orbits_by_shooting,
     orbits_from_hopf,
     orbits_from_motion,
 )
 from fecontact.bifurcation.orbits.from_run import settled_motion
-from fecontact.bifurcation.orbits.orbit_output import orbit_history
 from fecontact.bifurcation.orbits.period_doubling import (
     doubled_by_shooting,
     hopf_orbits_by_shooting,
     restored_shooting,
 )
-from fecontact.bifurcation.orbits.samples import motion_of, observe
-from fecontact.bifurcation.orbits.shooting_branch import orbits_by_shooting
+from fecontact.bifurcation.orbits.samples import motion_of, observe, orbit_history
 from fecontact.core.errors import AnalysisError, InputError
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))

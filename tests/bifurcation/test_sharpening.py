@@ -15,7 +15,7 @@ from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.orbits.branches import orbits_from_hopf, orbits_from_motion
 from fecontact.bifurcation.orbits.normal_forms import verdict
-from fecontact.cli.commands.branch_results import branches_csv, special_table
+from fecontact.cli.commands.branch import branches_csv, special_table
 from fecontact.output.files.branches import read_branch
 
 

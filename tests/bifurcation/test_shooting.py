@@ -9,11 +9,10 @@ from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.orbits.branches import orbits_from_hopf, restored
+from fecontact.bifurcation.orbits.branches import orbits_by_shooting, orbits_from_hopf, restored
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.orbit_output import quantity_range
+from fecontact.bifurcation.orbits.samples import quantity_range
 from fecontact.bifurcation.orbits.shooting import shooting_from
-from fecontact.bifurcation.orbits.shooting_branch import orbits_by_shooting
 from fecontact.core.errors import AnalysisError, InputError
 
 

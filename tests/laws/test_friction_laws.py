@@ -13,10 +13,11 @@ from scipy.optimize import brentq
 from fecontact.core.errors import InputError
 from fecontact.laws.base import PerNode, Positive, Range
 from fecontact.laws.friction.base import MemorylessFriction
-from fecontact.laws.friction.friction_minimum import CubicFriction, GalvanettoFriction
 from fecontact.laws.friction.stribeck import (
     ConstantFriction,
+    CubicFriction,
     ExponentialFriction,
+    GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
     ProductFriction,

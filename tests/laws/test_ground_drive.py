@@ -10,7 +10,7 @@ from fecontact.core.errors import InputError
 from fecontact.laws.excitation import Drive, Load, PointLoad
 from fecontact.laws.ground.fourier_series import FourierSeries
 from fecontact.laws.ground.ground import Ground, HarmonicSpeed, SpeedRamp
-from fecontact.laws.ground.profiles import Flat, Sine
+from fecontact.laws.ground.profile import Flat, Sine
 from fecontact.laws.ground.random_roughness import RandomRoughness
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics, Sweep
 

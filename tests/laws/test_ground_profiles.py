@@ -13,8 +13,7 @@ from fecontact.core.errors import InputError
 from fecontact.laws.ground.fourier_series import FourierSeries
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.measured_profile import Trace
-from fecontact.laws.ground.profile import Profile
-from fecontact.laws.ground.profiles import Flat, Sine
+from fecontact.laws.ground.profile import Flat, Profile, Sine
 from fecontact.laws.ground.random_roughness import RandomRoughness
 from fecontact.laws.signatures import ground_profile
 

@@ -13,6 +13,7 @@ from scipy.integrate import quad
 
 from fecontact.core.errors import InputError
 from fecontact.laws.base import NormalLaw, PerNode
+from fecontact.laws.check import require_sound
 from fecontact.laws.normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from fecontact.laws.normal.measured_surface import MeasuredSurface
 from fecontact.laws.normal.power import PowerContact, PowerLawContact, RestitutionContact
@@ -23,9 +24,8 @@ from fecontact.laws.normal.rough_surface import (
     RoughSurface,
 )
 from fecontact.laws.normal.statistical import ExponentialContact, GreenwoodWilliamson
-from fecontact.laws.potential import stored_energy
+from fecontact.laws.sampling import stored_energy
 from fecontact.laws.signatures import normal_law
-from fecontact.laws.soundness import require_sound
 
 R = 5e-6
 TRACE = np.random.default_rng(5).normal(size=400).cumsum() * 1e-7

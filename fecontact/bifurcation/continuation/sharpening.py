@@ -20,8 +20,8 @@ from fecontact.bifurcation.continuation.crossings import UNRESOLVED
 from fecontact.bifurcation.continuation.newton import corrected, finished, norm
 from fecontact.bifurcation.continuation.pseudo_arclength import Settings, continuation
 from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.floquet import FLAT
 from fecontact.bifurcation.orbits.mesh import equidistributed
-from fecontact.bifurcation.orbits.multiplier_tests import FLAT
 from fecontact.bifurcation.orbits.normal_forms import verdict
 from fecontact.core.errors import FecontactError
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
-from fecontact.bifurcation.continuation.follow import follow
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
+from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
     find_equilibrium,
@@ -18,7 +18,6 @@ from fecontact.bifurcation.equilibria.equilibrium import (
 from fecontact.bifurcation.equilibria.problem import EquilibriumProblem
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
-from fecontact.bifurcation.orbits.orbit_options import settings_of, sizes_of, width_of
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 

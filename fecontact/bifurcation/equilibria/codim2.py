@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
-from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.branches import default_scales
 from fecontact.bifurcation.equilibria.codim2_problems import (
     FoldCurve,

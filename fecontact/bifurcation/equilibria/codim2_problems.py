@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.problem import Problem
-from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues
-from fecontact.bifurcation.equilibria.linear import solution
+from fecontact.bifurcation.equilibria.equilibrium import solution, sorted_eigenvalues
 from fecontact.bifurcation.equilibria.normal_forms import hopf, null_vectors
 from fecontact.bifurcation.equilibria.problem import pair_test
 from fecontact.bifurcation.fields.multilinear_forms import bend

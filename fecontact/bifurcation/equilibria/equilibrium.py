@@ -7,11 +7,34 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecontact.bifurcation.equilibria.linear import solution
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import Array, VectorField, require_field
+from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
+
+Array = NDArray[np.float64]
+
+_CONSISTENT = 1e-8
+
+
+def solution(matrix: Array, rhs: Array) -> Array:
+    """Solution (n,) of ``matrix x = rhs``; the shortest one of a singular system that has some.
+
+    Raises
+    ------
+    AnalysisError
+        If the system is singular and has none.
+    """
+    try:
+        return np.asarray(np.linalg.solve(matrix, rhs))
+    except np.linalg.LinAlgError:
+        x = np.linalg.lstsq(matrix, rhs, rcond=None)[0]
+    left = np.abs(matrix @ x - rhs)
+    if (left > _CONSISTENT * (np.abs(matrix) @ np.abs(x) + np.abs(rhs))).any():
+        raise AnalysisError("The equations are singular and have no solution there: nothing "
+                            "holds the solution in some direction.")
+    return np.asarray(x)
+
 
 ComplexArray = NDArray[np.complex128]
 

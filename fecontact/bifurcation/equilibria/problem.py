@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.problem import Problem
-from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues, unstable_count
-from fecontact.bifurcation.equilibria.linear import solution
+from fecontact.bifurcation.equilibria.equilibrium import (
+    solution,
+    sorted_eigenvalues,
+    unstable_count,
+)
 from fecontact.bifurcation.equilibria.normal_forms import (
     branching_tangents,
     critical_pair,

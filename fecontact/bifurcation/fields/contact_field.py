@@ -11,7 +11,7 @@ from fecontact.bifurcation.fields.parametrised_system import SystemFamily
 from fecontact.bifurcation.fields.vector_field import Array, VectorField
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
-from fecontact.system import field_kernels as kernels
+from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period
 

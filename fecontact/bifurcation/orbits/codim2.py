@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, require_on_branch
-from fecontact.bifurcation.continuation.follow import follow
-from fecontact.bifurcation.continuation.problem import Problem, Settings
+from fecontact.bifurcation.continuation.problem import Problem, Settings, settings_of
+from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.branches import restored
 from fecontact.bifurcation.orbits.collocation import Collocation
-from fecontact.bifurcation.orbits.linearised import Linearised
+from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.normal_forms import Expansion
-from fecontact.bifurcation.orbits.orbit_options import settings_of
 from fecontact.core.errors import InputError, require_finite, require_positive
 
 Array = NDArray[np.float64]
@@ -74,7 +73,7 @@ class OrbitCurve(Problem):
         found = bordered.expand(vectors[-1])
         return np.asarray(found / np.sqrt(self.orbit.weights() @ found**2))
 
-    def test(self, linearised: Linearised) -> float:
+    def test(self, linearised: CollocationLinearisation) -> float:
         """The test function."""
         if self.kind != "fold":
             doubling, _, torus = linearised.floquet.products

@@ -1,25 +1,21 @@
-"""Periodic orbits by orthogonal collocation: the equations, and their linearisation."""
+"""Periodic orbits by orthogonal collocation as a problem of continuation."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation.corrector_kernels import weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.problem import Problem
-from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.orbits.collocation_kernels import at_points, fill_mesh, fill_phase_row
-from fecontact.bifurcation.orbits.linearised import Linearised
+from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
+from fecontact.bifurcation.orbits.floquet import unresolved
 from fecontact.bifurcation.orbits.mesh import (
-    Rule,
     carry_over,
     equidistributed,
     extremes,
-    rule,
 )
-from fecontact.bifurcation.orbits.multiplier_tests import unresolved
+from fecontact.bifurcation.orbits.normal_forms import examined
 from fecontact.bifurcation.orbits.same_orbit import HALVING, halves_meet, in_phase, same_heading
 from fecontact.core.errors import InputError
 
@@ -33,35 +29,11 @@ _UNLIKE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Collocation(Problem):
-    """Equations of a periodic orbit of x' = f(t, x, p), one parameter free.
-
-    With time scaled to [0, 1], x is a polynomial of degree m on each of N intervals, continuous
-    and periodic, and meets x' = T f at the m Gauss points of each. The error falls as h^(m + 1),
-    at the ends of the intervals as h^(2 m). If f does not depend on t, the period T is an unknown
-    and the phase is fixed by int <x, y'> = 0 with the orbit y before; else T is ``periods`` times
-    the period of the forcing.
-
-    The unknowns are ``u = [nodes (N m d), T if it is unknown, parameter]``.
+class Collocation(Discretisation, Problem):
+    """The problem of following orbits by collocation; see :class:`Discretisation`.
 
     Attributes
     ----------
-    field : VectorField
-    values : (k,) array
-        Parameters; the free one is taken from u.
-    free : int
-        Index of the free parameter.
-    mesh : (N + 1,) array
-        Ends of the intervals, from 0 to 1.
-    degree : int
-        m.
-    reference : (N m, d) array
-        Nodes of the orbit that fixes the phase.
-    scales : (d + 2,) array
-        What counts as one in the length of a step: of each state (root mean square over the
-        orbit), of the period, of the parameter.
-    periods : int
-        Periods of the forcing in one of the orbit.
     age : int
         Steps since the mesh was made.
     renewal : int
@@ -71,129 +43,27 @@ class Collocation(Problem):
     precision : float
         Part of a step to which special points are located. Above 1e-6 their normal forms are
         left out.
-    second : int, optional
-        Index of another free parameter, which stands before the first one in u; two equations
-        are missing then.
     before : tuple of (n,) arrays
         u, the tangent and, after the first step, its derivative along the branch, from which the
         last step went; empty before the first one.
     """
 
-    field: VectorField
-    values: Array
-    free: int
-    mesh: Array
-    degree: int
-    reference: Array
-    scales: Array
-    periods: int = 1
     age: int = 0
     renewal: int = 1
     limits: Array | None = None
     precision: float = 1e-12
-    second: int | None = None
     before: tuple[Array, ...] = ()
 
     keeps_matrix: ClassVar[bool] = True
     confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
 
-    @cached_property
-    def autonomous(self) -> bool:
-        """Whether the period is an unknown."""
-        return self.field.forcing_period(self.values) is None
-
-    @property
-    def intervals(self) -> int:
-        """Number N of intervals."""
-        return len(self.mesh) - 1
-
-    @cached_property
-    def size(self) -> int:
-        """Number N m d of nodal unknowns."""
-        return self.reference.size
-
-    @cached_property
-    def common(self) -> int:
-        """Number of unknowns that all intervals share."""
-        return len(self.active) + self.autonomous
-
-    @cached_property
-    def active(self) -> tuple[int, ...]:
-        """Indices of the parameters that are unknowns, in their order in u."""
-        return (self.free,) if self.second is None else (self.second, self.free)
-
-    @cached_property
-    def rule(self) -> Rule:
-        """Basis polynomials and Gauss points."""
-        return rule(self.degree)
-
-    @cached_property
-    def _on_mesh(self) -> tuple[Array, Array, Array]:
-        """Widths of the intervals, times of the Gauss points, weights of the inner product."""
-        points = self.intervals * self.degree
-        found = (np.empty(self.intervals), np.empty(points), np.empty(self.size + self.common))
-        fill_mesh(self.mesh, self.rule.points, self.scales, *found)
-        return found
-
-    @property
-    def widths(self) -> Array:
-        """Widths (N,) of the intervals."""
-        return self._on_mesh[0]
-
-    @property
-    def times(self) -> Array:
-        """Times (N m,) of the Gauss points in [0, 1]."""
-        return self._on_mesh[1]
-
-    @property
-    def phase_row(self) -> Array:
-        """Row (N m d,) of the phase condition."""
-        return self.phase_border[: self.size]
-
-    @cached_property
-    def phase_border(self) -> Array:
-        """The same over all unknowns."""
-        row = np.empty(self.size + self.common)
-        fill_phase_row(self.reference, self.rule.weights, self.rule.values, self.rule.slopes, row)
-        return row
-
-    def at_gauss_points(self, nodes: Array) -> tuple[Array, Array]:
-        """States (N m, d) and their slopes over one interval, h x', at the Gauss points."""
-        x, slopes = np.empty_like(nodes), np.empty_like(nodes)
-        at_points(nodes, self.rule.values, self.rule.slopes, x, slopes)
-        return x, slopes
-
-    def nodes(self, u: Array) -> Array:
-        """Nodes (N m, d) of the orbit."""
-        return u[: self.size].reshape(self.reference.shape)
-
-    def period(self, u: Array) -> float:
-        """Period T [s] of the orbit."""
-        if self.autonomous:
-            return float(u[self.size])
-        given = self.field.forcing_period(self.parameters(u))
-        assert given is not None
-        return self.periods * given
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[self.free] = u[-1]
-        if self.second is not None:
-            values[self.second] = u[-2]
-        return values
-
-    def linearise(self, u: Array) -> Linearised:
+    def linearise(self, u: Array) -> CollocationLinearisation:
         """Residual and linearisation at u; what is not asked for is not computed."""
-        return Linearised(self, u)
+        return CollocationLinearisation(self, u)
 
-    def evaluate(self, u: Array) -> Linearised:
+    def evaluate(self, u: Array) -> CollocationLinearisation:
         """As :meth:`linearise`, for the residual alone."""
-        return Linearised(self, u, whole=False)
-
-    def weights(self) -> Array:
-        """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""
-        return self._on_mesh[2]
+        return CollocationLinearisation(self, u, whole=False)
 
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
@@ -203,7 +73,7 @@ class Collocation(Problem):
         return found
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """See :func:`fecontact.bifurcation.orbits.multiplier_tests.unresolved`."""
+        """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
         first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
         return unresolved((first, last), values, tests)
 
@@ -228,8 +98,6 @@ class Collocation(Problem):
 
         A branch point at which a doubled orbit becomes a single one is a period halving.
         """
-        from fecontact.bifurcation.orbits.normal_forms import examined
-
         if kind == "branch point" and halves_meet(self, u, tangent):
             return {"kind": HALVING}
         return examined(kind, self, u, linearisation, self.precision < 1e-6)

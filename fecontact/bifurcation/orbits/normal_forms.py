@@ -13,7 +13,7 @@ third derivatives of f are differences of its Jacobian along directions.
 """
 
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.linalg.condensation import condense, factors_for
 from fecontact.bifurcation.orbits.collocation_kernels import to_nodes
-from fecontact.bifurcation.orbits.linearised import Linearised
-
-if TYPE_CHECKING:
-    from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 
 Array = NDArray[Any]
 
@@ -36,7 +33,8 @@ _SURE = 0.25
 
 
 def examined(
-    kind: str, problem: "Collocation", u: Array, linearised: Linearised, details: bool = True
+    kind: str, problem: Discretisation, u: Array, linearised: CollocationLinearisation,
+    details: bool = True
 ) -> dict[str, Any] | None:
     """Details of a special point of a branch of orbits; None if it is none.
 
@@ -83,7 +81,8 @@ def _judged(coefficient: Any) -> dict[str, Any]:
 class Expansion:
     """The flow about an orbit, to third order, on the points of collocation."""
 
-    def __init__(self, problem: "Collocation", u: Array, linearised: Linearised) -> None:
+    def __init__(self, problem: Discretisation, u: Array,
+                 linearised: CollocationLinearisation) -> None:
         self._problem, self._T = problem, linearised.period
         self._values = problem.parameters(u)
         self._times = problem.times * self._T

@@ -7,17 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status, require_on_branch
-from fecontact.bifurcation.continuation.follow import follow
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
+from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.branches import default_scales
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import require_field
 from fecontact.bifurcation.orbits import starts as orbit_starts
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.orbit_options import settings_of, sizes_of, width_of
 from fecontact.bifurcation.orbits.same_orbit import HALVING
-from fecontact.bifurcation.orbits.shooting import Shooting, Shot, shooting_from
+from fecontact.bifurcation.orbits.shooting import Shooting, ShootingLinearisation, shooting_from
 from fecontact.core.errors import FecontactError, InputError
 
 Array = NDArray[np.float64]
@@ -59,7 +58,7 @@ def hopf_orbits_by_shooting(
 
     For orbits that come to stick on steep friction; the arguments are those of
     :func:`fecontact.bifurcation.orbits.branches.orbits_from_hopf` and
-    :func:`fecontact.bifurcation.orbits.shooting_branch.orbits_by_shooting`, the branch that of the
+    :func:`fecontact.bifurcation.orbits.branches.orbits_by_shooting`, the branch that of the
     latter.
 
     Raises
@@ -109,7 +108,7 @@ def doubled_by_shooting(
     doubling of the single orbit, the branch ends with a point 'period halving': beyond it are the
     same orbits with their halves exchanged. The arguments are those of
     :func:`fecontact.bifurcation.orbits.branches.orbits_beyond`, the branch that of
-    :func:`fecontact.bifurcation.orbits.shooting_branch.orbits_by_shooting`.
+    :func:`fecontact.bifurcation.orbits.branches.orbits_by_shooting`.
 
     Raises
     ------
@@ -224,7 +223,7 @@ def _doublings_near(
 def _doubled(problem: Shooting, u: Array) -> tuple[_Doubled, Array, Array]:
     """The orbit run through twice, and the direction (of length one) in which it parts."""
     starts = problem.starts(u)
-    rounds = [run.monodromy for run in Shot(problem, u).runs]
+    rounds = [run.monodromy for run in ShootingLinearisation(problem, u).runs]
     around = np.eye(starts.shape[1])
     for matrix in rounds:
         around = matrix @ around

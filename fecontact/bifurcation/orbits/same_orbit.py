@@ -6,16 +6,12 @@ their halves exchanged.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import interpolate, node_times
-
-if TYPE_CHECKING:
-    from fecontact.bifurcation.orbits.collocation import Collocation
-    from fecontact.bifurcation.orbits.shooting import Shooting
 
 Array = NDArray[np.float64]
 
@@ -33,7 +29,7 @@ def same_heading(weights: Array, one: Array, other: Array, common: int) -> bool:
     return float(weights[-common:] * one[-common:] @ other[-common:]) > 0.0
 
 
-def in_phase(problem: "Collocation", u: Array, like: Array) -> Array:
+def in_phase(problem: Discretisation, u: Array, like: Array) -> Array:
     """An orbit on the mesh of the problem, shifted in time to be next to another one."""
     mesh, d = problem.mesh, problem.field.dimension
     nodes, times = problem.nodes(u).copy(), node_times(mesh, problem.degree)
@@ -51,7 +47,7 @@ def in_phase(problem: "Collocation", u: Array, like: Array) -> Array:
 
 
 def _shift(
-    problem: "Collocation", nodes: Array, like: Array, shifted: Callable[[float], Array]
+    problem: Discretisation, nodes: Array, like: Array, shifted: Callable[[float], Array]
 ) -> float:
     """Shift in periods at which orbits correlate best, and meet the phase condition."""
     from scipy.optimize import brentq
@@ -71,47 +67,7 @@ def _shift(
     return float(brentq(off, low, high, xtol=1e-12))
 
 
-def started_in_phase(problem: "Shooting", u: Array, like: Array) -> Array:
-    """An orbit by shooting, started where it is next to another one.
-
-    Where the phase is free it starts on the plane of the phase condition, else a whole number of
-    periods of the forcing later.
-
-    Raises
-    ------
-    AnalysisError
-        If a run of it fails.
-    """
-    from scipy.optimize import brentq
-
-    d = problem.field.dimension
-    paths = problem.linearise(u).paths
-    samples = paths.shape[1] - 1
-    grid = np.append(np.linspace(problem.mesh[:-1], problem.mesh[1:], samples, endpoint=False,
-                                 axis=1).reshape(-1), 1.0)
-    path = np.concatenate([paths[:, :-1].reshape(-1, d), paths[:1, 0]])
-    starts, wanted = problem.mesh[:-1], problem.starts(like)
-
-    def apart(shift: float) -> float:
-        phases = np.mod(starts + shift, 1.0)
-        near = np.stack([np.interp(phases, grid, column) for column in path.T], axis=1)
-        return float((((near - wanted) / problem.scales[:d]) ** 2).sum())
-
-    def off(shift: float) -> float:
-        return float(problem.phase_row @ (problem.at_phases(u, np.array([shift]))[0]
-                                          - problem.reference))
-
-    if problem.autonomous:
-        index = int(np.argmin([apart(phase) for phase in grid[:-1]]))
-        low, high, shift = grid[index - 1] - (index == 0), grid[index + 1], grid[index]
-        if off(low) * off(high) < 0.0:
-            shift = float(brentq(off, low, high, xtol=1e-12))
-    else:
-        shift = min((k / problem.periods for k in range(problem.periods)), key=apart)
-    return np.concatenate([problem.at_phases(u, starts + shift).reshape(-1), u[-problem.common:]])
-
-
-def halves_meet(problem: "Collocation", u: Array, tangent: Array) -> bool:
+def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
     """Whether an orbit is one run through twice, from which the branch parts the two rounds."""
     times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
     nodes, along = problem.nodes(u).copy(), problem.nodes(tangent).copy()

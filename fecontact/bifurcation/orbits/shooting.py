@@ -9,16 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation.corrector_kernels import weighted_norm
+from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbits.collocation import Collocation
-from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
+from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of, unresolved
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.multiplier_tests import unresolved
-from fecontact.bifurcation.orbits.same_orbit import same_heading, started_in_phase
+from fecontact.bifurcation.orbits.same_orbit import same_heading
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
@@ -127,9 +126,9 @@ class Shooting(Problem):
         row = f / self.scales[: len(f)] ** 2
         return row / np.linalg.norm(row * self.scales[: len(f)])
 
-    def linearise(self, u: Array) -> "Shot":
+    def linearise(self, u: Array) -> "ShootingLinearisation":
         """Residual and linearisation at u; what is not asked for is not computed."""
-        return Shot(self, u)
+        return ShootingLinearisation(self, u)
 
     def weights(self) -> Array:
         """Weights of the inner product: mean of the scaled starts, T, parameter."""
@@ -166,7 +165,7 @@ class Shooting(Problem):
         return linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """See :func:`fecontact.bifurcation.orbits.multiplier_tests.unresolved`."""
+        """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
         first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
         return unresolved((first, last), values, tests)
 
@@ -264,7 +263,47 @@ def run_from(system: ContactSystem, times: Array, starts: Array, rtol: float) ->
     return found.states
 
 
-class Shot:
+def started_in_phase(problem: Shooting, u: Array, like: Array) -> Array:
+    """An orbit by shooting, started where it is next to another one.
+
+    Where the phase is free it starts on the plane of the phase condition, else a whole number of
+    periods of the forcing later.
+
+    Raises
+    ------
+    AnalysisError
+        If a run of it fails.
+    """
+    from scipy.optimize import brentq
+
+    d = problem.field.dimension
+    paths = problem.linearise(u).paths
+    samples = paths.shape[1] - 1
+    grid = np.append(np.linspace(problem.mesh[:-1], problem.mesh[1:], samples, endpoint=False,
+                                 axis=1).reshape(-1), 1.0)
+    path = np.concatenate([paths[:, :-1].reshape(-1, d), paths[:1, 0]])
+    starts, wanted = problem.mesh[:-1], problem.starts(like)
+
+    def apart(shift: float) -> float:
+        phases = np.mod(starts + shift, 1.0)
+        near = np.stack([np.interp(phases, grid, column) for column in path.T], axis=1)
+        return float((((near - wanted) / problem.scales[:d]) ** 2).sum())
+
+    def off(shift: float) -> float:
+        return float(problem.phase_row @ (problem.at_phases(u, np.array([shift]))[0]
+                                          - problem.reference))
+
+    if problem.autonomous:
+        index = int(np.argmin([apart(phase) for phase in grid[:-1]]))
+        low, high, shift = grid[index - 1] - (index == 0), grid[index + 1], grid[index]
+        if off(low) * off(high) < 0.0:
+            shift = float(brentq(off, low, high, xtol=1e-12))
+    else:
+        shift = min((k / problem.periods for k in range(problem.periods)), key=apart)
+    return np.concatenate([problem.at_phases(u, starts + shift).reshape(-1), u[-problem.common:]])
+
+
+class ShootingLinearisation:
     """Residual of the shooting equations at u, and solutions of systems with their derivative."""
 
     def __init__(self, problem: Shooting, u: Array) -> None:

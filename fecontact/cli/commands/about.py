@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from fecontact.cli.printing import say, show
+from fecontact.cli.console import say, show
 
 
 def doctor() -> int:

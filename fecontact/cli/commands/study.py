@@ -5,9 +5,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import INTERRUPTED
+from fecontact.cli.console import INTERRUPTED, complain, say, say_written, show
 from fecontact.cli.options import Changes, Folder, StudyFile
-from fecontact.cli.printing import complain, say, say_written, show
 from fecontact.core.errors import InputError
 
 
@@ -22,7 +21,7 @@ def init(
 ) -> None:
     """Write a commented study file to start from."""
     from fecontact.cli.templates import template
-    from fecontact.core.folders import write_text
+    from fecontact.core.atomic_write import write_text
 
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
@@ -37,7 +36,7 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     """Make the mesh of a study, and print its size and its groups."""
     from fecontact.cli.run_files import read_study
     from fecontact.cli.tables import mesh_table
-    from fecontact.core.folders import output_folder
+    from fecontact.core.atomic_write import output_folder
     from fecontact.fem.mesh_files import write_mesh
 
     described = read_study(study, set_)
@@ -65,7 +64,7 @@ def modes(
     """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
     from fecontact.cli.console import progress_bar, waiting
     from fecontact.cli.run_files import convergence_of, read_study
-    from fecontact.core.folders import output_folder
+    from fecontact.core.atomic_write import output_folder
     from fecontact.reduction.report import BasisReport
 
     described = read_study(study, set_)
@@ -104,7 +103,7 @@ def run(
     from fecontact.cli.console import progress_bar, waiting
     from fecontact.cli.run_files import read_study, write_run
     from fecontact.cli.tables import notes, run_table
-    from fecontact.core.folders import output_folder
+    from fecontact.core.atomic_write import output_folder
     from fecontact.core.locks import locked
 
     described = read_study(study, set_)

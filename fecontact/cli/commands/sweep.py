@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from fecontact.cli.console import say, say_written, show
 from fecontact.cli.options import Changes, StudyFile
-from fecontact.cli.printing import say, say_written, show
 from fecontact.core.errors import InputError
 
 if TYPE_CHECKING:

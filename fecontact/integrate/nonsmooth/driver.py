@@ -15,8 +15,8 @@ from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.base import FrictionLaw
-from fecontact.system.contact_energy import POWERS
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import POWERS
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class SetValuedRun:
     states : (N, 2 m) array
         [q, q'].
     work : (N, 8) array
-        Integrals of the powers :data:`fecontact.system.contact_energy.POWERS` from the first time
+        Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
         [J]. What impacts on rigid stops take is with ``contact_damping``.
     node_friction_work : (N, n) array
         Energy that friction at each node has taken since the first time [J].

@@ -40,8 +40,7 @@ from fecontact.integrate.nonsmooth.problem import (
     WORKSPACE,
 )
 from fecontact.laws.signatures import friction_at, ground_at, normal_at, signal_at
-from fecontact.system.body_powers import body_powers
-from fecontact.system.kernels import node_motion
+from fecontact.system.kernels import body_powers, node_motion
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
 DERIVATIVE = types.void(f8, vector, PROBLEM, integers, integers, WORKSPACE, vector)

@@ -39,7 +39,7 @@ from fecontact.integrate.nonsmooth.problem import (
     WORKSPACE,
 )
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, decide_stops, hold_velocity
-from fecontact.system.body_powers import drive_jump
+from fecontact.system.kernels import drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
 EARLY = 0.25

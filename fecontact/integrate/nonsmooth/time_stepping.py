@@ -38,7 +38,7 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, solve_stage
 from fecontact.laws.signatures import signal_at
-from fecontact.system.body_powers import drive_jump
+from fecontact.system.kernels import drive_jump
 
 GAMMA = 0.43586652150845899942
 A21 = 0.5 * (1.0 - GAMMA)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.integrate.trajectory import Status
-from fecontact.system.contact_energy import POWERS, powers
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import right_hand_side
+from fecontact.system.kernels import POWERS, powers, right_hand_side
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from fecontact.integrate.rodas5p.state import Control, progress_for, room_for
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import variation_for
 from fecontact.integrate.trajectory import Status
-from fecontact.system.contact_energy import POWERS
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import POWERS
 
 Array = NDArray[np.float64]
 

@@ -42,7 +42,7 @@ class Run:
         Derivatives that go with the run.
     states, work : arrays (N, 2 m + n s), (N, 8 + n)
         At the output times; rows from ``outputs`` on are not filled yet. Work of the powers
-        :data:`fecontact.system.contact_energy.POWERS`, then friction work of each node [J].
+        :data:`fecontact.system.kernels.POWERS`, then friction work of each node [J].
     progress : Progress
         All that is needed to go on.
     watch : Watch

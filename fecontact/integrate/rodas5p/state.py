@@ -10,7 +10,7 @@ from fecontact.core.compiled import f8, i8, integers, matrix, vector
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
-from fecontact.system.contact_energy import POWERS
+from fecontact.system.kernels import POWERS
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,13 @@ from fecontact.core.compiled import block, borrowed, f8, helper, i8, kernel, mat
 from fecontact.integrate.courses import doubtful, keep_ends, restless, set_courses, set_ends
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
+    add_up,
     energy_scale,
     set_scale,
     slip_error,
     state_error,
+    work_error,
+    work_until,
 )
 from fecontact.integrate.rodas5p.event_kernels import (
     KINKS,
@@ -37,11 +40,8 @@ from fecontact.integrate.rodas5p.state import (
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import VARIATION, begin_anew, keep, propagate
-from fecontact.integrate.rodas5p.work import add_up, work_error, work_until
 from fecontact.laws.signatures import signal_at
-from fecontact.system.body_powers import drive_jump
-from fecontact.system.contact_energy import powers
-from fecontact.system.kernels import SYSTEM
+from fecontact.system.kernels import SYSTEM, drive_jump, powers
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 

@@ -20,10 +20,104 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
-from fecontact.integrate.rodas5p import curvature, dynamics, stage_solver, tableau
+from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import variational_stages as columns
-from fecontact.laws.signatures import signal_at
+from fecontact.laws.signatures import ground_at, signal_at
 from fecontact.system.kernels import SYSTEM
+
+# Differences are taken over this part of the scales of the laws.
+_PART = 1e-4
+# Differences of larger parts of the usual size of a derivative are jumps.
+_JUMP = 3.0 * _PART
+
+
+@helper
+def probing_distance(u, shapes, slip_scale, depth, memory_scale, w):  # type: ignore[no-untyped-def]
+    """Multiple e of the stage u that is small against the scales of all laws."""
+    m, rows = shapes.shape
+    n = rows // 2
+    dynamics.project(shapes, u, w[0], w[1])
+    largest = 1.0
+    for j in range(n):
+        largest = max(largest, abs(w[1, j]) / slip_scale[j])
+        largest = max(largest, abs(w[0, n + j]) / depth[j])
+    for k in range(len(memory_scale)):
+        largest = max(largest, abs(u[2 * m + k]) / memory_scale[k])
+    return _PART / largest
+
+
+@helper
+def _difference(ahead, here, behind, factor, forward, usual):  # type: ignore[no-untyped-def]
+    """Difference quotient, that of one side where a kink or a jump lies within reach.
+
+    A difference that is not small against the ``usual`` size has met a jump. Of two sides that
+    differ without one, that of the step itself counts.
+    """
+    a, b = ahead - here, here - behind
+    jump_ahead, jump_behind = abs(a) > _JUMP * usual, abs(b) > _JUMP * usual
+    if jump_ahead or jump_behind:
+        if jump_ahead and jump_behind:
+            return factor * (a if abs(a) < abs(b) else b)
+        return factor * (b if jump_ahead else a)
+    if abs(a - b) <= 0.5 * max(abs(a), abs(b)):
+        return 0.5 * factor * (a + b)
+    return factor * (a if forward else b)
+
+
+@helper
+def learn(here, usual):  # type: ignore[no-untyped-def]
+    """Let the usual sizes be the largest seen."""
+    n, states, width = here.rates.shape
+    for j in range(n):
+        for row in range(3):
+            for k in range(4):
+                usual.partial[j, row, k] = max(usual.partial[j, row, k],
+                                               abs(here.partial[j, row, k]))
+        for k in range(width):
+            usual.force[j, k] = max(usual.force[j, k], abs(here.force[j, k]))
+            for row in range(states):
+                usual.rates[j, row, k] = max(usual.rates[j, row, k], abs(here.rates[j, row, k]))
+
+
+@helper
+def set_sinking(t, y, s, shapes, v, out):  # type: ignore[no-untyped-def]
+    """Fill out (2, n): slope of the ground under each node, and rate of its penetration."""
+    n = len(s.abscissa)
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    dynamics.project(shapes, y, v.nodes[0], v.nodes[1])
+    for j in range(n):
+        xi = s.abscissa[j] + v.nodes[0, j] - travel
+        slope = ground_at(s.profile)(xi, s.profile_parameters)[1]
+        out[0, j] = slope
+        out[1, j] = slope * (v.nodes[1, j] - speed) - v.nodes[1, n + j]
+
+
+@helper
+def differences(ahead, here, behind, usual, factor, u, travelled, sinking, shapes, w):  # type: ignore[no-untyped-def]
+    """Put the difference quotients of gradients along the stage u into those ahead.
+
+    A stage that moves a node as the step does shows with its forward side what is within the
+    step.
+    """
+    n, states, width = ahead.rates.shape
+    dynamics.project(shapes, u, w[0], w[1])
+    for j in range(n):
+        sunk = sinking[0, j] * (w[0, j] - travelled) - w[0, n + j]
+        forward = sunk * sinking[1, j] >= 0.0
+        for row in range(3):
+            for k in range(4):
+                ahead.partial[j, row, k] = _difference(
+                    ahead.partial[j, row, k], here.partial[j, row, k], behind.partial[j, row, k],
+                    factor, forward, usual.partial[j, row, k])
+        for k in range(width):
+            ahead.force[j, k] = _difference(ahead.force[j, k], here.force[j, k],
+                                            behind.force[j, k], factor, forward,
+                                            usual.force[j, k])
+            for row in range(states):
+                ahead.rates[j, row, k] = _difference(
+                    ahead.rates[j, row, k], here.rates[j, row, k], behind.rates[j, row, k], factor,
+                    forward, usual.rates[j, row, k])
+
 
 Array = NDArray[np.float64]
 
@@ -173,15 +267,15 @@ def propagate(  # type: ignore[no-untyped-def]
     ahead, behind = v.ahead, v.behind
     if size == 2 * m:
         columns.set_solver(G, reduced, v)
-    curvature.set_sinking(t, state, s, shapes, v, v.sinking)
+    set_sinking(t, state, s, shapes, v, v.sinking)
     for i in range(tableau.STAGES):
         now = t if i == 0 else min(t + tableau.NODES[i] * h, latest)
         tableau.combined(tableau.A[i], 1.0, state, stages, Y)
         dynamics.set_given(now, s, v.given, v.pull)
         dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.inside, rate)
-        curvature.learn(v.inside, v.usual)
+        learn(v.inside, v.usual)
         advance = tableau.TIME[i] * h
-        reach = curvature.reach(stages[i], shapes, slip_scale, depth, memory_scale, w)
+        reach = probing_distance(stages[i], shapes, slip_scale, depth, memory_scale, w)
         if width != 0.0:
             _rates_between(now, Y, above, below, shapes, v, 1.0 / width, rate, other, forced)
         for side in range(2):
@@ -199,7 +293,7 @@ def propagate(  # type: ignore[no-untyped-def]
                 dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, ahead, rate)
             else:
                 dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, behind, rate)
-        curvature.differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
+        differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
                      signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1] * advance,
                      v.sinking, shapes, w)
         if size > 2 * m:

@@ -1,13 +1,110 @@
 """Friction laws without memory whose coefficient is constant or falls with slip velocity."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from fecontact.laws.base import NotNegative, Positive
-from fecontact.laws.friction import friction_kernels
-from fecontact.laws.friction.base import MemorylessFriction, SmoothedFriction, Smoothing
+from fecontact.core.compiled import helper
+from fecontact.laws.base import NotNegative, PerNode, Positive
+from fecontact.laws.friction.base import (
+    MemorylessFriction,
+    SmoothedFriction,
+    Smoothing,
+    require_at_least,
+)
+from fecontact.laws.signatures import friction_law
+
+
+@helper
+def _smoothed_sign(v, slope, smoothing):  # type: ignore[no-untyped-def]
+    """s(v) and s'(v); the smoothing is its index among the choices."""
+    rise = 2.0 / math.pi * slope
+    if smoothing == 0.0:
+        x = slope * v
+        return 2.0 / math.pi * math.atan(x), rise / (1.0 + x * x)
+    x = rise * v
+    if smoothing == 1.0:
+        s = math.tanh(x)
+        return s, rise * (1.0 - s) * (1.0 + s)
+    root = 1.0 / math.sqrt(1.0 + x * x)
+    return x * root, rise * root * root * root
+
+
+@helper
+def _force(v, F, coefficient, change, viscous, slope, smoothing):  # type: ignore[no-untyped-def]
+    """R, dR/dv, dR/dF from mu and its derivative ``change`` to the speed."""
+    s, rate = _smoothed_sign(v, slope, smoothing)
+    sign = 1.0 if v >= 0.0 else -1.0
+    ratio = coefficient * s + viscous * v
+    return ratio * F, (coefficient * rate + sign * change * s + viscous) * F, ratio
+
+
+@friction_law
+def exponential(v, F, p):  # type: ignore[no-untyped-def]
+    """Coefficient mu_inf + (mu_0 - mu_inf) exp(-lambda |v|)."""
+    static, kinetic, decay = p[0], p[1], p[2]
+    excess = (static - kinetic) * math.exp(-decay * abs(v))
+    return _force(v, F, kinetic + excess, -decay * excess, p[4], p[3], p[5])
+
+
+@friction_law
+def gaussian(v, F, p):  # type: ignore[no-untyped-def]
+    """Coefficient mu_inf + (mu_0 - mu_inf) exp(-(v/v_s)^2)."""
+    static, kinetic, stribeck = p[0], p[1], p[2]
+    x = abs(v) / stribeck
+    excess = (static - kinetic) * math.exp(-x * x)
+    return _force(v, F, kinetic + excess, -2.0 * x / stribeck * excess, p[4], p[3], p[5])
+
+
+@friction_law
+def hyperbolic(v, F, p):  # type: ignore[no-untyped-def]
+    """Coefficient mu_inf + (mu_0 - mu_inf) / (1 + |v|/v_s)."""
+    static, kinetic, stribeck = p[0], p[1], p[2]
+    ratio = stribeck / (stribeck + abs(v))
+    excess = (static - kinetic) * ratio
+    return _force(v, F, kinetic + excess, -excess * ratio / stribeck, p[4], p[3], p[5])
+
+
+@friction_law
+def constant(v, F, p):  # type: ignore[no-untyped-def]
+    """Coefficient mu."""
+    return _force(v, F, p[0], 0.0, p[2], p[1], p[3])
+
+
+@friction_law
+def galvanetto(v, F, p):  # type: ignore[no-untyped-def]
+    """Coefficient mu_k + (mu_s - mu_k) / (1 + gamma |v|) + eta v^2."""
+    static, kinetic, decay, growth = p[0], p[1], p[2], p[3]
+    speed = abs(v)
+    ratio = 1.0 / (1.0 + decay * speed)
+    excess = (static - kinetic) * ratio
+    return _force(v, F, kinetic + excess + growth * speed * speed,
+                  2.0 * growth * speed - decay * ratio * excess, 0.0, p[4], p[5])
+
+
+@friction_law
+def cubic(v, F, p):  # type: ignore[no-untyped-def]
+    """Coefficient mu_s - 3/2 (mu_s - mu_m) (x - x^3/3) with x = |v|/v_m."""
+    static, least, velocity = p[0], p[1], p[2]
+    x = abs(v) / velocity
+    depth = 1.5 * (static - least)
+    return _force(v, F, static - depth * x * (1.0 - x * x / 3.0),
+                  -depth * (1.0 - x * x) / velocity, 0.0, p[3], p[4])
+
+
+@friction_law
+def product(v, F, p):  # type: ignore[no-untyped-def]
+    """R/F a_1 (1 + a_2 exp(-b_1 |v|)) arctan(b_2 v)."""
+    factor, excess, decay, slope = p[0], p[1], p[2], p[3]
+    fall = excess * math.exp(-decay * abs(v))
+    sign = 1.0 if v >= 0.0 else -1.0
+    x = slope * v
+    bend = math.atan(x)
+    ratio = factor * (1.0 + fall) * bend
+    rate = factor * ((1.0 + fall) * slope / (1.0 + x * x) - sign * decay * fall * bend)
+    return ratio * F, rate * F, ratio
 
 
 @dataclass(frozen=True)
@@ -46,7 +143,7 @@ class ExponentialFriction(SmoothedFriction):
     W. Sextro, Dynamical Contact Problems with Friction, section 4.1.
     """
 
-    kernel: ClassVar = friction_kernels.exponential
+    kernel: ClassVar = exponential
 
     static_coefficient: NotNegative = 0.8
     kinetic_coefficient: NotNegative = 0.55
@@ -92,7 +189,7 @@ class GaussianFriction(SmoothedFriction):
     compensation methods for the control of machines with friction, Automatica 30 (1994).
     """
 
-    kernel: ClassVar = friction_kernels.gaussian
+    kernel: ClassVar = gaussian
 
     static_coefficient: NotNegative = 0.8
     kinetic_coefficient: NotNegative = 0.55
@@ -138,7 +235,7 @@ class HyperbolicFriction(SmoothedFriction):
     by alternate friction models, Nonlinear Dynamics 16 (1998).
     """
 
-    kernel: ClassVar = friction_kernels.hyperbolic
+    kernel: ClassVar = hyperbolic
 
     static_coefficient: NotNegative = 0.8
     kinetic_coefficient: NotNegative = 0.55
@@ -171,7 +268,7 @@ class ConstantFriction(SmoothedFriction):
         For values outside these ranges.
     """
 
-    kernel: ClassVar = friction_kernels.constant
+    kernel: ClassVar = constant
 
     friction_coefficient: NotNegative = 0.55
     smoothing_slope: Positive = 1e6
@@ -209,7 +306,7 @@ class ProductFriction(MemorylessFriction):
     W. Sextro, Dynamical Contact Problems with Friction, section 4.4.
     """
 
-    kernel: ClassVar = friction_kernels.product
+    kernel: ClassVar = product
 
     factor: NotNegative = 0.14
     excess: NotNegative = 1.14
@@ -220,3 +317,99 @@ class ProductFriction(MemorylessFriction):
     def velocity_scale(self) -> float:
         """Width 1/b_2 of the arctan [m/s], the smallest of all nodes."""
         return 1.0 / float(np.max(self.smoothing_slope))
+
+
+@dataclass(frozen=True)
+class GalvanettoFriction(SmoothedFriction):
+    r"""Dry friction that falls like a hyperbola and rises again with the square of velocity.
+
+    .. math::
+
+        R = F\, \mu(v)\, s(v), \qquad
+        \mu(v) = \mu_k + \frac{\mu_s - \mu_k}{1 + \gamma |v|} + \eta v^2
+
+    R [N] has the sign of the slip velocity v [m/s]. Friction is least where
+    ``gamma (mu_s - mu_k) = 2 eta |v| (1 + gamma |v|)^2``.
+
+    Parameters
+    ----------
+    static_coefficient, kinetic_coefficient : float or (n,) sequence
+        mu_s and mu_k, zero or above; with mu_s below mu_k friction rises from rest on.
+    decay : float or (n,) sequence
+        gamma, zero or above [s/m].
+    growth : float or (n,) sequence
+        eta, zero or above [s^2/m^2].
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    U. Galvanetto, S. R. Bishop, Dynamics of a simple damped oscillator undergoing stick-slip
+    vibrations, Meccanica 34 (1999), for two blocks on a belt.
+    """
+
+    kernel: ClassVar = galvanetto
+
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+    decay: NotNegative = 1000.0
+    growth: NotNegative = 0.0
+    smoothing_slope: Positive = 1e6
+    smoothing: Smoothing = "arctan"
+
+
+@dataclass(frozen=True)
+class CubicFriction(SmoothedFriction):
+    r"""Dry friction that is a cubic parabola of slip velocity with one minimum.
+
+    .. math::
+
+        R = F\, \mu(v)\, s(v), \qquad
+        \mu(v) = \mu_s - \tfrac{3}{2} (\mu_s - \mu_m)
+        \left[\frac{|v|}{v_m} - \frac{1}{3} \left(\frac{|v|}{v_m}\right)^3\right]
+
+    R [N] has the sign of the slip velocity v [m/s]. mu falls from mu_s at rest to mu_m at v_m, is
+    back at mu_s at ``sqrt(3) v_m`` and grows without bound.
+
+    Parameters
+    ----------
+    static_coefficient : float or (n,) sequence
+        mu_s, at least mu_m.
+    minimum_coefficient : float or (n,) sequence
+        mu_m, zero or above.
+    minimum_velocity : float or (n,) sequence
+        v_m, positive [m/s].
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+
+    References
+    ----------
+    J. J. Thomsen, A. Fidlin, Analytical approximations for stick-slip vibration amplitudes,
+    International Journal of Non-Linear Mechanics 38 (2003), unsmoothed.
+    """
+
+    kernel: ClassVar = cubic
+
+    static_coefficient: PerNode = 0.8
+    minimum_coefficient: NotNegative = 0.55
+    minimum_velocity: Positive = 1e-2
+    smoothing_slope: Positive = 1e6
+    smoothing: Smoothing = "arctan"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_at_least(self, "static_coefficient", "minimum_coefficient")

@@ -15,8 +15,7 @@ from fecontact.laws.ground.motion import (
     SpeedRamp,
     constant_speed,
 )
-from fecontact.laws.ground.profile import Profile
-from fecontact.laws.ground.profiles import Flat, Sine
+from fecontact.laws.ground.profile import Flat, Profile, Sine
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from fecontact.core.errors import InputError, require_positive
 from fecontact.laws.base import PerNode
 from fecontact.laws.data_columns import read_columns
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.laws.normal.surface_kernels import bed_of_asperities
+from fecontact.laws.normal.rough_surface import RoughSurface, bed_of_asperities
 from fecontact.laws.signatures import normal_law
 
 _INTERVALS, _HEAD, _KNOT = 64, 3, 3

@@ -21,9 +21,8 @@ from fecontact.output.files.frames import frame_indices
 from fecontact.output.files.hdf5 import new_file, open_file, store_basis, stored_basis
 from fecontact.output.files.vtkhdf import write_vtkhdf
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.contact_energy import POWERS
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import GROUND_RATE
+from fecontact.system.kernels import GROUND_RATE, POWERS
 from fecontact.system.tables import system_from_tables, system_tables
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.reduction.field import Field
+from fecontact.reduction.modal_basis import Field
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,7 @@ from fecontact.core.stored import (
     sound_sparse,
     values,
 )
-from fecontact.reduction.field import Field, Quality
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.modal_basis import Field, ModalBasis, Quality
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
 _FIELD = ("nodes", "cells", "outline", "shapes", "stress")

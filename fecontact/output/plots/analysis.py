@@ -2,12 +2,260 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.analysis.frequency_response import FrequencyResponse
-from fecontact.analysis.histories import Point
+from fecontact.analysis.histories import Point, history, point_name
+from fecontact.analysis.periodicity import strobed_states
+from fecontact.analysis.resolved import resolved
+from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from fecontact.core.errors import InputError, choices
+from fecontact.core.units import count, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots import analysis_figures as figures
-from fecontact.output.plots.style import save_figure
+from fecontact.output.plots.run import thinned
+from fecontact.output.plots.style import (
+    COLOURS,
+    DASHES,
+    add_note,
+    distinct_colours,
+    new_figure,
+    save_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_COLUMNS = 1000  # points of a line
+_DECADES = 5.0  # shown below the highest value of a logarithmic axis
+_AXES = ("x", "y")
+
+
+def spectrum_figure(
+    trajectory: Trajectory,
+    quantity: str = "velocity",
+    point: Point = "B",
+    axis: str = "x",
+    *,
+    density: bool = False,
+    highest_hz: float | None = None,
+) -> "Figure":
+    """Amplitude spectrum of a quantity, its highest peaks named; or its power spectral density."""
+    shown = history(trajectory, quantity, point, axis)
+    make = power_spectral_density if density else amplitude_spectrum
+    found = make(trajectory.time, shown.values)
+    figure = new_figure(9.0, 4.6)
+    panel = figure.subplots()
+    factor, symbol = (1.0, f"({shown.unit})²/Hz") if density else suitable_unit(
+        float(found.values.max()), shown.unit)
+    end = highest_hz or _end_of_content(found.frequency_hz, found.values)
+    panel.semilogy(*_envelope(found.frequency_hz, np.maximum(found.values, 1e-300) / factor, end),
+                   color=COLOURS[0], linewidth=1.0)
+    top = float(found.values.max()) / factor
+    if top > 0.0:
+        panel.set_ylim(top * 10.0**-_DECADES, 4.0 * top)
+    panel.set_xlim(0.0, end)
+    named: list[float] = []
+    for peak in found.peaks(40):
+        # Numbers need room beside those of higher peaks.
+        apart = all(abs(peak.frequency_hz - other) > 0.06 * end for other in named)
+        if peak.frequency_hz < end and apart and len(named) < 6:
+            named.append(peak.frequency_hz)
+            panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value / factor),
+                           xytext=(0, 4), textcoords="offset points", ha="center", fontsize=8.5)
+    panel.set_xlabel("frequency [Hz]")
+    panel.set_ylabel(f"{'density' if density else 'amplitude'} [{symbol}]")
+    panel.set_title(shown.title)
+    return figure
+
+
+def spectrogram_figure(
+    trajectory: Trajectory,
+    quantity: str = "velocity",
+    point: Point = "B",
+    axis: str = "x",
+    *,
+    piece: float | None = None,
+    highest_hz: float | None = None,
+) -> "Figure":
+    """Amplitudes of a quantity over time and frequency, below its history."""
+    from matplotlib.colors import LogNorm
+
+    shown = history(trajectory, quantity, point, axis)
+    found = spectrogram(trajectory.time, shown.values, piece=piece, overlap=0.9)
+    figure = new_figure(9.5, 5.6)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
+    time_unit, time_symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
+    unit, symbol = suitable_unit(float(np.abs(shown.values).max()), shown.unit)
+    drawn = resolved(trajectory)
+    add_note(figure, drawn)
+    line = history(drawn.trajectory, quantity, point, axis).values
+    upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
+               linewidth=0.8)
+    upper.set_ylabel(f"[{symbol}]")
+    upper.set_title(shown.title)
+    factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
+    top = float(found.values.max()) / factor or 1.0
+    image = lower.pcolormesh(
+        found.time / time_unit, found.frequency_hz, np.maximum(found.values / factor, 1e-300),
+        norm=LogNorm(top * 1e-4, top), cmap="viridis", shading="nearest", rasterized=True)
+    figure.colorbar(image, ax=lower, label=f"amplitude [{symbol}]", pad=0.01)
+    spread = found.values.max(axis=1)
+    lower.set_ylim(0.0, highest_hz or _end_of_content(found.frequency_hz, spread))
+    lower.set_xlim(trajectory.time[0] / time_unit, trajectory.time[-1] / time_unit)
+    lower.set_ylabel("frequency [Hz]")
+    lower.set_xlabel(f"time [{time_symbol}]")
+    lower.grid(False)
+    return figure
+
+
+def poincare_figure(
+    trajectory: Trajectory,
+    point: Point = "B",
+    axis: str = "x",
+    *,
+    period: float | None = None,
+    phase: float = 0.0,
+) -> "Figure":
+    """Velocity over displacement once per period, over the phase curve of the motion."""
+    if axis not in _AXES:
+        raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
+    row = _AXES.index(axis)
+    found = strobed_states(trajectory, period=period, phase=phase, start=float(trajectory.time[0]))
+    basis = trajectory.system.basis
+    drawn = resolved(trajectory)
+    x, v = (values(point)[:, row] for values in (
+        drawn.trajectory.displacement, drawn.trajectory.velocity))
+    rows = trajectory._rows(point)[row]
+    m = basis.modes
+    figure = new_figure(6.4, 5.2)
+    add_note(figure, drawn)
+    plane = figure.subplots()
+    unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
+    factor, rate_symbol = suitable_unit(float(np.abs(v).max()), "m/s")
+    plane.plot(x / unit, v / factor, color="#b9c4cc", linewidth=0.6, label="motion")
+    plane.plot(found.states[:, :m] @ rows / unit, found.states[:, m : 2 * m] @ rows / factor, "o",
+               markersize=3.5, color=COLOURS[1], label=f"once per {found.period:.4g} s")
+    plane.set_xlabel(f"displacement {axis} [{symbol}]")
+    plane.set_ylabel(f"velocity {axis} [{rate_symbol}]")
+    plane.legend(loc="best")
+    plane.set_title(f"{point_name(point)}, {count(len(found.time), 'point')}")
+    return figure
+
+
+def friction_work_figure(trajectory: Trajectory) -> "Figure":
+    """Friction work per length of the face, and slip distance, at each contact node.
+
+    Wear by Archard's law is proportional to the integral of pressure times slip, which with a
+    constant coefficient is the friction work over that coefficient.
+    """
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
+    basis = trajectory.system.basis
+    x, length = basis.contact_x, basis.tributary
+    work = trajectory.friction_work[-1] / length
+    touching = trajectory.normal_force != 0.0
+    speed = np.abs(trajectory.slip_velocity) * touching
+    slip = np.trapezoid(speed, trajectory.time, axis=0)
+    figure = new_figure(9.0, 5.6)
+    add_note(figure, drawn)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    unit, symbol = suitable_unit(float(np.abs(x).max() or length.max()), "m")
+    for panel, values, name, base in ((upper, work, "friction work per length", "N"),
+                                      (lower, slip, "slip in contact", "m")):
+        factor, label = suitable_unit(float(np.abs(values).max()), base)
+        panel.bar(x / unit, values / factor, width=0.92 * length / unit, color=COLOURS[0])
+        label = label.replace("N", "J/m") if base == "N" else label
+        panel.set_ylabel(f"{name} [{label}]")
+        panel.set_ylim(bottom=min(0.0, float(values.min()) / factor))
+    lower.set_xlabel(f"contact position x [{symbol}]")
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+def response_figure(
+    responses: Sequence[FrequencyResponse], labels: Sequence[str] = ()
+) -> "Figure":
+    """Magnitude and phase of frequency responses over frequency; those of unstable states dashed.
+
+    What is linearised about an unstable state is not what a measurement would show: the legend
+    says so.
+    """
+    if not responses:
+        raise InputError("responses = [] holds nothing to draw; give at least one.")
+    if not any(response.values.any() for response in responses):
+        raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
+                         f"{_place(responses[0].excitations[0])}; choose another point or "
+                         f"direction.")
+    figure = new_figure(9.0, 6.0)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    number = 0
+    many = len(responses) > 1 or responses[0].values[0].size > 1
+    colours = distinct_colours(sum(response.values[0].size for response in responses))
+    for index, response in enumerate(responses):
+        for r, seen in enumerate(response.responses):
+            for e, pushed in enumerate(response.excitations):
+                colour = colours[number]
+                number += 1
+                name = f"{_place(seen)} by {_place(pushed)}"
+                if index < len(labels):
+                    name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
+                        labels[index])
+                style = "-" if response.stable else DASHES
+                if not response.stable:
+                    name += f"\nUNSTABLE, not to be measured:\n{response.growth_in_words}"
+                f = response.frequency_hz
+                upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name,
+                               linestyle=style)
+                lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0,
+                           linestyle=style)
+    first = responses[0]
+    upper.set_ylabel(f"{first.kind} [{first.unit()}]")
+    if many or not first.stable:
+        upper.legend(loc="best")
+    else:
+        upper.set_title(f"{_place(first.responses[0])} by a force at "
+                        f"{_place(first.excitations[0])}")
+    lower.set_ylim(-190.0, 190.0)
+    lower.set_yticks([-180, -90, 0, 90, 180])
+    lower.set_ylabel("phase [°]")
+    lower.set_xlabel("frequency [Hz]")
+    _whole_width(lower, first)
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+def _whole_width(panel: "Axes", response: FrequencyResponse) -> None:
+    f = response.frequency_hz
+    if len(f) > 1:
+        panel.set_xlim(f[0], f[-1])
+
+
+def _place(place: tuple[str | int, str]) -> str:
+    return f"{point_name(place[0])} {place[1]}"
+
+
+def _end_of_content(frequency: Array, values: Array) -> float:
+    """Frequency up to which there is more than a part of 0.002 of the highest value."""
+    heard = np.flatnonzero(values > 2e-3 * values.max(initial=0.0))
+    end = 1.1 * frequency[heard[-1]] if len(heard) else frequency[-1]
+    return float(min(max(end, 10.0 * frequency[1]), frequency[-1]))
+
+
+def _envelope(frequency: Array, values: Array, end: float) -> tuple[Array, Array]:
+    """A long spectrum by the highest value of every few up to ``end``."""
+    shown = int(np.searchsorted(frequency, end, side="right"))
+    few = shown // _COLUMNS
+    if few < 2:
+        return frequency[:shown], values[:shown]
+    blocks = values[: shown - shown % few].reshape(-1, few)
+    tops = np.arange(len(blocks)) * few + blocks.argmax(axis=1)
+    return frequency[tops], values[tops]
 
 
 def plot_spectrum(
@@ -41,7 +289,7 @@ def plot_spectrum(
         For a quantity or a point that does not exist, uneven times, another suffix, or a file
         that cannot be written.
     """
-    return save_figure(path, lambda: figures.spectrum_figure(
+    return save_figure(path, lambda: spectrum_figure(
         trajectory, quantity, point, axis, density=density, highest_hz=highest_hz))
 
 
@@ -69,7 +317,7 @@ def plot_spectrogram(
     InputError
         As :func:`plot_spectrum`.
     """
-    return save_figure(path, lambda: figures.spectrogram_figure(
+    return save_figure(path, lambda: spectrogram_figure(
         trajectory, quantity, point, axis, piece=piece, highest_hz=highest_hz))
 
 
@@ -101,7 +349,7 @@ def plot_poincare(
         For a point or an axis that does not exist, a system without a period, another suffix, or
         a file that cannot be written.
     """
-    return save_figure(path, lambda: figures.poincare_figure(
+    return save_figure(path, lambda: poincare_figure(
         trajectory, point, axis, period=period, phase=phase))
 
 
@@ -118,7 +366,7 @@ def plot_friction_work(trajectory: Trajectory, path: str | Path) -> Path:
     InputError
         For another suffix, or a file that cannot be written.
     """
-    return save_figure(path, lambda: figures.friction_work_figure(trajectory))
+    return save_figure(path, lambda: friction_work_figure(trajectory))
 
 
 def plot_response(
@@ -144,4 +392,4 @@ def plot_response(
         For another suffix, or a file that cannot be written.
     """
     several = [responses] if isinstance(responses, FrequencyResponse) else list(responses)
-    return save_figure(path, lambda: figures.response_figure(several, labels))
+    return save_figure(path, lambda: response_figure(several, labels))

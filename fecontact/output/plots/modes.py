@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from fecontact.core.errors import InputError
 from fecontact.output.plots.style import new_figure
 from fecontact.reduction.convergence import ModeConvergence
-from fecontact.reduction.field import Field
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.modal_basis import Field, ModalBasis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.window import window
 from fecontact.core.units import suitable_unit
-from fecontact.output.plots.figures import thinned
+from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render.frames_data import Motion
 

@@ -19,7 +19,7 @@ from fecontact.output.files.frames import (
     von_mises,
 )
 from fecontact.output.plots.style import state_names
-from fecontact.reduction.field import Field
+from fecontact.reduction.modal_basis import Field
 
 Array = NDArray[np.float64]
 Colour = Literal["displacement", "von_mises"]

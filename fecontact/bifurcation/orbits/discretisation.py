@@ -1,0 +1,266 @@
+"""Periodic orbits by orthogonal collocation: unknowns, mesh, equations and their linearisation."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.linalg.bordered import Border, Bordered
+from fecontact.bifurcation.orbits.collocation_kernels import (
+    at_points,
+    fill_mesh,
+    fill_phase_row,
+    fill_residual,
+)
+from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
+from fecontact.bifurcation.orbits.mesh import (
+    Rule,
+    rule,
+)
+
+Array = NDArray[np.float64]
+
+@dataclass(frozen=True, eq=False)
+class Discretisation:
+    """Equations of a periodic orbit of x' = f(t, x, p), one parameter free.
+
+    With time scaled to [0, 1], x is a polynomial of degree m on each of N intervals, continuous
+    and periodic, and meets x' = T f at the m Gauss points of each. The error falls as h^(m + 1),
+    at the ends of the intervals as h^(2 m). If f does not depend on t, the period T is an unknown
+    and the phase is fixed by int <x, y'> = 0 with the orbit y before; else T is ``periods`` times
+    the period of the forcing.
+
+    The unknowns are ``u = [nodes (N m d), T if it is unknown, parameter]``.
+
+    Attributes
+    ----------
+    field : VectorField
+    values : (k,) array
+        Parameters; the free one is taken from u.
+    free : int
+        Index of the free parameter.
+    mesh : (N + 1,) array
+        Ends of the intervals, from 0 to 1.
+    degree : int
+        m.
+    reference : (N m, d) array
+        Nodes of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        What counts as one in the length of a step: of each state (root mean square over the
+        orbit), of the period, of the parameter.
+    periods : int
+        Periods of the forcing in one of the orbit.
+    second : int, optional
+        Index of another free parameter, which stands before the first one in u; two equations
+        are missing then.
+    """
+
+    field: VectorField
+    values: Array
+    free: int
+    mesh: Array
+    degree: int
+    reference: Array
+    scales: Array
+    periods: int = 1
+    second: int | None = None
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether the period is an unknown."""
+        return self.field.forcing_period(self.values) is None
+
+    @property
+    def intervals(self) -> int:
+        """Number N of intervals."""
+        return len(self.mesh) - 1
+
+    @cached_property
+    def size(self) -> int:
+        """Number N m d of nodal unknowns."""
+        return self.reference.size
+
+    @cached_property
+    def common(self) -> int:
+        """Number of unknowns that all intervals share."""
+        return len(self.active) + self.autonomous
+
+    @cached_property
+    def active(self) -> tuple[int, ...]:
+        """Indices of the parameters that are unknowns, in their order in u."""
+        return (self.free,) if self.second is None else (self.second, self.free)
+
+    @cached_property
+    def rule(self) -> Rule:
+        """Basis polynomials and Gauss points."""
+        return rule(self.degree)
+
+    @cached_property
+    def _on_mesh(self) -> tuple[Array, Array, Array]:
+        """Widths of the intervals, times of the Gauss points, weights of the inner product."""
+        points = self.intervals * self.degree
+        found = (np.empty(self.intervals), np.empty(points), np.empty(self.size + self.common))
+        fill_mesh(self.mesh, self.rule.points, self.scales, *found)
+        return found
+
+    @property
+    def widths(self) -> Array:
+        """Widths (N,) of the intervals."""
+        return self._on_mesh[0]
+
+    @property
+    def times(self) -> Array:
+        """Times (N m,) of the Gauss points in [0, 1]."""
+        return self._on_mesh[1]
+
+    @property
+    def phase_row(self) -> Array:
+        """Row (N m d,) of the phase condition."""
+        return self.phase_border[: self.size]
+
+    @cached_property
+    def phase_border(self) -> Array:
+        """The same over all unknowns."""
+        row = np.empty(self.size + self.common)
+        fill_phase_row(self.reference, self.rule.weights, self.rule.values, self.rule.slopes, row)
+        return row
+
+    def at_gauss_points(self, nodes: Array) -> tuple[Array, Array]:
+        """States (N m, d) and their slopes over one interval, h x', at the Gauss points."""
+        x, slopes = np.empty_like(nodes), np.empty_like(nodes)
+        at_points(nodes, self.rule.values, self.rule.slopes, x, slopes)
+        return x, slopes
+
+    def nodes(self, u: Array) -> Array:
+        """Nodes (N m, d) of the orbit."""
+        return u[: self.size].reshape(self.reference.shape)
+
+    def period(self, u: Array) -> float:
+        """Period T [s] of the orbit."""
+        if self.autonomous:
+            return float(u[self.size])
+        given = self.field.forcing_period(self.parameters(u))
+        assert given is not None
+        return self.periods * given
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[self.free] = u[-1]
+        if self.second is not None:
+            values[self.second] = u[-2]
+        return values
+
+    def weights(self) -> Array:
+        """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""
+        return self._on_mesh[2]
+
+
+_DIFFERENCE = 1e-5  # relative step in a parameter that moves the period of the forcing
+
+
+class CollocationLinearisation:
+    """Residual of the collocation equations at u, and solutions of systems with their derivative.
+
+    Attributes
+    ----------
+    period : float
+        Period T [s].
+
+    Residual: the collocation rows (N m d), interval by interval, Gauss point by Gauss point, and
+    the phase condition where the period is unknown.
+    """
+
+    def __init__(self, problem: Discretisation, u: Array, whole: bool = True) -> None:
+        self.problem, self.u, self._whole = problem, u, whole
+        self.period = problem.period(u)
+        self._x, self._slopes = problem.at_gauss_points(problem.nodes(u))
+        self._last: tuple[Array, float, Bordered] | None = None
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual (N m d + 1,), without the last entry for forced systems."""
+        problem = self.problem
+        if self._whole:
+            f = self.derivatives[0]
+        else:
+            f = problem.field.rates(self._times, self._x, problem.parameters(self.u))
+        out = np.empty(problem.size + problem.autonomous)
+        fill_residual(self._slopes, f, problem.widths, self.period,
+                      problem.phase_border if problem.autonomous else self.u, self.u, out)
+        return out
+
+    @property
+    def _times(self) -> Array:
+        """Times (N m,) [s] of the Gauss points; all zero where nothing depends on them."""
+        if self.problem.autonomous:
+            return np.zeros(len(self._x))
+        return self.problem.times * self.period
+
+    @cached_property
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        """Rates and their derivatives to state and parameter at the Gauss points."""
+        problem, values = self.problem, self.problem.parameters(self.u)
+        f, J, P = problem.field.derivatives(self._times, self._x, values, problem.active)
+        if not problem.autonomous:
+            self._add_forcing(self._x, values, P)
+        return f, J, P
+
+    def _add_forcing(self, x: Array, values: Array, P: Array) -> None:
+        """Let P be the derivative of T f(T tau, x, p) / T where the parameter moves T."""
+        problem, T = self.problem, self.period
+        for place, index in enumerate(problem.active):
+            h = _DIFFERENCE * max(abs(values[index]), 1e-3)
+            sides = []
+            for sign in (1.0, -1.0):
+                beside = values.copy()
+                beside[index] += sign * h
+                period = problem.field.forcing_period(beside)
+                assert period is not None
+                sides.append((beside, problem.periods * period))
+            if sides[0][1] == T == sides[1][1]:
+                continue
+            up, down = (period * problem.field.rates(problem.times * period, x, beside)
+                        for beside, period in sides)
+            P[:, :, place] = (up - down) / (2.0 * h * T)
+
+    @cached_property
+    def factors(self) -> condensation.Factors:
+        """The condensed equations."""
+        problem = self.problem
+        f, J, P = self.derivatives
+        factors = condensation.factors_for(problem.intervals, problem.degree, f.shape[1],
+                                           problem.common)
+        condensation.condense(J, f, P, problem.widths, self.period, problem.rule.values,
+                              problem.rule.slopes, int(problem.autonomous), factors)
+        return factors
+
+    @cached_property
+    def _phase(self) -> "Border":
+        return Border(self.factors, self.problem.phase_border)
+
+    def with_rows(self, rows: list[Array]) -> Bordered:
+        """The matrix [[G_u], [row], [row], ...]."""
+        borders = [self._phase] if self.problem.autonomous else []
+        return Bordered(self.factors, [*borders, *(Border(self.factors, row) for row in rows)], 1.0)
+
+    def bordered(self, row: Array, closing: float = 1.0) -> "Bordered":
+        """The matrix [[G_u], [row]]; ``closing`` = -1 is for x(1) = -x(0)."""
+        if self._last is not None and self._last[0] is row and self._last[1] == closing:
+            return self._last[2]
+        borders = [self._phase] if self.problem.autonomous else []
+        bordered = Bordered(self.factors, [*borders, Border(self.factors, row)], closing)
+        self._last = row, closing, bordered
+        return bordered
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        return self.bordered(row).solve(rhs)
+
+    @cached_property
+    def floquet(self) -> Floquet:
+        """Multipliers and stability."""
+        return floquet_of(self.factors, self.problem.autonomous)
