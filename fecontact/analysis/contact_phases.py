@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 Nodes = int | str | None
 

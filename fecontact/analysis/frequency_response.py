@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 
-Array = NDArray[np.float64]
 Place = tuple[str | int, str]
 Kind = Literal["receptance", "mobility", "accelerance"]
 

@@ -3,14 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
 
-Array = NDArray[np.float64]
 Point = str | int | tuple[float, float]
 
 _OF_POINTS = {"displacement": "m", "velocity": "m/s"}

@@ -11,9 +11,8 @@ from fecontact.analysis.contact_phases import ContactMotion, Nodes
 from fecontact.analysis.periodicity import drive_period
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_not_negative, require_positive
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 # Gauss-Lobatto points and weights on [0, 1]: the ends count for the largest force.
 _PARTS = 0.5 + 0.5 * np.array([-1.0, -math.sqrt(3.0 / 7.0), 0.0, math.sqrt(3.0 / 7.0), 1.0])

@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
-
-Array = NDArray[np.float64]
 
 _LEAST_CHECKS = 8  # returns that must agree before a motion is called periodic
 

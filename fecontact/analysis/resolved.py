@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import FecontactError
+from fecontact.core.types import Array
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status, Trajectory
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # Largest distance of a curve from its straight pieces, of the range of what is drawn.

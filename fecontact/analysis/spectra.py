@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 _EVEN = 1e-6  # part of the spacing by which times may be off
 

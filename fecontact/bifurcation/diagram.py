@@ -7,7 +7,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.continuation.problem import Settings
@@ -15,13 +14,13 @@ from fecontact.bifurcation.equilibria.branches import equilibrium_branch, switch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import motion_of, observe, shot
 from fecontact.core.errors import FecontactError
+from fecontact.core.types import Array
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.diagram_options import BranchSettings
     from fecontact.system.contact_system import ContactSystem
 
-Array = NDArray[np.float64]
 
 _EQUILIBRIA = "steady sliding"
 # Longest step along equilibria, in parts of the diagram.

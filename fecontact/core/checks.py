@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.types import Array, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
 _LARGEST = 1e12  # factor of displacements; they are drawn in single precision
@@ -52,7 +52,7 @@ def as_path(path: Any, what: str) -> Path:
     return found
 
 
-def as_floats(values: Any, what: str) -> NDArray[np.float64]:
+def as_floats(values: Any, what: str) -> Array:
     """An array of numbers; InputError if it is none. ``what`` is its name, for the message."""
     try:
         return np.asarray(values, dtype=float)
@@ -61,7 +61,7 @@ def as_floats(values: Any, what: str) -> NDArray[np.float64]:
                          f"kind.") from None
 
 
-def as_integers(values: Any, what: str) -> NDArray[np.int64]:
+def as_integers(values: Any, what: str) -> Integers:
     """An array of whole numbers; InputError if it is none, or a number has a fraction."""
     found = as_floats(values, what)
     if not (np.isfinite(found) & (found == np.round(found))).all():

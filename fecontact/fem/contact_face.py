@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +131,7 @@ def _check_faces_down(body: ElasticBody, boundary: str) -> None:
                          f"contact boundary.")
 
 
-def _chains(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def _chains(edges: Integers) -> list[Integers]:
     """The edges as runs (k, 2) of successive ones, each run from one end to the other."""
     neighbours: dict[int, list[int]] = {}
     for index, edge in enumerate(edges.tolist()):
@@ -155,14 +153,14 @@ def _chains(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return chains
 
 
-def _in_order(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def _in_order(nodes: Integers) -> Integers:
     """Nodes of successive edges, each once, along the chain."""
     along = nodes[:, :-1].ravel()
     closed = nodes[0, 0] == nodes[-1, -1]
     return along if closed else np.append(along, nodes[-1, -1])
 
 
-def _lengths(body: ElasticBody, nodes: NDArray[np.int64]) -> Array:
+def _lengths(body: ElasticBody, nodes: Integers) -> Array:
     ends = body.nodes[nodes[:, -1]] - body.nodes[nodes[:, 0]]
     return np.asarray(np.linalg.norm(ends, axis=1))
 
@@ -175,7 +173,7 @@ def _shared_out(count: int, totals: Array) -> list[int]:
     return [int(share) for share in shares]
 
 
-def _cut(body: ElasticBody, nodes: NDArray[np.int64], count: int) -> list[Pieces]:
+def _cut(body: ElasticBody, nodes: Integers, count: int) -> list[Pieces]:
     length = _lengths(body, nodes)
     reached = np.concatenate([[0.0], np.cumsum(length)])
     cuts = np.linspace(0.0, reached[-1], count + 1)

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import (
@@ -18,10 +17,9 @@ from fecontact.core.errors import (
     require_positive,
 )
 from fecontact.core.memory import require_memory
+from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.supports import check_supports, expansion, fixed_dofs, hinges
-
-Array = NDArray[np.float64]
 
 # Unknowns of a cell by its corners and the degree, and memory for each to find modes [bytes].
 _UNKNOWNS = {(3, 1): 1, (3, 2): 4, (4, 1): 2, (4, 2): 8}
@@ -199,7 +197,7 @@ class ElasticBody:
         return lateral + 2.0 * shear, lateral, shear
 
     @cached_property
-    def fixed_dofs(self) -> NDArray[np.int64]:
+    def fixed_dofs(self) -> Integers:
         """Degrees of freedom held at zero by the supports, ascending."""
         return fixed_dofs(self.fixed, self._supported)
 
@@ -209,18 +207,18 @@ class ElasticBody:
         return expansion(self.nodes, self.fixed_dofs, self.hinges)
 
     @cached_property
-    def hinges(self) -> list[tuple[NDArray[np.int64], Array]]:
+    def hinges(self) -> list[tuple[Integers, Array]]:
         """Nodes and centre (2,) [m] of each boundary that turns rigidly about its centre."""
         return hinges(self.mesh, self.nodes, self.fixed, self._supported)
 
     @cached_property
-    def _supported(self) -> dict[str, NDArray[np.int64]]:
+    def _supported(self) -> dict[str, Integers]:
         # Meshes may hold a group both ways; only the boundary has the nodes in the middle of edges.
         boundaries, points = self.mesh.boundaries, self.mesh.points
         return {name: np.unique(self.edge_nodes(boundaries[name])) if name in boundaries
                 else np.asarray(points[name]) for name in self.fixed}
 
-    def edge_nodes(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    def edge_nodes(self, edges: Integers) -> Integers:
         """Displacement nodes (k, degree + 1) of mesh edges (k, 2): start, (middle,) end."""
         if self.degree == 1:
             return np.asarray(edges)

@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_floats, as_integers
 from fecontact.core.errors import MeshError, choices, nearest
+from fecontact.core.types import Array, Integers
 
 _FLAT = 1e-12  # area of a degenerate cell, as part of its squared sides
 
@@ -36,10 +37,10 @@ class Mesh:
         outline or is named twice.
     """
 
-    nodes: NDArray[np.float64]
-    cells: NDArray[np.int64]
-    boundaries: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
-    points: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    nodes: Array
+    cells: Integers
+    boundaries: Mapping[str, Integers] = field(default_factory=dict)
+    points: Mapping[str, Integers] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
@@ -100,22 +101,22 @@ class Mesh:
                 raise MeshError(f"Boundary '{name}' names an edge twice.")
 
     @cached_property
-    def outline(self) -> NDArray[np.int64]:
+    def outline(self) -> Integers:
         """Edges (k, 2) that belong to one cell only, the body on their left-hand side."""
         return self._sides[self._cells_at_edges == 1]
 
     @cached_property
-    def _sides(self) -> NDArray[np.int64]:
+    def _sides(self) -> Integers:
         """Edges of each cell in turn, so that inner ones occur twice."""
         return np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2).reshape(-1, 2)
 
     @cached_property
-    def _cells_at_edges(self) -> NDArray[np.int64]:
+    def _cells_at_edges(self) -> Integers:
         """For each row of ``_sides`` the number of cells that have this edge."""
         _, edge, count = np.unique(
             np.sort(self._sides, axis=1), axis=0, return_inverse=True, return_counts=True
         )
-        cells: NDArray[np.int64] = count[edge.ravel()]
+        cells: Integers = count[edge.ravel()]
         return cells
 
     def refined(self) -> "Mesh":
@@ -141,7 +142,7 @@ class Mesh:
                                     for part in parts])
         keys = ends[:, 0] * count + ends[:, 1]
 
-        def halves(boundary: NDArray[np.int64]) -> NDArray[np.int64]:
+        def halves(boundary: Integers) -> Integers:
             ordered = np.sort(boundary, axis=1)
             middle = count + np.searchsorted(keys, ordered[:, 0] * count + ordered[:, 1])
             return np.stack([boundary[:, 0], middle, middle, boundary[:, 1]],
@@ -160,7 +161,7 @@ class Mesh:
         """Length of the diagonal of the bounding box [m]."""
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
-    def boundary(self, name: str) -> NDArray[np.int64]:
+    def boundary(self, name: str) -> Integers:
         """Edges (k, 2) of a named boundary; MeshError lists the names there are."""
         if name not in self.boundaries:
             raise MeshError(
@@ -170,7 +171,7 @@ class Mesh:
         return self.boundaries[name]
 
 
-def _edges(name: str, edges: ArrayLike) -> NDArray[np.int64]:
+def _edges(name: str, edges: ArrayLike) -> Integers:
     array = np.array(edges, np.int64)
     if array.size and (array.ndim != 2 or array.shape[1] != 2):
         raise MeshError(f"Boundary '{name}' must have shape (k, 2), pairs of nodes, not "
@@ -178,19 +179,19 @@ def _edges(name: str, edges: ArrayLike) -> NDArray[np.int64]:
     return array.reshape(-1, 2)
 
 
-def _signed_area(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.float64]:
+def _signed_area(nodes: Array, cells: Integers) -> Array:
     x, y = nodes[cells, 0], nodes[cells, 1]
-    area: NDArray[np.float64] = 0.5 * (
+    area: Array = 0.5 * (
         x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
     return area
 
 
 def _smallest_corner_jacobian(
-    nodes: NDArray[np.float64], cells: NDArray[np.int64]
-) -> NDArray[np.float64]:
+    nodes: Array, cells: Integers
+) -> Array:
     corner = nodes[cells]
     ahead = np.roll(corner, -1, axis=1) - corner
     back = np.roll(corner, 1, axis=1) - corner
-    smallest: NDArray[np.float64] = (
+    smallest: Array = (
         ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]).min(axis=1)
     return smallest

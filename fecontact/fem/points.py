@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest, require_positive
+from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
-
-Array = NDArray[np.float64]
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
@@ -53,7 +51,7 @@ class Rows:
 class Pieces:
     """Parts of straight edges: nodes (k, degree + 1), from s = start to s = end in 0 ... 1."""
 
-    nodes: NDArray[np.int64]
+    nodes: Integers
     start: Array
     end: Array
 
@@ -97,7 +95,7 @@ def node_rows(body: ElasticBody, node: int) -> Rows:
     return Rows(node_matrix(body, np.array([node])), body.nodes[node])
 
 
-def node_matrix(body: ElasticBody, nodes: NDArray[np.int64]) -> Any:
+def node_matrix(body: ElasticBody, nodes: Integers) -> Any:
     """Rows (3 k, 2 N) of k displacement nodes, one after the other."""
     import scipy.sparse as sp
 
@@ -138,12 +136,12 @@ def patch_rows(body: ElasticBody, pieces: Pieces) -> Rows:
     return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), centre)
 
 
-def whole(nodes: NDArray[np.int64]) -> Pieces:
+def whole(nodes: Integers) -> Pieces:
     """Whole edges as pieces."""
     return Pieces(nodes, np.zeros(len(nodes)), np.ones(len(nodes)))
 
 
-def edge_weights(body: ElasticBody, nodes: NDArray[np.int64]) -> Array:
+def edge_weights(body: ElasticBody, nodes: Integers) -> Array:
     """Integrals (k, degree + 1) of the shape functions over whole edges [m]."""
     _, values, lengths = _sampled(whole(nodes), body.nodes)
     return np.einsum("kg,kgn->kn", lengths, values)
@@ -151,7 +149,7 @@ def edge_weights(body: ElasticBody, nodes: NDArray[np.int64]) -> Array:
 
 def _sampled(
     pieces: Pieces, places: Array
-) -> tuple[NDArray[np.int64], Array, Array]:
+) -> tuple[Integers, Array, Array]:
     """Nodes (k, n), shape functions (k, g, n) and weights (k, g) [m] at Gauss points."""
     half = 0.5 * (pieces.end - pieces.start)
     s = pieces.start[:, None] + half[:, None] * (1.0 + _GAUSS)
@@ -193,7 +191,7 @@ def _centre(body: ElasticBody, at: str | tuple[float, float], name: str) -> Arra
     return centre
 
 
-def _node_set_rows(body: ElasticBody, nodes: NDArray[np.int64]) -> Rows:
+def _node_set_rows(body: ElasticBody, nodes: Integers) -> Rows:
     """Rows of several nodes: their best-fitting rigid motion, all weighted alike."""
     import scipy.sparse as sp
 

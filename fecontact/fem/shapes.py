@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices, require_not_negative, require_positive
+from fecontact.core.types import Array
 
 Element = Literal["quadrilateral", "triangle"]
 
@@ -216,7 +216,7 @@ class Grid:
                 if part is not None:
                     yield i, j, part
 
-    def divisions(self, element_size: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def divisions(self, element_size: float) -> tuple[Array, Array]:
         """Elements along each interval of the lines x and y."""
         x, y = (np.clip(np.ceil(np.diff(lines) / max(element_size, 1e-99) - 1e-6), 1.0, 1e99)
                 for lines in (self.x, self.y))

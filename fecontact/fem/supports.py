@@ -4,13 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest
+from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 KINDS = ("x", "y", "xy", "hinge")
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.events import Events, Watched, as_watched
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
@@ -24,8 +25,6 @@ from fecontact.integrate.simulate import require_max_step
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,7 @@ class Ensemble:
     times: Array
     states: Array
     status: tuple[Status, ...]
-    steps: NDArray[np.int64]
+    steps: Integers
     events: tuple[Events, ...] | None = None
 
     @property

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.event_kernels import EVENT, FIRST_OWN
 from fecontact.system.contact_system import ContactSystem
-
-Array = NDArray[np.float64]
 
 CONTACT_EVENTS = ("touch-down", "lift-off", "stick", "slip")
 _AXES = ("x", "y", "phi")
@@ -193,7 +191,7 @@ class Events:
 
     time: Array
     kind: tuple[str, ...]
-    node: NDArray[np.int64]
+    node: Integers
     states: Array
 
     @classmethod

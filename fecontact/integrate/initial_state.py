@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.statics import equilibrium
 from fecontact.system.steady_memory import settled
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,7 @@ class RigidStart:
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-Initial = Literal["rest", "sliding"] | RigidStart | Trajectory | NDArray[np.float64]
+Initial = Literal["rest", "sliding"] | RigidStart | Trajectory | Array
 
 
 def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array:

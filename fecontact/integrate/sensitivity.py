@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish, start
@@ -16,7 +17,6 @@ from fecontact.integrate.rodas5p.variational import MOVE
 from fecontact.integrate.simulate import output_times, require_max_step
 from fecontact.system.contact_system import ContactSystem
 
-Array = NDArray[np.float64]
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
 # Part of the slip velocity over which friction rises by which the ground may be moved.

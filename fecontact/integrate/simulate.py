@@ -8,19 +8,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.memory import require_memory
+from fecontact.core.types import Array
 from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION, POWERS
 from fecontact.system.model_limits import warn_of_limits
-
-Array = NDArray[np.float64]
 
 # Starts deeper than so many penetration scales are warned of.
 _DEEP = 100.0
@@ -237,7 +236,7 @@ def require_max_step(max_step: Any) -> None:
                          f"out for steps as long as the tolerance allows.")
 
 
-def output_times(t_start: float, t_end: float, outputs: Any) -> NDArray[np.float64]:
+def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
     """Output times (N,) of a run; see :func:`simulate`.
 
     Raises

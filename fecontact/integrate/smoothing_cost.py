@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -15,8 +14,6 @@ from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.friction_curve import coefficient, largest_coefficient
 from fecontact.system.contact_system import ContactSystem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.integrate.events import Events
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS
-
-Array = NDArray[np.float64]
 
 
 class Status(Enum):

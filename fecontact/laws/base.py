@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.laws.friction_curve import stick_velocity
 from fecontact.laws.sampling import stored_energy
 
@@ -32,7 +33,7 @@ class Range:
     """
 
     allowed: str
-    holds: Callable[[NDArray[np.float64]], Any]
+    holds: Callable[[Array], Any]
 
 
 Positive = Annotated[PerNode, Range("above zero", lambda x: x > 0.0)]
@@ -108,7 +109,7 @@ class NodeLaw:
                              f"many values each, but {listed}.")
         return next(iter(sizes.values()), None)
 
-    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def table(self, share: Array) -> Array:
         """Parameters (n, k) of n nodes; ``share`` (n,) is each node's part of the face."""
         columns = []
         for entry in fields(self):
@@ -124,7 +125,7 @@ class NodeLaw:
             columns.append(np.broadcast_to(value, share.shape))
         return np.array(columns).T.reshape(len(share), -1).copy()
 
-    def require(self, allowed: str, test: Callable[[NDArray[np.float64]], Any],
+    def require(self, allowed: str, test: Callable[[Array], Any],
                 *names: str) -> None:
         """Raise :class:`InputError` unless every value of the named parameters passes a test."""
         for name in names:
@@ -148,7 +149,7 @@ class NormalLaw(NodeLaw):
         """
         raise NotImplementedError
 
-    def onsets(self, nodes: int) -> NDArray[np.float64]:
+    def onsets(self, nodes: int) -> Array:
         """Penetrations (k, n) of n nodes at which a force begins or ends [m]; here zero.
 
         The time integrator looks for touches between its steps there.
@@ -156,8 +157,8 @@ class NormalLaw(NodeLaw):
         return np.zeros((1, nodes))
 
     def stored_energy(
-        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, penetration: Array, share: Array
+    ) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         return stored_energy(self.kernel.address, penetration, self.table(share),
                              self.penetration_scale)
@@ -173,7 +174,7 @@ class FrictionLaw(NodeLaw):
         return 0
 
     @property
-    def state_scale(self) -> NDArray[np.float64]:
+    def state_scale(self) -> Array:
         """Scale (s,) of each internal variable, for tolerances."""
         return np.ones(self.memory)
 
@@ -182,7 +183,7 @@ class FrictionLaw(NodeLaw):
         """Slip velocity [m/s] over which the force rises, the smallest of all nodes."""
         raise NotImplementedError
 
-    def stick_velocity(self, nodes: int) -> NDArray[np.float64]:
+    def stick_velocity(self, nodes: int) -> Array:
         """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
 
         It is where the friction force is largest for a given normal force; where it has no
@@ -194,9 +195,9 @@ class FrictionLaw(NodeLaw):
 
     def sticks(
         self,
-        slip_velocity: NDArray[np.float64],
-        normal_force: NDArray[np.float64],
-        friction_force: NDArray[np.float64],
+        slip_velocity: Array,
+        normal_force: Array,
+        friction_force: Array,
     ) -> NDArray[np.bool_]:
         """Whether nodes in contact stick, from their slip velocities, F and R, each (N, n)."""
         return np.abs(slip_velocity) < self.stick_velocity(slip_velocity.shape[-1])

@@ -6,10 +6,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.sampling import cycle_work, friction_values, memory_values, normal_values
 from fecontact.laws.signatures import FRICTION_FORM, MEMORY_FORM, NORMAL_FORM
@@ -67,7 +67,6 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
                          f"({place}); a law must return finite numbers everywhere.")
 
 
-Array = NDArray[np.float64]
 Values = Callable[[Array], Array]
 
 _SIZES = np.geomspace(1e-4, 1e4, 97)

@@ -10,14 +10,12 @@ from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from fecontact.core.compiled import CompiledLaw, f8, i8, kernel, matrix, vector
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at
-
-Array = NDArray[np.float64]
 
 
 class Curve(Protocol):

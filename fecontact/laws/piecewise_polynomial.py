@@ -3,11 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import helper
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 
 @helper

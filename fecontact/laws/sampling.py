@@ -2,12 +2,10 @@
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import block, f8, i8, kernel, matrix, vector
+from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at, memory_at, normal_at
-
-Array = NDArray[np.float64]
 
 
 @kernel(types.void(i8, vector, vector, vector, matrix))
@@ -60,8 +58,8 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 def stored_energy(
-    address: int, penetration: NDArray[np.float64], parameters: NDArray[np.float64], scale: float
-) -> NDArray[np.float64]:
+    address: int, penetration: Array, parameters: Array, scale: float
+) -> Array:
     """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u.
 
     Gauss-Legendre quadrature with 16 points in each interval between 0 and 1, 3, 9, 27, ... times
@@ -138,9 +136,9 @@ def _cycles(address, p, F, travel, z, step, work):  # type: ignore[no-untyped-de
 
 
 def cycle_work(
-    address: int, memory: int, p: NDArray[np.float64], normal_force: float, speed: float,
+    address: int, memory: int, p: Array, normal_force: float, speed: float,
     reach: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Work (6,) of friction in each of six cycles of slip from z = 0 [J], and that of its size.
 
     The cycles are of two harmonics with the largest velocity ``speed`` [m/s]; the first one

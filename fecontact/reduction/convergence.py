@@ -4,14 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
+from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.report import BasisReport
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +32,10 @@ class ModeConvergence:
         the worst node.
     """
 
-    unknowns: NDArray[np.int64]
+    unknowns: Integers
     frequencies_hz: Array
     compliance: Array
-    modes: NDArray[np.int64]
+    modes: Integers
     missing: Array
 
     def __str__(self) -> str:

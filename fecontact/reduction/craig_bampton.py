@@ -10,13 +10,11 @@ compliance at the interface is exact as well.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.residual_vectors import Flexibility, diagonalised
-
-Array = NDArray[np.float64]
 
 
 def craig_bampton(system: FreeSystem, rows: Any, count: int) -> tuple[Array, Array]:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_not_negative
+from fecontact.core.types import Array
 
 
 @dataclass(frozen=True)
@@ -50,12 +50,12 @@ class LossFactor:
         require_not_negative("LossFactor", value=self.value)
 
 
-Damping = float | Rayleigh | LossFactor | Sequence[float] | NDArray[np.float64]
+Damping = float | Rayleigh | LossFactor | Sequence[float] | Array
 
 
 def modal_damping(
-    damping: Damping, angular_frequencies: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    damping: Damping, angular_frequencies: Array
+) -> Array:
     """Modal damping matrix (m, m) [1/s], so that ``q'' + damping q' + w^2 q = R``.
 
     Parameters

@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.compiled import block, kernel, matrix, vector
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.factorisation import Factors, factorised
-
-Array = NDArray[np.float64]
 
 # Below this size, and for a large share of all modes, the dense solver is quicker and as exact.
 _DENSE = 600
@@ -55,7 +53,7 @@ class FreeSystem:
                    (E.T @ rigid) / E.multiply(E).sum(axis=0)[:, None])
 
     @cached_property
-    def held(self) -> NDArray[np.int64]:
+    def held(self) -> Integers:
         """Degrees of freedom not supported (f - r,): the other r hold the body isostatically."""
         from scipy.linalg import qr
 

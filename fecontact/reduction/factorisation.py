@@ -8,12 +8,10 @@ from typing import Any, Protocol
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import kernel, matrix, vector
 from fecontact.core.errors import AnalysisError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array, Integers
 
 
 class Factors(Protocol):
@@ -22,7 +20,7 @@ class Factors(Protocol):
     def solve(self, right: Array) -> Array:
         """``A^-1 right`` of one (n,) or several (n, k) right-hand sides."""
 
-    def triangle(self) -> tuple[Any, Array, NDArray[np.int64]]:
+    def triangle(self) -> tuple[Any, Array, Integers]:
         """L, sparse unit lower triangular by columns; the diagonal of D (n,); and the place
         (n,) of each row of A in them.
         """
@@ -38,7 +36,7 @@ class SuperLUFactors:
         """``A^-1 right``."""
         return np.asarray(self.factors.solve(right))
 
-    def triangle(self) -> tuple[Any, Array, NDArray[np.int64]]:
+    def triangle(self) -> tuple[Any, Array, Integers]:
         """L, D and the order; AnalysisError if pivoting has made the factors unsymmetric."""
         if (self.factors.perm_r != self.factors.perm_c).any():
             raise AnalysisError("The stiffness of the held body is not positive definite; look "
@@ -56,7 +54,7 @@ class CholmodFactors:
         """``A^-1 right``."""
         return np.asarray(self.factors.solve_A(right))
 
-    def triangle(self) -> tuple[Any, Array, NDArray[np.int64]]:
+    def triangle(self) -> tuple[Any, Array, Integers]:
         """L, D and the order."""
         L, D = self.factors.L_D()
         return L.tocsc(), D.diagonal(), np.argsort(self.factors.P())
@@ -143,14 +141,14 @@ class SymmetricFactors:
                   np.ascontiguousarray(L.data))
         self.diagonal, self.order = np.asarray(diagonal), order
 
-    def half_solved(self, rows: Any) -> tuple[NDArray[np.int64], Array]:
+    def half_solved(self, rows: Any) -> tuple[Integers, Array]:
         """``D^-1/2 L^-1 P W^T`` of sparse rows W (k, n): the places of its non-zero rows (r,)
         and these rows (r, k).
         """
         size, count = len(self.order), rows.shape[0]
         columns = rows.tocsr()
 
-        def solved(first: int) -> tuple[NDArray[np.int64], Array]:
+        def solved(first: int) -> tuple[Integers, Array]:
             part = columns[first : first + _BLOCK].tocoo()
             x = np.zeros((size, part.shape[0]))
             x[self.order[part.coords[1]], part.coords[0]] = part.data
@@ -172,7 +170,7 @@ class SymmetricFactors:
             column += block.shape[1]
         return kept, result / np.sqrt(self.diagonal[kept, None])
 
-    def completed(self, places: NDArray[np.int64], half: Array) -> Array:
+    def completed(self, places: Integers, half: Array) -> Array:
         """``A^-1 W^T C`` (n, p) from combinations ``half @ C`` (r, p) of half-solved columns."""
         scaled = half / np.sqrt(self.diagonal[places, None])
         result = np.empty((len(self.order), half.shape[1]))

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs, free_modes
 from fecontact.reduction.matrix_files import AssembledMatrix
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.null_space import lowest_vectors, null_space, relative_energies
 from fecontact.reduction.restriction import GivenRows, gathered_rows
-
-Array = NDArray[np.float64]
 
 # Up to this size all modes are kept where no number is given.
 _ALL = 2000
@@ -32,7 +31,7 @@ class Given:
 
     name: str
     matrix: Any
-    labels: NDArray[np.int64] | None
+    labels: Integers | None
 
     def dof(self, number: int) -> str:
         """A degree of freedom in words."""

@@ -5,16 +5,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.eigenmodes import fixed_signs
 from fecontact.reduction.from_matrices import assembled_basis, given_matrix
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.restriction import gathered_rows
-
-Array = NDArray[np.float64]
 
 # Mode shapes are often written with five or six digits.
 _EQUAL = 1e-4
@@ -176,7 +175,7 @@ def _frequencies(hz: ArrayLike | None, angular: ArrayLike | None, m: int) -> Arr
     return w
 
 
-def _reordered(damping: Damping, order: NDArray[np.int64], signs: Array) -> Damping:
+def _reordered(damping: Damping, order: Integers, signs: Array) -> Damping:
     """Damping of the modes in their new order and with their new signs."""
     if isinstance(damping, (LossFactor, Rayleigh)):
         return damping

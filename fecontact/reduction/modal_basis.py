@@ -5,12 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, choices, nearest
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +34,8 @@ class Field:
     """
 
     nodes: Array
-    cells: NDArray[np.int64]
-    outline: NDArray[np.int64]
+    cells: Integers
+    outline: Integers
     shapes: Array
     stress: Array
     restriction: Any

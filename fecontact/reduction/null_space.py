@@ -8,11 +8,9 @@ the matrix either.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array, Integers
 
 _ROUND_OFF = 1e-15
 _DENSE = 600
@@ -95,7 +93,7 @@ def symmetric_factors(matrix: Any) -> Any:
                 options={"SymmetricMode": True})
 
 
-def _supports(vectors: Array) -> NDArray[np.int64]:
+def _supports(vectors: Array) -> Integers:
     """Degrees of freedom (r,) that hold r vectors (d, r), the first of nearly equal ones."""
     left = vectors.copy()
     chosen = []

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.core.types import Array, Integers
 from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.points import Place, Rows, place_rows
@@ -16,9 +16,6 @@ from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_dam
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.reduction.modal_basis import Field, ModalBasis, Quality
 from fecontact.reduction.residual_vectors import Flexibility, residual_modes
-
-Array = NDArray[np.float64]
-
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
@@ -162,7 +159,7 @@ def _quality(
     )
 
 
-def linear_cells(body: ElasticBody) -> NDArray[np.int64]:
+def linear_cells(body: ElasticBody) -> Integers:
     """First-order cells between all displacement nodes, counter-clockwise."""
     # Indices are 64-bit integers in files too.
     dofs = body.basis.element_dofs.astype(np.int64)
@@ -202,5 +199,5 @@ def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
     return place_rows(body, place, name)
 
 
-def _halved(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+def _halved(edges: Integers) -> Integers:
     return np.concatenate([edges[:, i : i + 2] for i in range(edges.shape[1] - 1)])

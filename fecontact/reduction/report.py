@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
-
-Array = NDArray[np.float64]
 
 # Errors of static compliance below this need no remedy; contact laws are known less well.
 _GOOD = 0.1

@@ -14,12 +14,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs
 from fecontact.reduction.factorisation import SymmetricFactors
-
-Array = NDArray[np.float64]
 
 
 class Flexibility:

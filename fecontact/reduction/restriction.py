@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 
 Place = Sequence[int | None]
 
@@ -161,7 +161,7 @@ def _point_block(name: str, given: Any, d: int) -> Any:
     return block if block.shape[0] == 3 else sp.csr_array(sp.vstack([block, sp.csr_array((1, d))]))
 
 
-def _numbers(name: str, given: Any) -> NDArray[np.float64]:
+def _numbers(name: str, given: Any) -> Array:
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):

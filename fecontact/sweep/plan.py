@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.core.memory import require_memory, shown_count
+from fecontact.core.types import Array
 from fecontact.study.sweep_section import Axis, Distribution, Range, SweepSettings
-
-Array = NDArray[np.float64]
 
 _MOST = 10_000_000  # cases; more than that is a slip of the pen
 _BYTES = 2000.0  # memory for the values, the key and the row of a case

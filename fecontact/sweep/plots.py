@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.output.plots.style import COLOURS, distinct_colours, new_figure, save_figure
 from fecontact.study.study import Study
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _FAILED = "#c8c4bc"
 _MOST_LINES = 7

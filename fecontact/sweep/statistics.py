@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.sweep.table import SweepTable
-
-Array = NDArray[np.float64]
 
 QUANTILES = (0.05, 0.5, 0.95)
 _RESAMPLES = 2000

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.analysis.periodicity import count_periods
 from fecontact.core.errors import FecontactError
+from fecontact.core.types import Array
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.initial_state import initial_state
 from fecontact.integrate.trajectory import Status
@@ -15,8 +15,6 @@ from fecontact.study.sweep_section import Strobing
 from fecontact.sweep.case import Case, Row
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
-
-Array = NDArray[np.float64]
 
 _PHASES = 8  # states per period, which show the size of the motion
 _AXES = ("x", "y")

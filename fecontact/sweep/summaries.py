@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import FecontactError, InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.core.user_code import user_function
 from fecontact.integrate.trajectory import ContactState, Trajectory
 from fecontact.system.kernels import POWERS
@@ -170,7 +171,7 @@ def rms_velocity(trajectory: Trajectory, point: Point | None = None) -> float:
     return float(np.sqrt(_mean(trajectory, (velocity[:, :2] ** 2).sum(axis=1))))
 
 
-def _of_point(trajectory: Trajectory, point: Point | None) -> NDArray[np.float64]:
+def _of_point(trajectory: Trajectory, point: Point | None) -> Array:
     return trajectory.displacement(usual_point(trajectory) if point is None else point)
 
 

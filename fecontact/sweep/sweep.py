@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.tables import from_table, plain, require_known, to_table
+from fecontact.core.types import Array
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import SweepSettings, flat_axes
 from fecontact.sweep.batch import Batch, make_basis
@@ -202,7 +202,7 @@ class _Work:
                                  f"a period, not {keep}; compute it again with --overwrite "
                                  f"(overwrite=True).")
 
-    def _strobed(self, rows: Sequence[Row | None]) -> NDArray[np.float64] | None:
+    def _strobed(self, rows: Sequence[Row | None]) -> Array | None:
         if self.settings.strobe is None:
             return None
         nothing = [np.nan] * self.settings.strobe.keep

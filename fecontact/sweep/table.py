@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.sweep.store import write_whole
-
-Array = NDArray[np.float64]
 
 _BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
 

@@ -4,16 +4,14 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array, Integers
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.kernels import SystemArrays
-
-Array = NDArray[np.float64]
 
 _DIRECTIONS = ("x", "y", "moment")
 
@@ -96,7 +94,7 @@ def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
                              f"leave it out, or give the basis rows for that point.")
 
 
-def _law_table(law_groups: Iterable[LawGroup]) -> tuple[NDArray[np.int64], Array]:
+def _law_table(law_groups: Iterable[LawGroup]) -> tuple[Integers, Array]:
     """Addresses (n,) and parameters (n, k) of the laws of all nodes."""
     groups = [(law, law.table(share)) for _, share, law in law_groups]
     width = max(table.shape[1] for _, table in groups)
@@ -114,5 +112,5 @@ def _rows(parameters: list[Array]) -> Array:
     return table
 
 
-def _addresses(kernels: Iterable[CompiledLaw]) -> NDArray[np.int64]:
+def _addresses(kernels: Iterable[CompiledLaw]) -> Integers:
     return np.array([kernel.address for kernel in kernels], dtype=np.int64)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
@@ -21,8 +22,6 @@ from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
 from fecontact.system.arrays import require_motion, system_arrays
 from fecontact.system.gap import Gap, gap_values
-
-Array = NDArray[np.float64]
 
 NO_NORMAL_LAW = ("{}, the law of the normal force, which no default can replace; give a rough "
                  "surface with its stiffness and roughness_height, or another law: `fecontact "

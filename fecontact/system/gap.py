@@ -4,11 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_positive
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 
 @dataclass(frozen=True)

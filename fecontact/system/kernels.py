@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import (
     block,
@@ -28,10 +27,8 @@ from fecontact.core.compiled import (
     matrix,
     vector,
 )
+from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class SystemArrays(NamedTuple):

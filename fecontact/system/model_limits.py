@@ -7,14 +7,12 @@ import warnings
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import ModelWarning
+from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
-
-Array = NDArray[np.float64]
 
 # Penetration of a rough surface, in roughness heights, beyond which a wrong unit or stiffness is
 # likelier than a wish: its asperities are long crushed.

@@ -1,10 +1,10 @@
 """Equilibria: a body resting on the ground, and steady sliding."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError
+from fecontact.core.types import Array
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
 from fecontact.system import kernels as kernels
@@ -12,8 +12,6 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.jacobian import jacobian
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.steady_memory import settled
-
-Array = NDArray[np.float64]
 
 # Part of the load that may be out of balance, however large the rounding of other forces is.
 _UNBALANCED = 1e-6

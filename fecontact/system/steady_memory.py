@@ -2,13 +2,11 @@
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import f8, kernel, vector
+from fecontact.core.types import Array
 from fecontact.laws.signatures import signal_at
 from fecontact.system.kernels import SYSTEM, SystemArrays, memory_of, node_forces, node_motion
-
-Array = NDArray[np.float64]
 
 
 @kernel(types.void(f8, vector, SYSTEM))

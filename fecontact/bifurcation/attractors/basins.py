@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing
 from fecontact.system.contact_system import ContactSystem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class Basins:
 
     first: Array
     second: Array
-    label: NDArray[np.int64]
+    label: Integers
     attractors: tuple[Attractor, ...]
 
 
@@ -197,7 +196,7 @@ def _scale(system: ContactSystem, starts: Array, sets: list[Array | None]) -> Ar
 
 def _told_apart(
     sets: list[Array | None], still: list[bool], scale: Array, tolerance: float
-) -> tuple[NDArray[np.int64], tuple[Attractor, ...]]:
+) -> tuple[Integers, tuple[Attractor, ...]]:
     """Label of each set of points, and the attractors, the most frequent first."""
     labels = np.full(len(sets), -1)
     kinds: list[Literal["equilibrium", "periodic", "aperiodic"]] = []

@@ -5,17 +5,15 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_positive
+from fecontact.core.types import Array
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish, start
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
-
-Array = NDArray[np.float64]
 
 # Intervals integrated in one call, and blocks for the error of the mean.
 _CALL, _BLOCKS = 256, 10

@@ -7,15 +7,15 @@ from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array
 from fecontact.integrate.ensemble import strobe
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
-Array = NDArray[np.float64]
 Change = str | Callable[[ContactSystem, float], ContactSystem]
 
 _AXES = ("x", "y", "phi")

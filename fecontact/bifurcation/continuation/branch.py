@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 
 class Status(Enum):

@@ -7,15 +7,13 @@ turns, s = <n, u> grows through the whole turn, and u is a smooth function of it
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import BranchPoint
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.problem import Problem, Settings
 from fecontact.bifurcation.continuation.special_points import located_between
 from fecontact.core.errors import FecontactError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 _TOLERANCE = 1e-9  # of Newton's method, where the sheets are close to each other
 _STRAIGHT = 1e-5  # turn below which there is no telling where the branch turns to [rad]

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.problem import Linearisation, Problem, Settings
 from fecontact.core.compiled import borrowed, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.errors import AnalysisError, FecontactError
+from fecontact.core.types import Array
 
 
 @helper
@@ -65,8 +65,6 @@ def improve(weights, steps, count):  # type: ignore[no-untyped-def]
                 change[k] /= 1.0 - part
     return math.sqrt(_product(weights, change, change))
 
-
-Array = NDArray[np.float64]
 
 # A matrix is kept as long as each step is shorter than this part of the one before.
 _SERVES = 0.2

@@ -5,12 +5,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, require_positive
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 _PARALLEL = 0.9  # cosine between directions that count as the same
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED
@@ -19,8 +18,7 @@ from fecontact.bifurcation.continuation.newton import Solution, corrected, finis
 from fecontact.bifurcation.continuation.problem import Linearisation, Problem, Settings
 from fecontact.bifurcation.continuation.special_points import between, located_between
 from fecontact.core.errors import FecontactError, InputError, require_finite
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 # Part of the first step below which corners are taken for corners of the branch itself, as contact
 # laws with kinks make them.

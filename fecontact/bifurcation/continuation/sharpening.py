@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import BranchPoint
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED
@@ -24,8 +23,8 @@ from fecontact.bifurcation.orbits.floquet import FLAT
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.normal_forms import verdict
 from fecontact.core.errors import FecontactError
+from fecontact.core.types import Array
 
-Array = NDArray[np.float64]
 # Problem, unknowns and tangent of an orbit.
 Place = tuple[Collocation, Array, Array]
 

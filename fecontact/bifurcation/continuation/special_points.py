@@ -3,15 +3,13 @@
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import BranchPoint
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED, counted, with_count
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.problem import Problem, Settings
 from fecontact.core.errors import FecontactError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 # Newton's method for special points goes on to steps of this relative size.
 _EXACT = 1e-10

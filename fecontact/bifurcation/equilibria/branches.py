@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
 from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
@@ -20,8 +20,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 _GROWTH = 1e4
 

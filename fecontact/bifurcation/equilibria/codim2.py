@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
 from fecontact.bifurcation.continuation.problem import Settings
@@ -23,8 +23,7 @@ from fecontact.bifurcation.equilibria.normal_forms import critical_pair, null_ve
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 _GROWTH = 1e4
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.equilibrium import solution, sorted_eigenvalues
@@ -27,9 +26,7 @@ from fecontact.bifurcation.equilibria.problem import pair_test
 from fecontact.bifurcation.fields.multilinear_forms import bend
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from fecontact.core.types import Array, ComplexArray
 
 # Part of the first w^2 that takes its place in divisions by l where it is smaller.
 _NEAR_ZERO = 1e-12

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array, ComplexArray, Integers
 
 _CONSISTENT = 1e-8
 
@@ -35,8 +34,6 @@ def solution(matrix: Array, rhs: Array) -> Array:
                             "holds the solution in some direction.")
     return np.asarray(x)
 
-
-ComplexArray = NDArray[np.complex128]
 
 _ITERATIONS = 60
 
@@ -138,7 +135,7 @@ def sorted_eigenvalues(jacobian: Array) -> ComplexArray:
     return np.asarray(found[np.lexsort((-found.imag, -found.real))])
 
 
-def unstable_count(eigenvalues: ComplexArray) -> NDArray[np.int64]:
+def unstable_count(eigenvalues: ComplexArray) -> Integers:
     """Number (...) of eigenvalues (..., d) with positive real parts.
 
     Real parts below 1e-10 of the eigenvalue, or 1e-13 of the largest one, count as zero: those of

@@ -3,15 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields.multilinear_forms import Bend, bend
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-
+from fecontact.core.types import Array, ComplexArray
 
 # Parts of the terms of l1, and of what a change of the Jacobian by itself over the scales would
 # make of it, that are rounding.

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.equilibrium import (
@@ -24,9 +23,7 @@ from fecontact.bifurcation.equilibria.normal_forms import (
 from fecontact.bifurcation.fields.multilinear_forms import bend
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from fecontact.core.types import Array, ComplexArray
 
 # Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.
 _TRANSVERSAL = 1e-5

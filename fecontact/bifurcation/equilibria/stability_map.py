@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
@@ -15,9 +15,7 @@ from fecontact.bifurcation.equilibria.equilibrium import (
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import AnalysisError, InputError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from fecontact.core.types import Array, ComplexArray, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +41,7 @@ class StabilityMap:
     second: Array
     states: Array
     critical: ComplexArray
-    unstable: NDArray[np.int64]
+    unstable: Integers
 
     @property
     def growth_rate(self) -> Array:

@@ -16,8 +16,8 @@ from fecontact.core.compiled import (
     matrix,
     vector,
 )
+from fecontact.core.types import Array
 
-Array = NDArray[np.float64]
 c16 = types.complex128
 complex_vector = types.Array(c16, 1, "C")
 complex_matrix = types.Array(c16, 2, "C")

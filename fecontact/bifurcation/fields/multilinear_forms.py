@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import InputError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 # Central differences of order eight and six: weights of f(h k) - f(-h k) for the first, and of
 # f(h k) + f(-h k) - 2 f(0) for the second derivative, k = 1..4.

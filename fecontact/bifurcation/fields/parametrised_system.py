@@ -13,14 +13,13 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError
+from fecontact.core.types import Array
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import SystemArrays
 
-Array = NDArray[np.float64]
 Setter = Callable[[ContactSystem, float], ContactSystem]
 
 _KEPT = 64

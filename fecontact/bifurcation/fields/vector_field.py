@@ -4,12 +4,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 
 class VectorField(ABC):

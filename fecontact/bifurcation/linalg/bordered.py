@@ -1,12 +1,10 @@
 """Collocation systems with further rows: the phase condition, the one that fixes a step."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg import bordered_kernels
 from fecontact.bifurcation.linalg.condensation import Factors, pivot_rows
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 
 class Border:

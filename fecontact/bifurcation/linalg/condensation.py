@@ -20,13 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.lu import eliminate, eliminate_lanes
 from fecontact.core.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.simd import LANES, gather, read, spread, write
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array, Integers
 
 _pivots = types.Array(i8, 2, "C")
 _orders = types.Array(i8, 3, "C")
@@ -44,13 +42,13 @@ class Factors(NamedTuple):
     equations that are chained.
     """
 
-    inner: NDArray[np.float64]
-    inner_order: NDArray[np.int64]
+    inner: Array
+    inner_order: Integers
     local: Array
-    chain: NDArray[np.float64]
-    chain_order: NDArray[np.int64]
+    chain: Array
+    chain_order: Integers
     top: Array
-    top_pivots: NDArray[np.int64]
+    top_pivots: Integers
     end: Array
 
 

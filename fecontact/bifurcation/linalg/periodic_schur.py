@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.transition_matrices import merge
 from fecontact.core.compiled import block, helper, kernel
+from fecontact.core.types import Array
 
 _complex = types.complex128
 _complex_block = types.Array(_complex, 3, "C")
@@ -234,7 +235,7 @@ def product_eigenvalues(M, values):  # type: ignore[no-untyped-def]
     return True
 
 
-def eigenvalues_of_product(factors: NDArray[np.float64]) -> NDArray[np.complex128]:
+def eigenvalues_of_product(factors: Array) -> NDArray[np.complex128]:
     """Eigenvalues (d,) of M[N - 1] ... M[0] for M (N, d, d), by falling modulus.
 
     Each is accurate to about the round-off of the factors times its own condition, however small

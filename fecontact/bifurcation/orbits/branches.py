@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status, require_on_branch
 from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
@@ -26,9 +26,7 @@ from fecontact.core.errors import (
     InputError,
     require_finite,
 )
-
-Array = NDArray[np.float64]
-
+from fecontact.core.types import Array
 
 # Parts of the first step that are tried one after the other to leave a special point.
 _FIRST = (1.0, 0.2, 0.04)

@@ -16,8 +16,7 @@ from fecontact.bifurcation.orbits.collocation import Collocation
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.core.errors import InputError, require_finite, require_positive
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 _KINDS = ("fold", "period doubling", "Neimark-Sacker")
 _DIFFERENCE = 1e-5  # step of the differences of the test function, in the inner product

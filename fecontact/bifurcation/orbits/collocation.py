@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.problem import Problem
@@ -18,8 +17,7 @@ from fecontact.bifurcation.orbits.mesh import (
 from fecontact.bifurcation.orbits.normal_forms import examined
 from fecontact.bifurcation.orbits.same_orbit import HALVING, halves_meet, in_phase, same_heading
 from fecontact.core.errors import InputError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 # The most by which a guess is bent away from the tangent, in steps.
 _MOST_BENT = 0.2

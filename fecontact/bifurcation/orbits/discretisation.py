@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.linalg import condensation
@@ -20,8 +19,8 @@ from fecontact.bifurcation.orbits.mesh import (
     Rule,
     rule,
 )
+from fecontact.core.types import Array
 
-Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Discretisation:

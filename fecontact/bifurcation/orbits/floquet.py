@@ -15,8 +15,6 @@ from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.core.compiled import i8, kernel, vector
 from fecontact.core.errors import AnalysisError
 
-Array = NDArray[np.float64]
-
 # Distances from the unit circle at which a multiplier may lie on either side of it, at least and at
 # the most.
 _ROUNDING, _WORST = 1e-8, 0.1

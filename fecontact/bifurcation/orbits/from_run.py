@@ -3,18 +3,16 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.analysis.periodicity import count_periods
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_not_negative
+from fecontact.core.types import Array
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period
-
-Array = NDArray[np.float64]
 
 _SAMPLES = 1000
 _TRANSIENT_PERIODS, _LARGEST = 200, 16

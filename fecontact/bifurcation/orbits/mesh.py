@@ -9,11 +9,9 @@ from functools import cache
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import borrowed, helper, i8, kernel, matrix, vector
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status, require_on_branch
 from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
@@ -18,8 +18,7 @@ from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.shooting import Shooting, ShootingLinearisation, shooting_from
 from fecontact.core.errors import FecontactError, InputError
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 # Part of their largest distance below which the two halves of an orbit come together. Closer to
 # single orbits Newton's method finds either, as both solve the equations.

@@ -8,12 +8,10 @@ their halves exchanged.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import interpolate, node_times
-
-Array = NDArray[np.float64]
+from fecontact.core.types import Array
 
 # Samples of an orbit in which the shift is looked for roughly.
 _SAMPLES = 512

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, require_on_branch
 from fecontact.bifurcation.fields.contact_field import ContactField
@@ -13,9 +13,8 @@ from fecontact.bifurcation.fields.vector_field import require_field
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.integrate.simulate import simulate
-
-Array = NDArray[np.float64]
 
 
 def orbit_nodes(point: BranchPoint, states: int) -> tuple[Array, Array, int]:

@@ -7,7 +7,6 @@ from functools import cache, cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.continuation.problem import Problem
@@ -19,12 +18,11 @@ from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of, unresolved
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.same_orbit import same_heading
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
-
-Array = NDArray[np.float64]
 
 # Times at which the states of a segment are kept, for their extremes.
 _SAMPLES = 33

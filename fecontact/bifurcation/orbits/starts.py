@@ -6,14 +6,14 @@ A start is a problem, its unknowns u and the direction in which the branch leave
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import Collocation, require_mesh
 from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
 from fecontact.core.errors import AnalysisError, InputError, require_positive
+from fecontact.core.types import Array
 
-Array = NDArray[np.float64]
 Start = tuple[Collocation, Array, Array]
 
 _CORRECTIONS = 25

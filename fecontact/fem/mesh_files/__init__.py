@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.core.atomic_write import replaced
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, MeshError
+from fecontact.core.types import Integers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.abaqus import read_inp
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_points
 from fecontact.fem.mesh_files.med import read_med
-from fecontact.fem.mesh_files.raw import Ints, RawMesh, plane_mesh
+from fecontact.fem.mesh_files.raw import RawMesh, plane_mesh
 
 
 def read_mesh(
@@ -235,7 +236,7 @@ def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
     if np.any(found.point_data.get("nastran:ref", 0)):
         raise MeshError("The file gives nodes in local coordinate systems; export them in the "
                         "basic one.")
-    edges: dict[str, list[Ints]] = {}
+    edges: dict[str, list[Integers]] = {}
     references = found.cell_data.get("nastran:ref", [])
     for block, numbers in zip(found.cells, references, strict=False):
         if block.type in ("line", "line3") and len(numbers) == len(block.data):

@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError
+from fecontact.core.types import Array
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.mesh_files.raw import NODES, Ints, RawMesh
+from fecontact.fem.mesh_files.raw import NODES, RawMesh
 
 _KINDS = {15: "vertex", 1: "line", 8: "line3", 2: "triangle", 9: "triangle6",
           3: "quad", 16: "quad8", 10: "quad9"}
 _SOLIDS = {4: 4, 5: 8, 6: 6, 7: 5, 11: 10, 12: 27, 13: 18, 14: 14, 17: 20, 18: 15, 19: 13}
 
 # Elements of one kind with the physical groups (2.2: one or none, 4.1: of their entity).
-_Block = tuple[str, Ints, list[int]]
+_Block = tuple[str, Integers, list[int]]
 
 
 def read_msh(path: Path) -> RawMesh:
@@ -104,7 +105,7 @@ def _entity_groups(numbers: _Numbers, size: int) -> dict[tuple[int, int], list[i
     return groups
 
 
-def _nodes_41(numbers: _Numbers, size: int) -> tuple[Ints, NDArray[np.float64]]:
+def _nodes_41(numbers: _Numbers, size: int) -> tuple[Integers, Array]:
     tags, points = [], []
     for _ in range(numbers.take(f"u{size}", 4)[0]):
         dimension, _, parametric = numbers.take("i4", 3)
@@ -129,7 +130,7 @@ def _elements_41(
     return blocks
 
 
-def _nodes_22(numbers: _Numbers) -> tuple[Ints, NDArray[np.float64]]:
+def _nodes_22(numbers: _Numbers) -> tuple[Integers, Array]:
     if numbers.binary:
         count, rest = numbers.data.split(b"\n", 1)
         rows = np.frombuffer(rest, [("tag", "i4"), ("xyz", "f8", 3)], int(count))
@@ -139,7 +140,7 @@ def _nodes_22(numbers: _Numbers) -> tuple[Ints, NDArray[np.float64]]:
 
 
 def _elements_22(numbers: _Numbers) -> list[_Block]:
-    rows: dict[tuple[str, int], list[Ints]] = {}
+    rows: dict[tuple[str, int], list[Integers]] = {}
     if numbers.binary:
         count, numbers.data = numbers.data.split(b"\n", 1)
         left = int(count)
@@ -174,13 +175,13 @@ def _kind(code: int) -> tuple[str, int]:
 
 
 def _raw_mesh(
-    tags: Ints, points: NDArray[np.float64], blocks: list[_Block],
+    tags: Integers, points: Array, blocks: list[_Block],
     names: dict[tuple[int, int], str],
 ) -> RawMesh:
     order = np.argsort(tags, kind="stable")
     tags, points = tags[order], points[order]
-    cells: list[tuple[str, Ints]] = []
-    groups: tuple[dict[str, list[Ints]], dict[str, list[Ints]]] = ({}, {})
+    cells: list[tuple[str, Integers]] = []
+    groups: tuple[dict[str, list[Integers]], dict[str, list[Integers]]] = ({}, {})
     for kind, block, physical in blocks:
         index = np.searchsorted(tags, block)
         if (tags[np.minimum(index, len(tags) - 1)] != block).any():

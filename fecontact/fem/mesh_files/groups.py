@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.mesh_files.raw import Groups, Ints, edges_on_outline
+from fecontact.fem.mesh_files.raw import Groups, edges_on_outline
 
 Box = tuple[float, float, float, float]
 
@@ -17,7 +17,7 @@ _BOX_TOLERANCE = 1e-6  # of the body's size
 
 def named_boundaries(
     mesh: Mesh, groups: Groups, wanted: Mapping[str, str | Box]
-) -> dict[str, Ints]:
+) -> dict[str, Integers]:
     """The file's boundaries, with those that are asked for under their new names.
 
     Raises
@@ -45,7 +45,7 @@ def named_boundaries(
 
 def named_points(
     mesh: Mesh, groups: Groups, wanted: Mapping[str, str | tuple[float, float]]
-) -> dict[str, Ints]:
+) -> dict[str, Integers]:
     """The file's points, with those that are asked for under their new names.
 
     Raises
@@ -80,7 +80,7 @@ def _no_group(
                      f"{nearest(source, available)}; the file's groups are: {choices(available)}.")
 
 
-def _edges_in_box(mesh: Mesh, name: str, box: Box) -> Ints:
+def _edges_in_box(mesh: Mesh, name: str, box: Box) -> Integers:
     values = _numbers(box, 4, f"Boundary '{name}' must be the name of a group or a box "
                               f"(x0, y0, x1, y1) in metres")
     low = np.minimum(values[:2], values[2:]) - _BOX_TOLERANCE * mesh.extent
@@ -92,7 +92,7 @@ def _edges_in_box(mesh: Mesh, name: str, box: Box) -> Ints:
     return edges
 
 
-def _node_at(mesh: Mesh, name: str, place: tuple[float, float]) -> Ints:
+def _node_at(mesh: Mesh, name: str, place: tuple[float, float]) -> Integers:
     where = _numbers(place, 2, f"Point '{name}' must be the name of a group or a place (x, y) in "
                                f"metres")
     distance = np.linalg.norm(mesh.nodes - where, axis=1)
@@ -110,7 +110,7 @@ def _node_at(mesh: Mesh, name: str, place: tuple[float, float]) -> Ints:
     return np.array([node])
 
 
-def _numbers(values: Any, count: int, message: str) -> NDArray[np.float64]:
+def _numbers(values: Any, count: int, message: str) -> Array:
     try:
         numbers = np.array(values, float)
     except (TypeError, ValueError):

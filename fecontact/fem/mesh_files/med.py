@@ -10,7 +10,8 @@ import numpy as np
 
 from fecontact.core.errors import MeshError
 from fecontact.core.stored import member, values
-from fecontact.fem.mesh_files.raw import Ints, RawMesh
+from fecontact.core.types import Integers
+from fecontact.fem.mesh_files.raw import RawMesh
 
 _KINDS = {"PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
           "QU4": "quad", "QU8": "quad8", "QU9": "quad9"}
@@ -61,12 +62,12 @@ def _families(families: Any, support: str) -> dict[int, list[str]]:
 def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
               of_cells: dict[int, list[str]]) -> RawMesh:
     points = values(member(step, "NOE/COO")).reshape(dimension, -1).T
-    nodes: dict[str, list[Ints]] = {}
-    edges: dict[str, list[Ints]] = {}
-    cells: list[tuple[str, Ints]] = []
+    nodes: dict[str, list[Integers]] = {}
+    edges: dict[str, list[Integers]] = {}
+    cells: list[tuple[str, Integers]] = []
 
-    def collect(into: dict[str, list[Ints]], names: dict[int, list[str]], stored: Any,
-                members: Ints) -> None:
+    def collect(into: dict[str, list[Integers]], names: dict[int, list[str]], stored: Any,
+                members: Integers) -> None:
         if "FAM" not in stored:
             return
         family = values(stored["FAM"])

@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError
+from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 NODES = {"vertex": 1, "line": 2, "line3": 3,
@@ -41,10 +39,10 @@ class RawMesh:
         Whether a group of nodes that are joined by edges of the outline is a boundary as well.
     """
 
-    points: Floats
-    cells: list[tuple[str, Ints]]
-    edges: dict[str, Ints] = field(default_factory=dict)
-    nodes: dict[str, Ints] = field(default_factory=dict)
+    points: Array
+    cells: list[tuple[str, Integers]]
+    edges: dict[str, Integers] = field(default_factory=dict)
+    nodes: dict[str, Integers] = field(default_factory=dict)
     sets_are_boundaries: bool = False
 
 
@@ -52,8 +50,8 @@ class RawMesh:
 class Groups:
     """Named groups of a mesh, and the names of those that hold nothing of the body."""
 
-    boundaries: dict[str, Ints]
-    points: dict[str, Ints]
+    boundaries: dict[str, Integers]
+    points: dict[str, Integers]
     empty: tuple[str, ...]
 
 
@@ -96,15 +94,15 @@ def plane_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     return mesh, _groups(raw, mesh, number)
 
 
-def edges_on_outline(mesh: Mesh, chosen: NDArray[np.bool_]) -> Ints:
+def edges_on_outline(mesh: Mesh, chosen: NDArray[np.bool_]) -> Integers:
     """Outline edges whose two nodes are both chosen, ``chosen`` being a mask of the nodes."""
-    edges: Ints = mesh.outline[chosen[mesh.outline].all(axis=1)]
+    edges: Integers = mesh.outline[chosen[mesh.outline].all(axis=1)]
     return edges
 
 
-def _groups(raw: RawMesh, mesh: Mesh, number: Ints) -> Groups:
-    boundaries: dict[str, Ints] = {}
-    points: dict[str, Ints] = {}
+def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
+    boundaries: dict[str, Integers] = {}
+    points: dict[str, Integers] = {}
     row = {frozenset(edge): k for k, edge in enumerate(mesh.outline.tolist())}
     for name, group in raw.nodes.items():
         nodes = np.unique(number[group])
@@ -132,7 +130,7 @@ def _groups(raw: RawMesh, mesh: Mesh, number: Ints) -> Groups:
     return Groups(boundaries, points, empty)
 
 
-def _plane_cells(cells: list[tuple[str, Ints]]) -> tuple[list[Ints], Ints]:
+def _plane_cells(cells: list[tuple[str, Integers]]) -> tuple[list[Integers], Integers]:
     """Second-order cells with all their nodes, and the corners of all cells."""
     plane = [(kind, block) for kind, block in cells if len(block)]
     other = sorted({kind for kind, _ in plane if kind not in CORNERS})
@@ -157,14 +155,14 @@ def _plane_cells(cells: list[tuple[str, Ints]]) -> tuple[list[Ints], Ints]:
     return second_order, np.concatenate([block[:, :CORNERS[kind]] for kind, block in plane])
 
 
-def _require_plane(points: Floats, size: float) -> None:
+def _require_plane(points: Array, size: float) -> None:
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > _ROUNDED * size:
         low, high = points[:, 2].min(), points[:, 2].max()
         raise MeshError(f"The mesh is a 3-D mesh (z runs from {low:g} to {high:g} m), but "
                         f"fecontact's bodies are plane; turn it into the x-y plane.")
 
 
-def _require_straight(points: Floats, cells: Ints, size: float) -> None:
+def _require_straight(points: Array, cells: Integers, size: float) -> None:
     corners = 3 if cells.shape[1] == 6 else 4
     start = points[cells[:, :corners]]
     chord = np.roll(start, -1, axis=1) - start
@@ -180,7 +178,7 @@ def _require_straight(points: Floats, cells: Ints, size: float) -> None:
         )
 
 
-def _first_of_coincident(points: Floats, tolerance: float) -> Ints:
+def _first_of_coincident(points: Array, tolerance: float) -> Integers:
     """For each point, the lowest-numbered of those that coincide with it."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -191,7 +189,7 @@ def _first_of_coincident(points: Floats, tolerance: float) -> Ints:
     joined = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
     _, label = connected_components(joined, directed=False)
     _, first = np.unique(label, return_index=True)
-    result: Ints = first[label]
+    result: Integers = first[label]
     return result
 
 

@@ -7,9 +7,9 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.reference.scipy import longest_step
@@ -17,8 +17,6 @@ from fecontact.integrate.trajectory import Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS
-
-Array = NDArray[np.float64]
 
 SCHEMES = ("auto", "events", "stepping")
 
@@ -214,7 +212,7 @@ def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
     return replace(law, **steep)
 
 
-def _clusters(Tx: Array) -> tuple[NDArray[np.int64], Array]:
+def _clusters(Tx: Array) -> tuple[Integers, Array]:
     """Cluster (n,) of each node and row (k, m) of each cluster."""
     scale = np.abs(Tx).max(initial=0.0)
     rows: list[Array] = []

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import borrowed, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.types import Array
 from fecontact.integrate.bernstein import (
     DEPTH,
     FINEST,
@@ -40,8 +40,6 @@ from fecontact.integrate.nonsmooth.problem import (
     Problem,
 )
 from fecontact.laws.signatures import ground_at, normal_at, signal_at
-
-Array = NDArray[np.float64]
 
 # Rounding of a sum, and of forces that come from a system of equations, relative to their parts.
 _ROUNDING, _FORCE_ROUNDING = 2e-15, 1e-13

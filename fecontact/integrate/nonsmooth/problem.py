@@ -4,13 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import f8, i8, integers, matrix, vector
+from fecontact.core.types import Array, Integers
 from fecontact.system.kernels import SYSTEM
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
 # curve of the coefficient has not begun to change.

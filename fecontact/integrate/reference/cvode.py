@@ -5,14 +5,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.integrate.reference import scipy
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
-
-Array = NDArray[np.float64]
 
 
 def integrate(

@@ -5,13 +5,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS, powers, right_hand_side
-
-Array = NDArray[np.float64]
 
 METHODS = ("Radau", "BDF", "LSODA")
 

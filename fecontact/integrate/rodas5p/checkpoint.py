@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from fecontact.core.atomic_write import replaced
 from fecontact.core.errors import InputError
 from fecontact.core.stored import DamagedError, npz_arrays, reading
+from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.state import OUTPUTS
-
-Array = NDArray[np.float64]
 
 _COUNTS = 1  # place of the counts among the leaves of the progress
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.integrate.events import Events, Watched
 from fecontact.integrate.reference.scipy import energy_scale
 from fecontact.integrate.rodas5p import state as run_arrays
@@ -22,8 +22,6 @@ from fecontact.integrate.rodas5p.variational import variation_for
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS
-
-Array = NDArray[np.float64]
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.

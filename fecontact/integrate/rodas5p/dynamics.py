@@ -7,15 +7,12 @@ nodes side by side in ``shapes`` (m, 2 n), so that sums over nodes vectorise.
 import math
 from typing import NamedTuple
 
-import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import block, helper, matrix
+from fecontact.core.types import Array
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system import kernels as kernels
-
-Array = NDArray[np.float64]
 
 # Entries of what is given in time: drive x and y, travel and speed of the ground, and their rates.
 DRIVE_X, DRIVE_Y, TRAVEL, SPEED, DRIVE_X_RATE, DRIVE_Y_RATE = range(6)

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import (
     borrowed,
@@ -25,6 +24,7 @@ from fecontact.core.compiled import (
     matrix,
     vector,
 )
+from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein
 from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, changes
 from fecontact.integrate.rodas5p import dynamics, tableau
@@ -32,9 +32,6 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.laws.signatures import signal_at
 from fecontact.system import kernels as kernels
 from fecontact.system.kernels import SYSTEM
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 EVENT = f8(f8, vector, vector)
 event_at = function_at(EVENT)

@@ -4,16 +4,14 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import state, step_loop
 from fecontact.integrate.rodas5p.event_kernels import FOUND, Watch
 from fecontact.integrate.rodas5p.state import Control, Progress, Room
 from fecontact.integrate.rodas5p.variational import Variation
-
-Array = NDArray[np.float64]
 
 
 class Vary(NamedTuple):

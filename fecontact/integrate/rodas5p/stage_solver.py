@@ -18,12 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import block, helper, integers, matrix, vector
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.dynamics import project
-
-Array = NDArray[np.float64]
 
 
 class Reduced(NamedTuple):
@@ -35,7 +33,7 @@ class Reduced(NamedTuple):
 
     J: Array
     factors: Array
-    pivots: NDArray[np.int64]
+    pivots: Integers
     inverse: Array
     weights: Array
     room: Array

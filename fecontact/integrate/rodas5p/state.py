@@ -4,15 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import f8, i8, integers, matrix, vector
+from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.system.kernels import POWERS
-
-Array = NDArray[np.float64]
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
 # fail may still lie ahead, else zero. ENERGY is the largest energy or work so far.
@@ -90,7 +88,7 @@ class Progress(NamedTuple):
     """
 
     numbers: Array
-    counts: NDArray[np.int64]
+    counts: Integers
     state: Array
     rate: Array
     extremes: Array

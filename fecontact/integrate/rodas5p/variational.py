@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
+from fecontact.core.types import Array
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.laws.signatures import ground_at, signal_at
@@ -118,8 +118,6 @@ def differences(ahead, here, behind, usual, factor, u, travelled, sinking, shape
                     ahead.rates[j, row, k], here.rates[j, row, k], behind.rates[j, row, k], factor,
                     forward, usual.rates[j, row, k])
 
-
-Array = NDArray[np.float64]
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5

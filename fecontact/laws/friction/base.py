@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.laws import base
 from fecontact.laws.base import NodeLaw, Positive
-
-Array = NDArray[np.float64]
 
 Smoothing = Literal["arctan", "tanh", "square-root"]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import helper
+from fecontact.core.types import Array
 from fecontact.laws.base import NotNegative, OneOrAbove, PerNode, Positive, Range
 from fecontact.laws.friction.base import MemoryFriction, require_at_least
 from fecontact.laws.signatures import memory_friction_law
@@ -96,9 +96,6 @@ def bouc_wen(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
     rates[0, 2] = 0.0
     side = 1.0 if z[0] >= 0.0 else -1.0
     rates[0, 3] = -v * share * exponent * power * side / yielding
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

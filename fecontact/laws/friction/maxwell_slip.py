@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.laws.base import NotNegative, Positive
 from fecontact.laws.friction.base import MemoryFriction
 from fecontact.laws.signatures import memory_friction_law
-
-Array = NDArray[np.float64]
 
 
 @memory_friction_law

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.data_columns import numbers
 from fecontact.laws.ground.profile import Profile
 from fecontact.laws.signatures import ground_profile
-
-Array = NDArray[np.float64]
 
 
 @ground_profile

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.ground.motion import (
     GroundMotion,
     HarmonicSpeed,
@@ -16,8 +17,6 @@ from fecontact.laws.ground.motion import (
     constant_speed,
 )
 from fecontact.laws.ground.profile import Flat, Profile, Sine
-
-Array = NDArray[np.float64]
 
 __all__ = ["Ground", "GroundMotion", "HarmonicSpeed", "SpeedRamp"]
 

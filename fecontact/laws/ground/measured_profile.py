@@ -5,9 +5,9 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
 from fecontact.laws.ground.profile import Profile
 from fecontact.laws.piecewise_polynomial import (
@@ -17,8 +17,6 @@ from fecontact.laws.piecewise_polynomial import (
     piecewise_parameters,
 )
 from fecontact.laws.signatures import ground_profile
-
-Array = NDArray[np.float64]
 
 
 @ground_profile

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import require_finite, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.signals.base import between
 from fecontact.laws.signatures import signal
-
-Array = NDArray[np.float64]
 
 # Samples of a speed that is known by its values alone.
 _SAMPLES = 10_001

@@ -7,13 +7,11 @@ from numbers import Integral
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_not_negative, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.ground.fourier_series import FourierSeries, fourier
 from fecontact.laws.ground.profile import Profile
-
-Array = NDArray[np.float64]
 
 _MOST_HARMONICS = 100_000
 

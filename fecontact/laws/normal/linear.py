@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, Positive
 from fecontact.laws.signatures import normal_law
 
@@ -54,8 +54,8 @@ class LinearContact(NormalLaw):
         return 1.0 / float(np.max(self.stiffness))
 
     def stored_energy(
-        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, penetration: Array, share: Array
+    ) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         return np.asarray(0.5 * self.table(share)[:, 0] * np.maximum(penetration, 0.0) ** 2)
 
@@ -121,13 +121,13 @@ class TwoSidedStop(NormalLaw):
         stiffness, exponent = np.asarray(self.stiffness), np.asarray(self.exponent)
         return float(np.min(stiffness ** (-1.0 / exponent)))
 
-    def onsets(self, nodes: int) -> NDArray[np.float64]:
+    def onsets(self, nodes: int) -> Array:
         """Zero and minus the clearance (2, n) [m]."""
         return np.array([np.zeros(nodes), np.broadcast_to(-np.asarray(self.clearance), nodes)])
 
     def stored_energy(
-        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, penetration: Array, share: Array
+    ) -> Array:
         """Energy (..., n) stored in both stops [J]: the integral of F(u, 0) from 0 to u."""
         stiffness, clearance, exponent, _ = self.table(share).T
         depth = np.maximum(penetration, np.maximum(-penetration - clearance, 0.0))
@@ -168,7 +168,7 @@ class PrescribedForce(NormalLaw):
         return 1e-6
 
     def stored_energy(
-        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, penetration: Array, share: Array
+    ) -> Array:
         """Energy (..., n) of the force [J]: F_0 u, zero at u = 0."""
         return np.asarray(self.table(share)[:, 0] * penetration)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.base import PerNode
 from fecontact.laws.data_columns import read_columns
 from fecontact.laws.normal.rough_surface import RoughSurface, bed_of_asperities
@@ -140,8 +140,8 @@ class MeasuredSurface(RoughSurface):
     @classmethod
     def from_heights(
         cls,
-        heights: Sequence[float] | NDArray[np.float64],
-        abscissa: Sequence[float] | NDArray[np.float64] | None = None,
+        heights: Sequence[float] | Array,
+        abscissa: Sequence[float] | Array | None = None,
         *,
         stiffness: PerNode,
         damping: PerNode = 0.0,
@@ -223,7 +223,7 @@ class MeasuredSurface(RoughSurface):
             raise InputError(f"MeasuredSurface: file = '{file}': "
                              f"{str(error).removeprefix('MeasuredSurface: ')}") from None
 
-    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def table(self, share: Array) -> Array:
         """Parameters (n, 3 + 3 k): c, R_Z, beta c, and f, h, h' at k depths."""
         curve = self._curve()
         knots = np.column_stack([curve.antiderivative()(_DEPTHS), curve(_DEPTHS),
@@ -242,8 +242,8 @@ class MeasuredSurface(RoughSurface):
         return float(self._curve().antiderivative()(1.0))
 
     def _energy(
-        self, s: NDArray[np.float64], table: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, s: Array, table: Array
+    ) -> Array:
         return np.asarray(self._curve().antiderivative(2)(s))
 
 
@@ -253,7 +253,7 @@ class _Bed(RoughSurface):
         return f"{MeasuredSurface.__name__}: {name}"
 
 
-def _numbers(given: Any, name: str) -> NDArray[np.float64]:
+def _numbers(given: Any, name: str) -> Array:
     try:
         values = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
@@ -266,5 +266,5 @@ def _numbers(given: Any, name: str) -> NDArray[np.float64]:
     return values
 
 
-def _shown(values: NDArray[np.float64]) -> str:
+def _shown(values: Array) -> str:
     return str(values.tolist()) if len(values) <= 8 else f"[{values[0]}, ..., {values[-1]}]"

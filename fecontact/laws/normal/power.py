@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, PerNode, Positive, UpToOne
 from fecontact.laws.signatures import normal_law
 
@@ -44,8 +44,8 @@ class _Power(NormalLaw):
         return float(np.min(table[:, 1] * table[:, 0] ** (-1.0 / table[:, 2])))
 
     def stored_energy(
-        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, penetration: Array, share: Array
+    ) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         scale, length, exponent, _ = self.table(share).T
         s = np.maximum(penetration / length, 0.0)
@@ -88,7 +88,7 @@ class PowerContact(_Power):
     exponent: OneOrAbove = 1.5
     damping_factor: NotNegative = 0.0
 
-    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def table(self, share: Array) -> Array:
         """Parameters (n, 4): K, 1, n, chi."""
         return np.insert(super().table(share), 1, 1.0, axis=1)
 
@@ -150,7 +150,7 @@ class RestitutionContact(_Power):
             self.require("above zero and at most 1", lambda e: (e > 0) & (e <= 1), "restitution")
 
     @property
-    def damping_factor(self) -> float | NDArray[np.float64]:
+    def damping_factor(self) -> float | Array:
         """Damping factor chi [s/m], of the face or (n,) of each node."""
         e = np.asarray(self.restitution, dtype=float)
         if self.damping_model == "lankarani-nikravesh":
@@ -162,7 +162,7 @@ class RestitutionContact(_Power):
         factor = product / np.asarray(self.reference_velocity, dtype=float)
         return factor if factor.ndim else float(factor)
 
-    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def table(self, share: Array) -> Array:
         """Parameters (n, 4): K, 1, n, chi."""
         stiffness, _, _, exponent, _ = super().table(share).T
         factor = np.broadcast_to(self.damping_factor, share.shape)
@@ -228,7 +228,7 @@ class PowerLawContact(_Power):
         """Penetration under a pressure of 1 MPa [m], the smallest of all nodes."""
         return float(np.min(self.coefficient * np.power(1e6, self.exponent)))
 
-    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def table(self, share: Array) -> Array:
         """Parameters (n, 4): A, C, 1/m, chi."""
         area, coefficient, exponent, factor = super().table(share).T
         return np.column_stack([area, coefficient, 1.0 / exponent, factor])

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import helper
+from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive, Range
 from fecontact.laws.signatures import normal_law
 
@@ -162,8 +162,8 @@ class RoughSurface(NormalLaw):
         return float(np.min(self.roughness_height))
 
     def stored_energy(
-        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, penetration: Array, share: Array
+    ) -> Array:
         """Energy (..., n) stored in the asperities [J]: the integral of F(u, 0) from 0 to u."""
         table = self.table(share)
         stiffness, height = table[:, 0], table[:, 1]
@@ -179,8 +179,8 @@ class RoughSurface(NormalLaw):
         return 0.5
 
     def _energy(
-        self, s: NDArray[np.float64], table: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, s: Array, table: Array
+    ) -> Array:
         """Integral of f from 0 to s, for s within 0 ... 1."""
         return s**3 / 6.0
 
@@ -208,8 +208,8 @@ class ParabolicSurface(RoughSurface):
     kernel: ClassVar = parabolic
 
     def _energy(
-        self, s: NDArray[np.float64], table: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, s: Array, table: Array
+    ) -> Array:
         return s**4 * (0.25 - 0.1 * s)
 
 
@@ -236,8 +236,8 @@ class CosineSurface(RoughSurface):
     kernel: ClassVar = cosine
 
     def _energy(
-        self, s: NDArray[np.float64], table: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, s: Array, table: Array
+    ) -> Array:
         x = _TAU * s
         series = x**5 / 120.0 * (1.0 - x**2 / 42.0 * (1.0 - x**2 / 72.0 * (1.0 - x**2 / 110.0)))
         return np.where(x < 0.2, series, x**3 / 6.0 - x + np.sin(x)) / _TAU**3
@@ -272,7 +272,7 @@ class GaussianSurface(RoughSurface):
     deviation: Annotated[PerNode, Range(
         "at least 0.02 and at most 1", lambda x: (x >= 0.02) & (x <= 1.0))] = 1.0 / 6.0
 
-    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def table(self, share: Array) -> Array:
         """Parameters (n, 7): the fields, and three integrals of the density at the highest peak."""
         from scipy.special import erf, ndtr
 
@@ -282,13 +282,13 @@ class GaussianSurface(RoughSurface):
         return np.column_stack([table, ndtr(-b), first_moment, 1.0 / erf(b * _ROOT_HALF)])
 
     def _energy(
-        self, s: NDArray[np.float64], table: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, s: Array, table: Array
+    ) -> Array:
         from scipy.special import ndtr
 
         deviation, highest, first_moment, norm = table[:, 3:7].T
 
-        def second(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        def second(t: Array) -> Array:
             return np.asarray((t**2 + 1.0) * ndtr(t) + t * _DENSITY * np.exp(-0.5 * t**2)) / 2.0
 
         moments = second((s - 0.5) / deviation) - second(-0.5 / deviation)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive
 from fecontact.laws.signatures import normal_law
 
@@ -69,13 +69,13 @@ class ExponentialContact(NormalLaw):
         """Penetration u_0 over which the force grows by a factor e [m], the smallest of all."""
         return float(np.min(self.decay_length))
 
-    def onsets(self, nodes: int) -> NDArray[np.float64]:
+    def onsets(self, nodes: int) -> Array:
         """Where the force is exp(-10) of that at u = 0 (1, n) [m]."""
         return np.full((1, nodes), -10.0 * np.asarray(self.decay_length))
 
     def stored_energy(
-        self, penetration: NDArray[np.float64], share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, penetration: Array, share: Array
+    ) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         force, length, _ = self.table(share).T
         s = np.maximum(penetration / length, _FARTHEST)
@@ -87,7 +87,7 @@ class ExponentialContact(NormalLaw):
 _CLOSEST, _INTERVALS_PER_UNIT, _APART, _DEGREE = -10.0, 2.0, 9.0, 9
 
 
-def _logarithm_of_loads() -> NDArray[np.float64]:
+def _logarithm_of_loads() -> Array:
     """Polynomials (intervals, degree + 1) of ln F_3/2(h) in x = -1 ... 1, highest power first.
 
     F_3/2(h) is the integral of (s - h)^(3/2) phi(s) over s > h, phi the normal density. With
@@ -196,12 +196,12 @@ class GreenwoodWilliamson(NormalLaw):
         """Standard deviation sigma of the asperity heights [m], the smallest of all nodes."""
         return float(np.min(self.height_deviation))
 
-    def onsets(self, nodes: int) -> NDArray[np.float64]:
+    def onsets(self, nodes: int) -> Array:
         """Where h = 5, and the force 1e-7 of that at h = 0 (1, n) [m]."""
         away = np.asarray(self.separation) - 5.0
         return np.array(np.broadcast_to(np.asarray(self.height_deviation) * away, (1, nodes)))
 
-    def table(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def table(self, share: Array) -> Array:
         """Parameters (n, 4): 4/3 E* R^(1/2) N sigma^(3/2), sigma, h_0, chi."""
         count, radius, modulus, deviation, separation, factor = super().table(share).T
         scale = 4.0 / 3.0 * modulus * np.sqrt(radius) * count * deviation**1.5

@@ -5,13 +5,12 @@ from typing import ClassVar
 
 import numpy as np
 from numba import types
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.compiled import CompiledLaw, i8, kernel, matrix, vector
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.laws.signatures import signal_at
-
-Array = NDArray[np.float64]
 
 
 @kernel(types.void(i8, vector, vector, matrix))

@@ -5,15 +5,14 @@ from dataclasses import dataclass, fields
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.data_columns import numbers
 from fecontact.laws.signals.base import Signal, between, require_one_of
 from fecontact.laws.signals.transient import Pulse, Step, Tabulated
 from fecontact.laws.signatures import signal
-
-Array = NDArray[np.float64]
 
 __all__ = ["Constant", "Harmonic", "Harmonics", "Pulse", "Signal", "Step", "Sweep", "Tabulated"]
 

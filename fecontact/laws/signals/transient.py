@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.types import Array
 from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
 from fecontact.laws.piecewise_polynomial import (
     curve_range,
@@ -19,8 +19,6 @@ from fecontact.laws.piecewise_polynomial import (
 )
 from fecontact.laws.signals.base import Signal, between, require_one_of
 from fecontact.laws.signatures import signal
-
-Array = NDArray[np.float64]
 
 _PULSES = ("half-sine", "rectangle", "triangle", "haversine")
 _RISE = 0.01

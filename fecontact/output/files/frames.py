@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import Field
-
-Array = NDArray[np.float64]
-
 
 
 def frame_indices(

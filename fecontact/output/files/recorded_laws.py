@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.laws.registry import UntrustedError
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import gap_values
 from fecontact.system.tables import system_parts
-
-Array = NDArray[np.float64]
 
 LAW_PARTS = ("normal", "friction")
 

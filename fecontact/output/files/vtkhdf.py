@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.frames import (
     blocks,
@@ -62,7 +63,7 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
         row = end
 
 
-def _write_grid(group: Any, nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
+def _write_grid(group: Any, nodes: Array, cells: Integers) -> None:
     count, corners = cells.shape
     points = np.zeros((len(nodes), 3))
     points[:, :2] = nodes
@@ -76,7 +77,7 @@ def _write_grid(group: Any, nodes: NDArray[np.float64], cells: NDArray[np.int64]
     group["NumberOfConnectivityIds"] = np.array([cells.size], dtype=np.int64)
 
 
-def _write_steps(group: Any, times: NDArray[np.float64], nodes: int) -> None:
+def _write_steps(group: Any, times: Array, nodes: int) -> None:
     """Where the data of each step begin: the grid always at zero, point data one after another."""
     zeros = np.zeros(len(times), dtype=np.int64)
     group.attrs["NSteps"] = np.int64(len(times))
@@ -89,7 +90,7 @@ def _write_steps(group: Any, times: NDArray[np.float64], nodes: int) -> None:
         group[f"PointDataOffsets/{name}"] = np.arange(len(times), dtype=np.int64) * nodes
 
 
-def _three(vectors: NDArray[np.float64]) -> NDArray[np.float32]:
+def _three(vectors: Array) -> NDArray[np.float32]:
     """Plane vectors (F, N, 2) as (F N, 3) in single precision."""
     out = np.zeros((vectors.shape[0] * vectors.shape[1], 3), dtype=np.float32)
     out[:, :2] = vectors.reshape(-1, 2)

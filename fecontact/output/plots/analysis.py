@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.analysis.frequency_response import FrequencyResponse
 from fecontact.analysis.histories import Point, history, point_name
@@ -13,6 +12,7 @@ from fecontact.analysis.periodicity import strobed_states
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array
 from fecontact.core.units import count, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.run import thinned
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _COLUMNS = 1000  # points of a line
 _DECADES = 5.0  # shown below the highest value of a logarithmic axis

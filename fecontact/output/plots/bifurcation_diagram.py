@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array
 from fecontact.output.plots.diagram_insets import DOTS, draw_beneath, draw_insets, main_axis
 from fecontact.output.plots.style import DASHES, distinct_colours, new_figure, save_figure
 from fecontact.system.parameter_labels import parameter_label
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
     from fecontact.output.plots.diagram_insets import Inset
 
-Array = NDArray[np.float64]
 Quantity = str | int | Callable[["BranchPoint"], float]
 
 # Letters and markers of special points.

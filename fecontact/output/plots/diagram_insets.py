@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fecontact.core.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
 
-Array = NDArray[np.float64]
 
 _INK = "#303030"
 # Colours of runs, which no branch has.

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.output.plots.style import new_figure
@@ -14,7 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _VISIBLE = 0.07  # largest displacement drawn, as a part of the body's extent
 _WIDTH = 10.0  # inches

@@ -11,6 +11,7 @@ from fecontact.analysis.histories import Point, point_name
 from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.modes import convergence_figure, modes_figure
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _MAP_COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
 _AXES = ("x", "y")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_scale
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
 from fecontact.core.units import round_125
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.frames import (
@@ -21,7 +22,6 @@ from fecontact.output.files.frames import (
 from fecontact.output.plots.style import state_names
 from fecontact.reduction.modal_basis import Field
 
-Array = NDArray[np.float64]
 Colour = Literal["displacement", "von_mises"]
 
 COLOURS = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}

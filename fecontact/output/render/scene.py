@@ -5,11 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.types import Array
 from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.offscreen import known_window
-
-Array = NDArray[np.float64]
 
 COLOUR_MAPS = {"displacement": "viridis", "von_mises": "cividis"}
 NODE_COLOURS = {"open": "#ffffff", **STATE_COLOURS}

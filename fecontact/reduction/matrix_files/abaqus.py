@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.stored import LARGEST
+from fecontact.core.types import Array, Integers
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+Ints = Integers
 
 _LARGEST_LABEL = 999_999_999  # of a node, in Abaqus
 _KEYWORD = re.compile(r"^[ \t]*\*(?!\*)(.*)$", re.MULTILINE)

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.types import Array, Integers
 from fecontact.reduction.from_modes import basis_from_modes
 
 if TYPE_CHECKING:
     from fecontact.reduction.modal_basis import ModalBasis
 
-Array = NDArray[np.float64]
 
 _AXES = ("x", "y", "z")
 
@@ -51,12 +51,12 @@ class UffModes:
 
     frequencies_hz: Array
     shapes: Array
-    node_labels: NDArray[np.int64]
+    node_labels: Integers
     coordinates: Array
     damping_ratios: Array
     modal_masses: Array | None
     source: str
-    elements: Mapping[int, NDArray[np.int64]] = field(default_factory=dict)
+    elements: Mapping[int, Integers] = field(default_factory=dict)
 
     def modal_basis(
         self,
@@ -248,7 +248,7 @@ def modes_of(sets: list[dict[str, Any]]) -> list[dict[str, Any]]:
             if one["type"] == 55 and one["analysis_type"] in (_NORMAL_MODES, *_COMPLEX_MODES)]
 
 
-def elements(sets: list[dict[str, Any]]) -> dict[int, NDArray[np.int64]]:
+def elements(sets: list[dict[str, Any]]) -> dict[int, Integers]:
     """Labels of the nodes of the elements, by the number of nodes."""
     found: dict[int, list[list[int]]] = {}
     for one in sets:
@@ -318,7 +318,7 @@ def units(sets: list[dict[str, Any]]) -> tuple[float, float]:
     return 1.0, 1.0
 
 
-def coordinates(sets: list[dict[str, Any]], labels: NDArray[np.int64]) -> Array:
+def coordinates(sets: list[dict[str, Any]], labels: Integers) -> Array:
     """Places (N, 3) of the nodes in the file's unit, not a number where it does not give them."""
     for one in sets:
         if one["type"] == 2420 and not all(

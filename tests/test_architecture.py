@@ -1,0 +1,95 @@
+"""The rooms of the package and the one way in which they import each other.
+
+This is what docs/architecture.md says, read from the sources: also imports inside functions and
+those for types alone count.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent / "fecontact"
+ROOMS = ("core", "fem", "laws", "reduction", "system", "integrate", "analysis", "bifurcation",
+         "output", "study", "sweep", "cli")
+# Rooms that do not know each other, although the one stands above the other.
+STRANGERS = {("laws", "fem"), ("study", "output")}
+LARGEST, MOST_FILES = 450, 16
+
+MODULES = {
+    ".".join(("fecontact", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
+        ".__init__"): path
+    for path in sorted(PACKAGE.rglob("*.py"))
+}
+
+
+def imported(module: str) -> Iterator[str]:
+    """Modules of the package that a module imports, wherever in its text."""
+    for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.startswith("fecontact"))
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fecontact"):
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                if full == "fecontact.__version__":
+                    continue
+                yield full if full in MODULES else str(node.module)
+
+
+ARROWS = {module: {target for target in imported(module) if target != module}
+          for module in MODULES}
+
+
+def room(module: str) -> str:
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else ""
+
+
+def test_there_is_nothing_beside_the_rooms():
+    folders = {path.name for path in PACKAGE.iterdir() if path.is_dir()} - {"__pycache__"}
+    files = {path.name for path in PACKAGE.iterdir() if path.is_file()}
+    assert folders == set(ROOMS)
+    assert files == {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
+
+
+@pytest.mark.parametrize("name", ROOMS)
+def test_rooms_import_only_from_rooms_above_them(name):
+    above = {other for other in ROOMS[: ROOMS.index(name)] if (name, other) not in STRANGERS}
+    wrong = {f"{module} -> {target}" for module, targets in ARROWS.items()
+             if room(module) == name for target in targets if room(target) not in {name, *above}}
+    assert not wrong
+
+
+def test_no_module_imports_itself_through_others():
+    left = {module: {target for target in targets if target in MODULES}
+            for module, targets in ARROWS.items()}
+    while free := [module for module, targets in left.items() if not targets & left.keys()]:
+        for module in free:
+            del left[module]
+    # What is left imports only from what is left: these are the circles, and what leads to them.
+    assert not left
+
+
+def test_every_import_names_a_module_that_exists():
+    assert {target for targets in ARROWS.values() for target in targets} <= MODULES.keys()
+
+
+def test_imports_are_absolute_and_found_by_this_test():
+    """A module that imports nothing would pass the others without being looked at."""
+    relative = [module for module, path in MODULES.items()
+                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+                if isinstance(node, ast.ImportFrom) and node.level]
+    assert not relative
+    assert sum(map(len, ARROWS.values())) > 800
+
+
+def test_modules_and_folders_are_of_a_size_to_be_read():
+    long = {module: lines for module, path in MODULES.items()
+            if (lines := len(path.read_text(encoding="utf-8").splitlines())) > LARGEST}
+    assert not long
+    full = {str(folder.relative_to(PACKAGE)): count
+            for folder in {path.parent for path in MODULES.values()}
+            if (count := sum(path.name != "__init__.py" for path in folder.glob("*.py")))
+            > MOST_FILES}
+    assert not full
