@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.raw import NODES, RawMesh
 

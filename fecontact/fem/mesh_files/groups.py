@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.raw import Groups, edges_on_outline
 
