@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import eigh
 
-from fecontact import ModalBasis, basis_from_matrices, basis_from_modes, modal_basis
+from fecontact import ModalBasis, basis_from_matrices, basis_from_modes
 from fecontact.reduction.from_modes import normalisation
 from fecontact.reduction.matrix_files import AssembledMatrix, read_matrix
 from fecontact.reduction.matrix_files.uff import read_uff
@@ -70,8 +70,8 @@ def bases(count: int | None = None) -> dict[str, ModalBasis]:
     """The basis by each way in, or by so many kinds of files, and by modes."""
     found = {name: from_files(*files) for name, files in list(FILES.items())[:count]}
     found["modes of SciPy"] = from_own_modes()
-    found["universal file"] = modal_basis(
-        read_uff(DATA / "block.uff"), contact=range(101, 106), B=106, C=113)
+    found["universal file"] = read_uff(DATA / "block.uff").modal_basis(
+        contact=range(101, 106), B=106, C=113)
     return found
 
 

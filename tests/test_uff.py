@@ -9,7 +9,6 @@ import pyuff
 
 from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.reduction.matrix_files.uff import read_uff
-from fecontact.reduction.reduce_body import modal_basis
 
 BLOCK = Path(__file__).parent / "data" / "block.uff"
 NODES = [11, 12, 40]
@@ -57,7 +56,7 @@ def test_modes_of_a_block():
     # Turned about its middle, unit motion in x or y at the corners: J / r^2.
     inertia = 0.628 * (0.1**2 + 0.04**2) / 12.0
     assert modes.modal_masses[2] == pytest.approx(inertia / 0.05**2, rel=1e-5)
-    basis = modal_basis(modes, range(101, 106))
+    basis = modes.modal_basis(range(101, 106))
     assert basis.contact_x == pytest.approx([0.0, 0.025, 0.05, 0.075, 0.1])
     assert basis.damping_ratios == pytest.approx(modes.damping_ratios)
     assert (basis.T[:2] == 0.0).all()
@@ -69,7 +68,7 @@ def test_shapes_and_points(tmp_path):
     assert modes.frequencies_hz.tolist() == [20.0, 10.0]
     assert modes.shapes[:, :, 0].tolist() == [[1.0, 0.0, 0.5], [-0.5, 2.0, 0.0], [0.25, -1.0, 3.0]]
     assert modes.node(40) == 2
-    basis = modal_basis(modes, [40, 11], B=12, points={"tip": 40})
+    basis = modes.modal_basis([40, 11], B=12, points={"tip": 40})
     assert basis.frequencies_hz == pytest.approx([10.0, 20.0])
     # Scaled by 1 / sqrt(modal mass), the largest component (at node 40, z is not used) positive.
     assert basis.T[0, :, 0] == pytest.approx(np.array([-0.5, 2.0, 0.0]) / 3.0)
@@ -77,7 +76,7 @@ def test_shapes_and_points(tmp_path):
     assert basis.T[4] == pytest.approx(basis.contact_T[0])
     assert basis.contact_x.tolist() == [0.3, 0.0]
     assert (basis.T[1] == 0.0).all()
-    own = modal_basis(modes, [40], modal_mass=1.0, damping=0.1, contact_x=[0.7], tributary=[0.02])
+    own = modes.modal_basis([40], modal_mass=1.0, damping=0.1, contact_x=[0.7], tributary=[0.02])
     assert own.T[2, :, 1] == pytest.approx([0.25, -1.0, 0.0])
     assert own.damping_ratios == pytest.approx([0.1, 0.1])
     assert own.contact_x.tolist() == [0.7]
@@ -95,7 +94,7 @@ def test_axes(tmp_path, axes, components, turn, x):
                r5=np.array([0.2]), r6=np.array([0.3]), data_ch=3, node_nums=np.array([11]),
                modal_m=1.0)
     path = written(tmp_path / "a.uff", nodes(places=[(0.1, 0.2, 0.3)], labels=[11]), one)
-    basis = modal_basis(read_uff(path), [11], axes=axes)
+    basis = read_uff(path).modal_basis([11], axes=axes)
     sign = basis.contact_T[0, 0, 0] / components[0]
     assert abs(sign) == pytest.approx(1.0)
     assert basis.contact_T[0, :2, 0] == pytest.approx(sign * np.array(components[:2]))
@@ -111,8 +110,8 @@ def test_units(tmp_path, kind):
     millimetres = read_uff(written(tmp_path / "mm.uff", units(1000.0, 1.0),
                                    nodes(kind, 1000.0 * places), mode(modal_m=4.0e-3)))
     assert millimetres.coordinates == pytest.approx(metres.coordinates)
-    expected = modal_basis(metres, NODES).T
-    found = modal_basis(millimetres, NODES).T
+    expected = metres.modal_basis(NODES).T
+    found = millimetres.modal_basis(NODES).T
     assert found == pytest.approx(expected, rel=1e-12)
 
 
@@ -125,7 +124,7 @@ def test_nodes_that_a_mode_leaves_out_do_not_move(tmp_path):
     assert modes.shapes[0, :, 0].tolist() == [0.0] * 3
     assert np.isnan(modes.coordinates[0]).all()
     # Without the place of a contact node, there are no abscissae.
-    assert modal_basis(modes, [5, 40]).contact_x.tolist() == [0.0, 0.0]
+    assert modes.modal_basis([5, 40]).contact_x.tolist() == [0.0, 0.0]
 
 
 def test_damping_and_masses_that_are_not_given(tmp_path):
@@ -135,8 +134,8 @@ def test_damping_and_masses_that_are_not_given(tmp_path):
     assert modes.damping_ratios.tolist() == [0.03]
     with pytest.raises(InputError, match=r"a\.uff: the file does not give the modal masses; give "
                                          r"modal_mass"):
-        modal_basis(modes, [11])
-    assert modal_basis(modes, [11], modal_mass=4.0).T[2, :, 0] == pytest.approx([0.5, 0.0, 0.0])
+        modes.modal_basis([11])
+    assert modes.modal_basis([11], modal_mass=4.0).T[2, :, 0] == pytest.approx([0.5, 0.0, 0.0])
 
 
 # Complex modes -----------------------------------------------------------------------------------
@@ -212,7 +211,7 @@ def test_local_coordinate_systems(tmp_path):
 def test_points_are_checked(tmp_path, arguments, options, message):
     modes = read_uff(written(tmp_path / "a.uff", nodes(), mode()))
     with pytest.raises(InputError, match=message):
-        modal_basis(modes, *arguments, **options)
+        modes.modal_basis(*arguments, **options)
 
 
 def test_damaged_files(tmp_path):
