@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from fecontact.geometry import Beam, Block, Pendulum, generate
-from fecontact.mesh_io import write_mesh
+from fecontact import Beam, Block, Pendulum, generate, write_mesh
 
 SHAPES = {
     "beam.msh": Beam(),
