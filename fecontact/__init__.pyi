@@ -37,6 +37,7 @@ from .integrate.initial_state import RigidStart
 from .integrate.sensitivity import Sensitivity, sensitivity
 from .integrate.simulate import simulate
 from .integrate.smoothing_cost import SmoothingCost, smoothing_cost
+from .integrate.solvers import CVODE, Rodas5P, Scipy, SetValued
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.base import FrictionLaw, NormalLaw, PerNode
 from .laws.check import check_law
@@ -116,6 +117,7 @@ from .system.statics import static_equilibrium
 __version__: str
 
 __all__ = [
+    "CVODE",
     "Attractor",
     "Axis",
     "Basins",
@@ -189,8 +191,11 @@ __all__ = [
     "Rayleigh",
     "RestitutionContact",
     "RigidStart",
+    "Rodas5P",
     "RoughSurface",
+    "Scipy",
     "Sensitivity",
+    "SetValued",
     "SettledMotion",
     "Sine",
     "SmoothingCost",

@@ -256,7 +256,7 @@ simulation.outputs 1.5
 simulation.outputs 1000000000000 take_at_most
 simulation.outputs 100000000000000000000000 too_large
 simulation.outputs 1e12
-simulation.method "rodas"
+simulation.solver "rodas"
 simulation.rtol 0
 simulation.rtol 1
 simulation.rtol nan

@@ -188,7 +188,7 @@ MISTAKES = [
     (["mesh", "text.toml"], "no complete section"),
     (["mesh", "solid.toml"], "solid"),
     (["mesh", "absent.toml"], "there is no such file"),
-    (["run", "tiny.toml", "--set", "simulation.method=Euler"], "method = 'Euler' must be"),
+    (["run", "tiny.toml", "--set", "simulation.solver=euler"], "solver = 'euler' must be"),
     (["render", "tiny.toml"], "run the study first: fecontact run tiny.toml"),
     (["render", "none.vtkhdf"], "none.vtkhdf does not exist"),
     (["render", "bad.toml"], "bad.toml is not valid TOML"),

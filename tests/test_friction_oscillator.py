@@ -96,8 +96,8 @@ def test_random_friction_breaks_away_at_the_coefficient_of_the_place():
     (2, "Radau", 1e-4), (2, "LSODA", 5e-4), (3, "LSODA", 1e-3)])
 def test_the_integrator_makes_no_difference(modes, method, tolerance):
     system = example.oscillator(modes)
-    run, other = (example.settled(system, 12, 12, 200, method=name)
-                  for name in ("Rodas5P", method))
+    run, other = (example.settled(system, 12, 12, 200, solver=solver)
+                  for solver in (fc.Rodas5P(), fc.Scipy(method)))
     assert lengths(other) == pytest.approx(lengths(run), rel=tolerance)
     for point in ("B", 0):
         for end in (np.min, np.max):

@@ -6,6 +6,7 @@ from oscillators import friction_oscillator, impact_oscillator
 from test_events import START, drop
 
 from fecontact import (
+    CVODE,
     ConstantFriction,
     ContactSystem,
     InputError,
@@ -14,6 +15,7 @@ from fecontact import (
     NormalLaw,
     RigidStart,
     RoughSurface,
+    SetValued,
     Status,
     basis_from_matrices,
     normal_law,
@@ -27,17 +29,18 @@ def test_cvode_agrees():
     pytest.importorskip("sksundae")
     system = friction_oscillator(3)
     one = simulate(system, 1.0, outputs=201, rtol=1e-8)
-    other = simulate(system, 1.0, outputs=201, method="CVODE", rtol=1e-8)
+    other = simulate(system, 1.0, outputs=201, solver=CVODE(), rtol=1e-8)
     assert other.status is Status.FINISHED
     size = np.abs(one.states).max(axis=0)
     assert (np.abs(one.states - other.states).max(axis=0) < 2e-4 * size + 1e-15).all()
     assert other.energies.imbalance < 1e-4
-    assert other.statistics["method"] == "CVODE"
+    assert other.statistics["solver"] == "cvode"
 
 
 def test_cvode_drops_on_a_spring():
     pytest.importorskip("sksundae")
-    run = simulate(drop(), 1.1, initial=START, outputs=[0.0, 1.0, 1.1], method="CVODE", rtol=1e-9)
+    run = simulate(drop(), 1.1, initial=START, outputs=[0.0, 1.0, 1.1], solver=CVODE(),
+                   rtol=1e-9)
     assert run.states[1:, 0] == pytest.approx([-1.332162981855, -0.856394405035], rel=1e-6)
 
 
@@ -68,12 +71,11 @@ def test_users_are_told_what_smoothing_costs():
 
 def test_options_of_set_valued_runs():
     system = friction_oscillator(2, **{"drive.amplitude_x": 0.0})
-    run = simulate(system, 0.1, method="set-valued", static_coefficient=0.9, scheme="events")
+    run = simulate(system, 0.1, solver=SetValued(static_coefficient=0.9, scheme="events"))
     assert run.status is Status.FINISHED
-    with pytest.raises(InputError, match=r"scheme = 'events' is for method = 'set-valued' alone"):
-        simulate(system, 0.1, scheme="events")
-    with pytest.raises(InputError, match=r"static_coefficient = 0\.9 is for"):
-        simulate(system, 0.1, static_coefficient=0.9, method="LSODA")
+    # The spring pulls at 1 mm/s until 0.9 F hold no longer, F being 14 N.
+    assert run.statistics["solver"] == "set-valued"
+    assert run.statistics["static_coefficient"] == 0.9
 
 
 def test_a_deep_start_is_warned_of():

@@ -118,7 +118,7 @@ def test_nodal_contact_forces_add_up_to_the_contact_forces(tmp_path):
 def test_read_case_is_equal_to_the_last_bit(tmp_path, frames):
     written = replace(run(times=31, waviness=3e-6), status=Status.INTERRUPTED,
                       work=np.random.default_rng(1).normal(size=(31, 8)),
-                      statistics={"steps": 12, "seconds": 0.1 + 0.2, "method": "Radau",
+                      statistics={"steps": 12, "seconds": 0.1 + 0.2, "solver": "radau",
                                   "factorisations": np.int64(3), "rtol": np.float64(1e-6)})
     written = replace(written, system=written.system.with_(
         **{"friction.static_coefficient": (0.1, 0.2, 0.3, 0.4, 1 / 3), "gap": (0, 1e-6, 0, 0, 0)}))

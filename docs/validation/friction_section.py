@@ -8,7 +8,7 @@ from comparison import Comparison, comparisons, table
 from matplotlib import rc_context
 from pictures import save
 
-from fecontact import Trajectory, periodicity, simulate, window
+from fecontact import Scipy, Trajectory, periodicity, simulate, window
 from fecontact.output.plots.style import STYLE
 
 FIGURES = {
@@ -64,7 +64,7 @@ def solvers() -> list[Comparison]:
     rows = []
     for method in ("LSODA", "Radau"):
         again = simulate(run.system, end + 4.0 * friction.PERIOD, initial=run, outputs=1601,
-                         method=method, rtol=1e-8)
+                         solver=Scipy(method), rtol=1e-8)
         orbit = window(run, end - 4.0 * friction.PERIOD)
         rows.append(Comparison(f"two modes: largest x of the orbit by {method} [mm]",
                                1e3 * orbit.displacement("B")[:, 0].max(),

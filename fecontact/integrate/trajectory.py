@@ -112,6 +112,43 @@ class Energies:
 
 
 @dataclass(frozen=True, eq=False)
+class Solution:
+    """What a solver has computed at N output times, and of a run that ended early the last state.
+
+    Attributes
+    ----------
+    time : (N,) array
+        [s].
+    states : (N, 2 m + n s) array
+        y = [q, q', z].
+    work : (N, 8) array
+        Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
+        [J]. What impacts on rigid stops take is with ``contact_damping``.
+    status : Status
+        How the run ended.
+    statistics : mapping
+        Counts of steps, rejected steps, events and the like, seconds, a message of the solver.
+    node_friction_work : (N, n) array or None
+        Energy that friction at each node has taken since the first time [J].
+    normal_force, friction_force : (N, n) arrays or None
+        F and R of each node [N] where they do not follow from the state, as in set-valued
+        contact; F without the impulses of rigid stops.
+    events : Events or None
+        What was watched for, in the order of time.
+    """
+
+    time: Array
+    states: Array
+    work: Array
+    status: Status
+    statistics: dict[str, Any]
+    node_friction_work: Array | None = None
+    normal_force: Array | None = None
+    friction_force: Array | None = None
+    events: Events | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Motion of a contact system at N output times.
 
