@@ -3,7 +3,6 @@ from .analysis.histories import history
 from .analysis.impacts import Impacts, find_impacts, find_rests
 from .analysis.periodicity import Periodicity, count_periods, periodicity, strobed_states
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
-from .analysis.window import window
 from .bifurcation.attractors.basins import Attractor, Axis, Basins, basins
 from .bifurcation.attractors.lyapunov import LyapunovExponents, lyapunov_exponents
 from .bifurcation.attractors.poincare_scan import BruteForce, brute_force
@@ -303,7 +302,6 @@ __all__ = [
     "switched_branch",
     "to_xarray",
     "vector_field",
-    "window",
     "write_basis",
     "write_branch",
     "write_branches",

@@ -153,7 +153,7 @@ def check_laws(names, printed, folder):
 def check_sweeps(names, printed, folder):
     assert names["amplitude"].shape == (2, 4)
     # The case once more, alone: half of its way is what the table says.
-    x = fc.window(names["run"], 0.5).displacement("B")[:, 0]
+    x = names["run"].between(0.5).displacement("B")[:, 0]
     assert names["amplitude"].ravel()[7] == pytest.approx(np.ptp(x) / 2.0, rel=1e-12)
 
 

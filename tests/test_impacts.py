@@ -5,7 +5,6 @@ import pytest
 from scipy.optimize import brentq
 
 from fecontact.analysis.impacts import find_impacts, find_rests
-from fecontact.analysis.window import window
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import SetValued
@@ -231,7 +230,7 @@ def test_chatter_of_the_pendulum_comes_to_rest_once_a_period():
 
     period = 2.0 * np.pi / 9.845
     run = simulate(pendulum(9.845), 10.0 * period, initial=np.zeros(4), outputs=10 * 12000 + 1)
-    late = window(run, 5.0 * period)
+    late = run.between(5.0 * period)
     rests = find_rests(late)
     # The last rest may have been cut off by the end of the run.
     assert len(rests) in (5, 6)

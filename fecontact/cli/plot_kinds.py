@@ -9,7 +9,6 @@ import numpy as np
 
 from fecontact.analysis.frequency_response import Place, frequency_response
 from fecontact.analysis.histories import Point, usual_axis
-from fecontact.analysis.window import window
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots import analysis
@@ -122,7 +121,7 @@ def redraw(
     if kind not in KINDS:
         raise InputError(f"There is no plot '{kind}'{nearest(kind, KINDS)}; there are: "
                          f"{choices(KINDS)}.")
-    part = trajectory if start is None and end is None else window(trajectory, start, end)
+    part = trajectory if start is None and end is None else trajectory.between(start, end)
     chosen = choice or Choice()
     if chosen.axis is None:
         chosen = replace(chosen, axis=usual_axis(part.system))

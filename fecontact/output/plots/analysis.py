@@ -272,7 +272,7 @@ def plot_spectrum(
     Parameters
     ----------
     trajectory : Trajectory
-        The run, transients cut off by :func:`fecontact.analysis.window.window`.
+        The run, transients cut off by :meth:`Trajectory.between`.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
     quantity, point, axis
