@@ -197,7 +197,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
           f"ringing at B")
     for name, run in runs.items():
         lengths = 1e3 * np.array([slip.distance for slip in slips(run)])
-        periods = fc.periodicity(run, start=run.time[0], largest=8).periods or "-"
+        periods = fc.periodicity(run, t_start=run.time[0], largest=8).periods or "-"
         peak = ringing(run) if run.system.basis.modes > 2 else None
         rings = f"{peak.frequency_hz:.2f} Hz, {1e3 * peak.value:.2f} mm/s" if peak else "-"
         print(f"{name:30s} {periods!s:>7s} {len(lengths):6d} {different(lengths):9d}   "

@@ -94,7 +94,7 @@ def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
                                                  angular_frequency=2.0 * np.pi * 200.0))
     case = write_case(tmp_path / "beam.vtkhdf", simulate(system, 0.02, outputs=801), frames=0)
     for kind in plot_kinds.KINDS:
-        assert execute(["plot", str(case), kind, "--start", "0.002"]) == 0
+        assert execute(["plot", str(case), kind, "--t-start", "0.002"]) == 0
         assert (tmp_path / f"beam-{kind}.png").read_bytes()[:4] == b"\x89PNG"
     assert execute(["plot", str(case), "history", "--point", "C", "--point", "2", "-o",
                     str(tmp_path / "two.svg")]) == 0

@@ -19,7 +19,7 @@ def lengths(run):
 
 def test_two_modes_close_one_loop_after_four_periods():
     run = example.settled(example.oscillator(2), 40, 24)
-    found = fc.periodicity(run, start=run.time[0], largest=6)
+    found = fc.periodicity(run, t_start=run.time[0], largest=6)
     assert found.periods == 4
     assert found.misfit < 1e-3
     # One slip in these four periods, always the same.
@@ -61,7 +61,7 @@ def test_third_mode_rings_at_the_drive_after_each_slip():
 
 def test_waves_make_several_slip_loops():
     run = example.settled(example.oscillator(3, example.WAVY), 20, 80)
-    assert fc.periodicity(run, start=run.time[0], largest=16).periods is None
+    assert fc.periodicity(run, t_start=run.time[0], largest=16).periods is None
     assert example.different(lengths(run), 0.05) >= 3
     assert np.ptp(lengths(run)) > 0.2 * lengths(run).max()
     # The waves lift and lower the body: its normal force is the load in the mean alone.

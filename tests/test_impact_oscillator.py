@@ -131,7 +131,7 @@ def test_exponent_of_chaos_is_the_growth_between_neighbours():
     growth, error = impact.exponent(run, found, 400)
     assert 0.0 < error < 0.5
     assert growth == pytest.approx(6.0, abs=0.9)
-    states = strobed_states(run, start=float(run.time[0])).states
+    states = strobed_states(run, t_start=float(run.time[0])).states
     assert growth_of_pairs(chaotic, states, 48, 8) == pytest.approx(6.0, abs=1.2)
 
 

@@ -136,7 +136,7 @@ def test_files_read_back_are_drawn_alike(tmp_path, capsys):
                                   resolved(run).trajectory.normal_force)
     assert execute(["plot", str(case), "history", "-o", str(tmp_path / "history.svg")]) == 0
     assert b"straight lines" not in (tmp_path / "history.svg").read_bytes()
-    assert execute(["plot", str(case), "phase", "--axis", "y", "--start", "0.01"]) == 0
+    assert execute(["plot", str(case), "phase", "--axis", "y", "--t-start", "0.01"]) == 0
 
 
 def test_pictures_say_where_they_are_too_coarse(tmp_path):

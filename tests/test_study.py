@@ -281,7 +281,8 @@ MISTAKES = [
     ({"drive.motion_x": {"law": "sweep", "amplitude": 1, "start_frequency_hz": 0,
                          "end_frequency_hz": 1, "duration": 1, "kind": "logarithmic"}},
      r"\[drive\.motion_x\]: start_frequency_hz = 0\.0 must be a finite number above zero"),
-    ({"render.start": 0.2, "render.end": 0.1}, r"\[render\]: end = 0\.1 must not be before start"),
+    ({"render.t_start": 0.2, "render.t_end": 0.1},
+     r"\[render\]: t_end = 0\.1 must not be before t_start"),
     ({"output.points": [1.5]}, r"points = \[1\.5\] must be a list of texts in quotes or whole num"),
 ]
 

@@ -40,7 +40,7 @@ def slips_table(runs: dict[str, Trajectory]) -> str:
     rows = []
     for name, run in runs.items():
         lengths = 1e3 * np.array([slip.distance for slip in friction.slips(run)])
-        found = periodicity(run, start=float(run.time[0]), largest=8)
+        found = periodicity(run, t_start=float(run.time[0]), largest=8)
         rows.append((name, found.periods or "none up to 8", f"{found.misfit:.0e}", len(lengths),
                      friction.different(lengths), f"{lengths.min():.3f} to {lengths.max():.3f}"))
     return table(("case", "repeats after periods", "misfit", "slips in 100 periods",

@@ -298,7 +298,7 @@ class RenderSettings:
         Factor by which displacements are drawn larger; by default the largest is well visible.
     title : str, optional
         Shown at the top.
-    start, end : float, optional
+    t_start, t_end : float, optional
         Part of the run to draw [s].
     """
 
@@ -308,8 +308,8 @@ class RenderSettings:
     colour: Literal["displacement", "von_mises"] = "displacement"
     scale: float | None = None
     title: str | None = None
-    start: float | None = None
-    end: float | None = None
+    t_start: float | None = None
+    t_end: float | None = None
 
     def __post_init__(self) -> None:
         if self.frames < 1:
@@ -321,9 +321,9 @@ class RenderSettings:
                              f"height in pixels, at least [320, 180].")
         if self.scale is not None:
             require_scale("RenderSettings", self.scale)
-        for name in ("start", "end"):
+        for name in ("t_start", "t_end"):
             if getattr(self, name) is not None:
                 require_finite("RenderSettings", **{name: getattr(self, name)})
-        if self.start is not None and self.end is not None and not self.start <= self.end:
-            raise InputError(f"RenderSettings: end = {self.end!r} must not be before start = "
-                             f"{self.start!r}.")
+        if self.t_start is not None and self.t_end is not None and not self.t_start <= self.t_end:
+            raise InputError(f"RenderSettings: t_end = {self.t_end!r} must not be before t_start = "
+                             f"{self.t_start!r}.")
