@@ -71,9 +71,13 @@ def test_users_are_told_what_smoothing_costs():
 
 def test_options_of_set_valued_runs():
     system = friction_oscillator(2, **{"drive.amplitude_x": 0.0})
-    run = simulate(system, 0.1, solver=SetValued(static_coefficient=0.9, scheme="events"))
+    run = simulate(system, 2.3, outputs=2301,
+                   solver=SetValued(static_coefficient=0.9, scheme="events"))
     assert run.status is Status.FINISHED
-    # The spring pulls at 1 mm/s until 0.9 F hold no longer, F being 14 N.
+    # The belt stretches the spring of 5610 N/m by 1 mm/s until the contact holds no longer.
+    pull = np.abs(run.friction_force[:, 0]) / run.normal_force[:, 0]
+    assert pull.max() == pytest.approx(0.9, rel=1e-3)
+    assert run.time[np.argmax(pull)] == pytest.approx(0.9 * 14.0 / 5.61, rel=1e-3)
     assert run.statistics["solver"] == "set-valued"
     assert run.statistics["static_coefficient"] == 0.9
 
@@ -126,7 +130,8 @@ def test_energies_beyond_all_numbers_have_a_status(change):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": rows})
-    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), load=Load(14.0))
+    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), ConstantFriction(0.0),
+                           load=Load(14.0))
     start = "rest"
     if change == "velocity":
         start = RigidStart(velocity=(1e300, 0.0, 0.0))

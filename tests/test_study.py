@@ -13,6 +13,8 @@ from fecontact.fem.mesh_files import write_mesh
 from fecontact.fem.points import Patch
 from fecontact.fem.shapes import Beam, Block, Pendulum
 from fecontact.integrate.initial_state import RigidStart
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import SOLVERS, SetValued
 from fecontact.laws.excitation import Load
 from fecontact.laws.friction.stribeck import ExponentialFriction
 from fecontact.laws.ground.ground import Ground
@@ -143,6 +145,23 @@ def test_changes_by_dotted_names(tiny):
     assert changed.friction.static_coefficient == (0.1, 0.2, 0.3, 0.4)
     assert tiny.ground.speed == 1.0
     assert changed.load == tiny.load
+
+
+def test_solvers_have_one_name_in_files_and_in_python(tiny):
+    """Every solver can be named, and takes its own options from [simulation]."""
+    assert sorted(SOLVERS) == ["bdf", "cvode", "lsoda", "radau", "rodas5p", "set-valued"]
+    for name, solver in SOLVERS.items():
+        assert tiny.with_(**{"simulation.solver": name}).simulation.chosen_solver() == solver
+    told = {"simulation.solver": "set-valued", "simulation.scheme": "stepping",
+            "simulation.static_coefficient": 0.9}
+    study = tiny.with_(**told)
+    assert study.simulation.chosen_solver() == SetValued(static_coefficient=0.9, scheme="stepping")
+    run = study.run()
+    same = simulate(study.system(), 1e-3, outputs=11,
+                    solver=SetValued(static_coefficient=0.9, scheme="stepping"))
+    assert np.array_equal(run.states, same.states)
+    assert run.statistics["solver"] == "set-valued"
+    assert not np.array_equal(run.states, tiny.run().states)
 
 
 def test_basis_keys_reach_the_basis(tiny):
