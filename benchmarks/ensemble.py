@@ -74,7 +74,7 @@ def own(values: Array, workers: int) -> Callable[[float, int], Array]:
     systems = diagram(values)
 
     def solve(rtol: float, periods: int) -> Array:
-        return strobe(systems, transient=1, keep=periods, initial=np.zeros(4), rtol=rtol,
+        return strobe(systems, transient_periods=1, keep=periods, initial=np.zeros(4), rtol=rtol,
                       workers=workers).states
 
     return solve

@@ -99,7 +99,7 @@ def settled(system: fc.ContactSystem, skip: int = 40, periods: int = 100, output
     """Some periods of the drive after those of the transients."""
     times = np.concatenate([[0.0], np.linspace(skip, skip + periods, periods * outputs + 1)
                             * PERIOD])
-    return fc.window(fc.simulate(system, times[-1], outputs=times, **options), skip * PERIOD)
+    return fc.simulate(system, times[-1], outputs=times, **options).between(skip * PERIOD)
 
 
 class Slip(NamedTuple):
@@ -197,7 +197,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
           f"ringing at B")
     for name, run in runs.items():
         lengths = 1e3 * np.array([slip.distance for slip in slips(run)])
-        periods = fc.periodicity(run, start=run.time[0], largest=8).periods or "-"
+        periods = fc.periodicity(run, t_start=run.time[0], largest=8).periods or "-"
         peak = ringing(run) if run.system.basis.modes > 2 else None
         rings = f"{peak.frequency_hz:.2f} Hz, {1e3 * peak.value:.2f} mm/s" if peak else "-"
         print(f"{name:30s} {periods!s:>7s} {len(lengths):6d} {different(lengths):9d}   "
@@ -205,7 +205,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     print(f"With the contact held the three modes vibrate at {held_frequency():.2f} Hz.")
     print(f"Normal force found by the static equilibrium: {prescribed().normal.force:.6f} N")
     names = list(runs)
-    shown = {name: fc.window(run, run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
+    shown = {name: run.between(run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
     save_figure(folder / "phase.png", lambda: figure({n: shown[n] for n in names[:3]}))
     save_figure(folder / "irregular.png", lambda: figure({n: shown[n] for n in names[3:]}))
     fc.plot_spectrogram(shown[names[1]], folder / "spectrogram.png", piece=0.25, highest_hz=60.0)
@@ -217,7 +217,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     parts = (run.contact_state == fc.ContactState.SLIP).mean(axis=1)
     print(f"Part of the time in which only a part of its face slips: "
           f"{((parts > 0.0) & (parts < 1.0)).mean():.0%}")
-    fc.plot_contact_map(fc.window(run, 0.8 * end), folder / "block-contact.png")
+    fc.plot_contact_map(run.between(0.8 * end), folder / "block-contact.png")
     fc.plot_friction_work(run, folder / "block-friction-work.png")
 
 

@@ -60,7 +60,7 @@ def bifurcation(system: ContactSystem, frequencies: np.ndarray, *, transient: in
     driven = [system.with_(**{"drive.angular_frequency": float(w)}) for w in frequencies]
     # Two chains, one on each of two cores.
     with progress_bar("bifurcation diagram", 2 * len(driven)) as progress:
-        found = strobe(driven + driven[::-1], transient=transient, keep=keep,
+        found = strobe(driven + driven[::-1], transient_periods=transient, keep=keep,
                        initial=start(system, 1e-4), chain=len(driven), progress=progress)
     if not found.finished.all():
         raise RuntimeError(f"{np.count_nonzero(~found.finished)} runs did not reach their end.")
@@ -82,8 +82,8 @@ def regime_map(bendings_hz: np.ndarray, dampings: np.ndarray, ratio: float = 0.6
         scale = np.ptp(contact_states(systems[0], base.states), axis=0)
         rests = frequency == 9.845
         with progress_bar(f"map at {frequency:g} rad/s", len(systems)) as progress:
-            found = strobe(systems, transient=transient // 4 if rests else transient, keep=keep,
-                           initial=start(systems[0], 1e-4), progress=progress)
+            found = strobe(systems, transient_periods=transient // 4 if rests else transient,
+                           keep=keep, initial=start(systems[0], 1e-4), progress=progress)
         points = contact_states(systems[0], found.states)
         counts = [count_periods(x, scale, largest=1 if rests else LARGEST,
                                 tolerance=COARSE if rests else FINE) for x in points]

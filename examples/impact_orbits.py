@@ -78,7 +78,7 @@ def runs(quick: bool = False) -> fc.BruteForce:
                              np.arange(46.0, 80.5, 0.5)])
     if quick:
         values = np.arange(44.0, 52.0, 2.0)
-    return fc.brute_force(oscillator(), FREQUENCY, values, transient=100, keep=24,
+    return fc.brute_force(oscillator(), FREQUENCY, values, transient_periods=100, keep=24,
                           initial=np.zeros(4))
 
 

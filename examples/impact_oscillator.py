@@ -123,7 +123,7 @@ def regime(run: Trajectory) -> Regime:
     """Periods, impacts and rests of a settled motion with resolved impacts."""
     period, begin = drive_period(run.system), float(run.time[0])
     impacts, rests = find_impacts(run), find_rests(run)
-    found = periodicity(run, start=begin, largest=8, tolerance=0.03 if rests else 2e-3)
+    found = periodicity(run, t_start=begin, largest=8, tolerance=0.03 if rests else 2e-3)
     return Regime(found, impacts, rests,
                   impacts.per_period(period, begin, float(run.time[-1])))
 

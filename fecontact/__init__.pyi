@@ -3,7 +3,6 @@ from .analysis.histories import history
 from .analysis.impacts import Impacts, find_impacts, find_rests
 from .analysis.periodicity import Periodicity, count_periods, periodicity, strobed_states
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
-from .analysis.window import window
 from .bifurcation.attractors.basins import Attractor, Axis, Basins, basins
 from .bifurcation.attractors.lyapunov import LyapunovExponents, lyapunov_exponents
 from .bifurcation.attractors.poincare_scan import BruteForce, brute_force
@@ -37,6 +36,7 @@ from .integrate.initial_state import RigidStart
 from .integrate.sensitivity import Sensitivity, sensitivity
 from .integrate.simulate import simulate
 from .integrate.smoothing_cost import SmoothingCost, smoothing_cost
+from .integrate.solvers import CVODE, Rodas5P, Scipy, SetValued
 from .integrate.trajectory import ContactState, Energies, Status, Trajectory
 from .laws.base import FrictionLaw, NormalLaw, PerNode
 from .laws.check import check_law
@@ -116,6 +116,7 @@ from .system.statics import static_equilibrium
 __version__: str
 
 __all__ = [
+    "CVODE",
     "Attractor",
     "Axis",
     "Basins",
@@ -189,8 +190,11 @@ __all__ = [
     "Rayleigh",
     "RestitutionContact",
     "RigidStart",
+    "Rodas5P",
     "RoughSurface",
+    "Scipy",
     "Sensitivity",
+    "SetValued",
     "SettledMotion",
     "Sine",
     "SmoothingCost",
@@ -298,7 +302,6 @@ __all__ = [
     "switched_branch",
     "to_xarray",
     "vector_field",
-    "window",
     "write_basis",
     "write_branch",
     "write_branches",

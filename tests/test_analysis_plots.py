@@ -7,7 +7,6 @@ import pytest
 from synthetic import basis, run
 
 from fecontact.analysis.frequency_response import frequency_response
-from fecontact.analysis.window import window
 from fecontact.cli import execute, plot_kinds
 from fecontact.core.errors import InputError
 from fecontact.integrate.simulate import simulate
@@ -22,22 +21,22 @@ def trajectory():
 
 
 def test_window_counts_from_its_own_start(trajectory):
-    part = window(trajectory, 0.005, 0.015)
+    part = trajectory.between(0.005, 0.015)
     assert (part.time[0], part.time[-1]) == pytest.approx((0.005, 0.015))
     np.testing.assert_array_equal(part.normal_force, trajectory.normal_force[500:1501])
     assert not part.work[0].any()
     np.testing.assert_allclose(part.friction_work[-1], trajectory.friction_work[1500]
                                - trajectory.friction_work[500], rtol=1e-9, atol=1e-18)
-    assert len(window(trajectory).time) == 2001
+    assert len(trajectory.between().time) == 2001
     with pytest.raises(InputError, match="fewer than two output times"):
-        window(trajectory, 0.03)
+        trajectory.between(0.03)
 
 
 def test_window_of_a_run_keeps_its_balance():
     from test_simulate import DRIVEN, beam
 
     whole = simulate(beam(**DRIVEN), 0.01, outputs=401)
-    part = window(whole, 0.004)
+    part = whole.between(0.004)
     assert part.energies.imbalance < 2e-5
     np.testing.assert_allclose(part.friction_work.sum(axis=1), part.energies.friction,
                                rtol=1e-6, atol=1e-12)
@@ -95,7 +94,7 @@ def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
                                                  angular_frequency=2.0 * np.pi * 200.0))
     case = write_case(tmp_path / "beam.vtkhdf", simulate(system, 0.02, outputs=801), frames=0)
     for kind in plot_kinds.KINDS:
-        assert execute(["plot", str(case), kind, "--start", "0.002"]) == 0
+        assert execute(["plot", str(case), kind, "--t-start", "0.002"]) == 0
         assert (tmp_path / f"beam-{kind}.png").read_bytes()[:4] == b"\x89PNG"
     assert execute(["plot", str(case), "history", "--point", "C", "--point", "2", "-o",
                     str(tmp_path / "two.svg")]) == 0

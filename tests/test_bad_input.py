@@ -256,7 +256,7 @@ simulation.outputs 1.5
 simulation.outputs 1000000000000 take_at_most
 simulation.outputs 100000000000000000000000 too_large
 simulation.outputs 1e12
-simulation.method "rodas"
+simulation.solver "rodas"
 simulation.rtol 0
 simulation.rtol 1
 simulation.rtol nan
@@ -288,8 +288,8 @@ render.size [320.0,180.0]
 render.colour "red"
 render.scale 0
 render.scale 1e50
-render.start nan
-render.end nan
+render.t_start nan
+render.t_end nan
 render.title 3
 branch.range [1,0]
 branch.range [nan,1]
@@ -307,9 +307,9 @@ sweep.method "x"
 sweep.samples 0
 sweep.seed -1
 sweep.summaries []
-sweep.after nan
+sweep.t_start nan
 sweep.strobe {keep=0} keep
-sweep.strobe {transient=1,keep=1000000000000} keep
+sweep.strobe {transient_periods=1,keep=1000000000000} keep
 sweep.wear_coefficient -1
 sweep.axes 3
 foo 3
@@ -447,10 +447,10 @@ render run.vtkhdf --frames -1 | frames
 render run.vtkhdf --scale nan | scale
 render run.vtkhdf --scale 1e300 | scale
 render run.vtkhdf --colour red | colour
-render run.vtkhdf --start 7 | no output time
-render run.vtkhdf --start nan | start
-render run.vtkhdf --end nan | end
-render run.vtkhdf --start 1 --end 0 | end
+render run.vtkhdf --t-start 7 | no output time
+render run.vtkhdf --t-start nan | t_start
+render run.vtkhdf --t-end nan | t_end
+render run.vtkhdf --t-start 1 --t-end 0 | t_end
 render run.vtkhdf -o x.avi | x.avi
 render run.vtkhdf -o text.msh/x.mp4 | text.msh
 render run.vtkhdf -o tiny.toml | tiny.toml
@@ -464,13 +464,13 @@ plot run.vtkhdf history --point 1,2,3 | 1,2,3
 plot run.vtkhdf history --point nan,nan | nan
 plot run.vtkhdf history --point 9,9 | 9
 plot run.vtkhdf history --axis z | axis
-plot run.vtkhdf history --start nan | start
-plot run.vtkhdf history --end nan | end
-plot run.vtkhdf history --start 7 | 7
-plot run.vtkhdf phase --end 0 | end
+plot run.vtkhdf history --t-start nan | t_start
+plot run.vtkhdf history --t-end nan | t_end
+plot run.vtkhdf history --t-start 7 | 7
+plot run.vtkhdf phase --t-end 0 | t_end
 plot run.vtkhdf spectrum --quantity x | quantity
 plot run.vtkhdf spectrum --highest 0 | highest
-plot run.vtkhdf spectrum --end 1e-4 | at least 8
+plot run.vtkhdf spectrum --t-end 1e-4 | at least 8
 plot run.vtkhdf spectrogram --highest -1 | highest
 plot run.vtkhdf poincare | period
 plot run.vtkhdf receptance --point 0,0 | receptance
@@ -513,7 +513,7 @@ sweep sweep.toml --set sweep.method="sobol" | samples
 sweep sweep.toml --set sweep.method="sobol" --set sweep.samples=1000000000000 | samples
 sweep sweep.toml --set 'sweep.summaries=["x"]' | 'x'
 sweep sweep.toml --set 'sweep.summaries=["none.py:f"]' | none.py
-sweep sweep.toml --set sweep.after=9 | after
+sweep sweep.toml --set sweep.t_start=9 | t_start
 branch none.toml | none.toml
 branch tiny.toml | parameter
 branch tiny.toml ground.speed | range

@@ -63,7 +63,8 @@ def test_growth_is_that_of_the_derivative_of_the_motion():
 def test_multipliers_at_loose_tolerance(w, periods, wanted):
     """At rtol = 1e-6 they are what they are at 1e-11, impacts and all."""
     system, period = impact_oscillator(2, w), 2.0 * np.pi / w * periods
-    orbit = strobe(system, transient=300, keep=1, initial=np.zeros(4), rtol=1e-10).states[0, 0]
+    orbit = strobe(system, transient_periods=300, keep=1, initial=np.zeros(4),
+                   rtol=1e-10).states[0, 0]
     for rtol, relative in ((1e-6, 5e-4), (1e-9, 2e-6)):
         found = sensitivity(system, period, initial=orbit, rtol=rtol).monodromy
         largest = np.log(np.abs(np.linalg.eigvals(found)).max()) / period
@@ -73,14 +74,14 @@ def test_multipliers_at_loose_tolerance(w, periods, wanted):
 def test_brute_force_meets_single_runs():
     system = impact_oscillator(2)
     values = np.linspace(60.0, 65.0, 5)
-    found = brute_force(system, "drive.angular_frequency", values, transient=60, keep=4,
+    found = brute_force(system, "drive.angular_frequency", values, transient_periods=60, keep=4,
                         initial=np.zeros(4), chains=2)
     assert found.up.shape == found.down.shape == (5, 4, 4)
-    alone = strobe(system.with_(**{"drive.angular_frequency": 60.0}), transient=60, keep=4,
+    alone = strobe(system.with_(**{"drive.angular_frequency": 60.0}), transient_periods=60, keep=4,
                    initial=np.zeros(4), rtol=1e-5)
     assert (found.up[0] == alone.states[0]).all()
     # The way down begins at the last value.
-    last = strobe(system.with_(**{"drive.angular_frequency": 65.0}), transient=60, keep=4,
+    last = strobe(system.with_(**{"drive.angular_frequency": 65.0}), transient_periods=60, keep=4,
                   initial=np.zeros(4), rtol=1e-5)
     assert (found.down[-1] == last.states[0]).all()
     assert (found.up[-1] != last.states[0]).any()
@@ -92,7 +93,7 @@ def test_brute_force_meets_single_runs():
     def faster(system, value):
         return system.with_(**{"drive.angular_frequency": value})
 
-    same = brute_force(system, faster, values, transient=60, keep=4, initial=np.zeros(4),
+    same = brute_force(system, faster, values, transient_periods=60, keep=4, initial=np.zeros(4),
                        chains=2, down=False)
     assert same.parameter == "faster"
     assert (same.up == found.up).all()
@@ -129,7 +130,7 @@ def test_basins_of_sliding_and_stick_slip():
 def test_basins_of_an_excited_system():
     """Impacts at 64.32 rad/s: one motion of period one from everywhere."""
     found = basins(impact_oscillator(2), (Axis("B", "y"), [0.0, 2e-4, 4e-4]),
-                   (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient=120, keep=6)
+                   (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient_periods=120, keep=6)
     assert len(found.attractors) == 1
     assert found.attractors[0].kind == "periodic"
     assert len(found.attractors[0].points) == 1
@@ -161,4 +162,4 @@ def test_bad_input():
         lyapunov_exponents(system, 1.0, initial=np.array([0.0, 0.0, 1e200, 0.0]))
     with pytest.raises(InputError, match="keep = 2"):
         basins(system, (Axis("B", "y"), [0.0]), (Axis("B", "y", "velocity"), [0.0]),
-               transient=1, keep=2)
+               transient_periods=1, keep=2)

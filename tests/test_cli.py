@@ -188,7 +188,7 @@ MISTAKES = [
     (["mesh", "text.toml"], "no complete section"),
     (["mesh", "solid.toml"], "solid"),
     (["mesh", "absent.toml"], "there is no such file"),
-    (["run", "tiny.toml", "--set", "simulation.method=Euler"], "method = 'Euler' must be"),
+    (["run", "tiny.toml", "--set", "simulation.solver=euler"], "solver = 'euler' must be"),
     (["render", "tiny.toml"], "run the study first: fecontact run tiny.toml"),
     (["render", "none.vtkhdf"], "none.vtkhdf does not exist"),
     (["render", "bad.toml"], "bad.toml is not valid TOML"),
@@ -223,7 +223,7 @@ def test_settings_of_a_movie_out_of_range(cli, study):
     for option, message in ((["--fps", -1], "fps = -1.0 must be a number from 0.01"),
                             (["--frames", 0], "frames = 0 must be at least 1"),
                             (["--size", 5, 5], "must be an even width and height"),
-                            (["--start", 7], "no output time"),
+                            (["--t-start", 7], "no output time"),
                             (["-o", "movie.avi"], "must end in .mp4")):
         code, _, err = cli("render", "results/tiny.vtkhdf", *option)
         assert code == 1
@@ -391,7 +391,7 @@ def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
     def small(shape):
         study = Study.from_toml(full(shape)).with_(**{
             "simulation.t_end": 2e-3, "simulation.outputs": 21, "output.frames": 2,
-            "render.frames": 1, "render.start": 0.0, "render.end": 1.0,
+            "render.frames": 1, "render.t_start": 0.0, "render.t_end": 1.0,
             "render.size": [320, 180]})
         return study.to_toml()
 

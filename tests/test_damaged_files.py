@@ -250,7 +250,7 @@ def test_a_damaged_shard_is_one_sentence(swept, content):
 
 def test_stored_displacements_of_another_number_are_refused(swept, tmp_path):
     study, _ = swept
-    options = {"strobe": {"keep": 3, "transient": 1}}
+    options = {"strobe": {"keep": 3, "transient_periods": 1}}
     axes = {"ground.speed": [1e-3]}
     sweep(study, axes, Serial(), folder=tmp_path / "f", **options)
     (shard,) = (tmp_path / "f" / "shards").glob("*.json")

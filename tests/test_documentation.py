@@ -21,7 +21,7 @@ TEXTS = {name: path.read_text() for name, path in PAGES.items()}
 BLOCK = re.compile(r"(?:<!-- not run: (?P<reason>[^>]+) -->\n)?```(?P<language>\w*)\n"
                    r"(?P<text>.*?)```", re.DOTALL)
 # Long computations of a page in fewer cases, each given by a text that stands there once.
-SHORTER = {"sweeps.md": {"12e-3, 24)": "12e-3, 2)", "after=30.0": "after=0.5",
+SHORTER = {"sweeps.md": {"12e-3, 24)": "12e-3, 2)", "t_start=30.0": "t_start=0.5",
                          "changes(17)": "changes(7)"}}
 BELT = """
 geometry = { shape = "block", element_size = 0.02 }
@@ -153,7 +153,7 @@ def check_laws(names, printed, folder):
 def check_sweeps(names, printed, folder):
     assert names["amplitude"].shape == (2, 4)
     # The case once more, alone: half of its way is what the table says.
-    x = fc.window(names["run"], 0.5).displacement("B")[:, 0]
+    x = names["run"].between(0.5).displacement("B")[:, 0]
     assert names["amplitude"].ravel()[7] == pytest.approx(np.ptp(x) / 2.0, rel=1e-12)
 
 

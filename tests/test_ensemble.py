@@ -34,13 +34,13 @@ def test_strobed_motion_repeats_where_the_motion_does():
     system = impact_oscillator(modes=2)
     assert forcing_period(system) == pytest.approx(PERIOD, rel=1e-14)
     states = 1e-4 * np.random.default_rng(2).normal(size=(4, system.size))
-    found = strobe(system, transient=150, keep=3, initial=states, rtol=1e-7)
+    found = strobe(system, transient_periods=150, keep=3, initial=states, rtol=1e-7)
     assert found.states.shape == (4, 3, 4)
     assert found.times[0] == pytest.approx(PERIOD * np.array([150, 151, 152]), rel=1e-14)
     # One attractor of period one at this frequency, from all four starts.
     size = np.abs(found.states).max(axis=(0, 1))
     assert (np.ptp(found.states, axis=(0, 1)) < 1e-4 * size).all()
-    none = strobe(system, transient=0, keep=2, initial=states)
+    none = strobe(system, transient_periods=0, keep=2, initial=states)
     assert (none.states[:, 0] == states).all()
 
 
@@ -48,7 +48,7 @@ def test_a_chain_hands_on_its_states():
     base = impact_oscillator(modes=2)
     systems = [base.with_(**{"drive.angular_frequency": w}) for w in (60.0, 61.0, 62.0, 63.0)]
     start = np.full(4, 1e-4)
-    found = strobe(systems, transient=3, keep=1, initial=start, chain=2)
+    found = strobe(systems, transient_periods=3, keep=1, initial=start, chain=2)
     last = start
     for index in (0, 1):
         w = systems[index].drive.angular_frequency
@@ -57,7 +57,7 @@ def test_a_chain_hands_on_its_states():
         run.advance(10**9)
         last = run.states[-1]
         assert found.states[index, 0] == pytest.approx(last, rel=1e-6)
-    alone = strobe(systems[2], transient=3, keep=1, initial=start)
+    alone = strobe(systems[2], transient_periods=3, keep=1, initial=start)
     assert (found.states[2] == alone.states[0]).all()
 
 
@@ -94,9 +94,9 @@ def test_bad_members():
     with pytest.raises(InputError, match="3 initial states for 1 systems"):
         ensemble([system], [0.0, 1.0], initial=np.zeros((3, 4)))
     with pytest.raises(InputError, match="give period"):
-        strobe(system.with_(**{"drive.amplitude_y": 0.0}), transient=1, keep=1,
+        strobe(system.with_(**{"drive.amplitude_y": 0.0}), transient_periods=1, keep=1,
                initial=np.zeros(4))
     with pytest.raises(InputError, match="keep = 0"):
-        strobe(system, transient=1, keep=0)
+        strobe(system, transient_periods=1, keep=0)
     with pytest.raises(InputError, match="period = -1"):
-        strobe(system, transient=1, keep=1, period=-1.0, initial=np.zeros(4))
+        strobe(system, transient_periods=1, keep=1, period=-1.0, initial=np.zeros(4))

@@ -13,6 +13,8 @@ from fecontact import (
     JenkinsFriction,
     LinearContact,
     Load,
+    Rodas5P,
+    Scipy,
     Status,
     event,
     read_case,
@@ -147,8 +149,9 @@ def test_bad_input():
         Crossing("B", "x", value=float("nan"))
     with pytest.raises(InputError, match="events: 'touch-down' must be"):
         simulate(drop(), 1.0, initial=START, events=["touch-down"])
-    with pytest.raises(InputError, match="'Rodas5P' alone"):
-        simulate(drop(), 1.0, initial=START, events=ContactEvents(), method="Radau")
+    with pytest.raises(InputError, match=r"Rodas5P\(\) alone, not by Scipy\(method='Radau'\)"):
+        simulate(drop(), 1.0, initial=START, events=ContactEvents(),
+                 solver=Scipy("Radau"))
 
 
 def test_events_survive_a_checkpoint(tmp_path):
@@ -160,10 +163,11 @@ def test_events_survive_a_checkpoint(tmp_path):
         if time > 5.0:
             raise KeyboardInterrupt
 
-    part = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(), checkpoint=file,
-                    progress=stop)
+    part = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(),
+                    solver=Rodas5P(file), progress=stop)
     assert part.status is Status.INTERRUPTED
-    rest = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(), checkpoint=file)
+    rest = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(),
+                    solver=Rodas5P(file))
     assert 0 < len(part.events) < len(whole.events)
     assert (rest.events.time == whole.events.time).all()
     assert rest.events.kind == whole.events.kind
@@ -201,7 +205,7 @@ def test_more_events_than_steps_of_a_piece(tmp_path, monkeypatch):
 
     run = simulate(system, 40.0, initial=np.array([1e-3, 0.0]), outputs=3, rtol=1e-5,
                    events=[Crossing("B", "y", of="velocity"), ContactEvents()], progress=tell,
-                   checkpoint=file)
+                   solver=Rodas5P(file))
     assert run.status is Status.FINISHED
     assert len(run.events.only("event 0")) in (79_999, 80_000, 80_001)
     times = [time for time, _ in told]

@@ -11,6 +11,7 @@ from fecontact.analysis.periodicity import count_periods, drive_period, strobed_
 from fecontact.fem.mesh_files import read_mesh
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import Scipy
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 
@@ -93,7 +94,7 @@ def test_other_integrators_keep_the_orbits(frequency, periods, method):
     run = settled_regime(system)[1]
     period, scale = drive_period(system), np.ptp(run.states, axis=0)
     again = simulate(system, run.time[-1] + periods * period, initial=run, outputs=2,
-                     method=method, rtol=1e-9)
+                     solver=Scipy(method), rtol=1e-9)
     assert (np.abs(again.states[-1] - run.states[-1]) / scale).max() < 1e-4
 
 
@@ -102,7 +103,7 @@ def test_another_integrator_finds_chaos_too():
     run = settled_regime(system)[1]
     period, scale = drive_period(system), np.ptp(run.states, axis=0)
     times = run.time[-1] + period * np.arange(25)
-    states = simulate(system, times[-1], initial=run, outputs=times, method="LSODA",
+    states = simulate(system, times[-1], initial=run, outputs=times, solver=Scipy("LSODA"),
                       rtol=1e-6).states
     assert count_periods(states, scale, largest=8).periods is None
     assert np.ptp(states, axis=0)[2] > 0.1 * scale[2]
@@ -130,7 +131,7 @@ def test_exponent_of_chaos_is_the_growth_between_neighbours():
     growth, error = impact.exponent(run, found, 400)
     assert 0.0 < error < 0.5
     assert growth == pytest.approx(6.0, abs=0.9)
-    states = strobed_states(run, start=float(run.time[0])).states
+    states = strobed_states(run, t_start=float(run.time[0])).states
     assert growth_of_pairs(chaotic, states, 48, 8) == pytest.approx(6.0, abs=1.2)
 
 

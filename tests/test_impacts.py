@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import brentq
 
 from fecontact.analysis.impacts import find_impacts, find_rests
-from fecontact.analysis.window import window
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import SetValued
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ExponentialFriction
 from fecontact.laws.ground.ground import Ground
@@ -169,12 +169,12 @@ def test_set_valued_friction_has_impacts_and_rigid_stops_have_none():
     q = np.linalg.solve(basis.T[2, :2], [0.0, 1e-4])
     system = ContactSystem(basis, normal=law, friction=ExponentialFriction(0.3, 0.3))
     run = simulate(system, 0.006, initial=np.concatenate([q, -V0 / 1e-4 * q]), outputs=601,
-                   method="set-valued")
+                   solver=SetValued())
     assert find_impacts(run).restitution == pytest.approx([RESTITUTION], rel=1e-3)
     assert find_impacts(run).impact_velocity == pytest.approx([V0], rel=1e-3)
     frictionless = ball(law, weight=1.0)
-    rigid = simulate(frictionless, 0.05, initial=state(1e-4, 0.0), outputs=601, restitution=0.5,
-                     method="set-valued")
+    rigid = simulate(frictionless, 0.05, initial=state(1e-4, 0.0), outputs=601,
+                     solver=SetValued(restitution=0.5))
     with pytest.raises(InputError, match="rigid stops take no time"):
         find_impacts(rigid)
 
@@ -230,7 +230,7 @@ def test_chatter_of_the_pendulum_comes_to_rest_once_a_period():
 
     period = 2.0 * np.pi / 9.845
     run = simulate(pendulum(9.845), 10.0 * period, initial=np.zeros(4), outputs=10 * 12000 + 1)
-    late = window(run, 5.0 * period)
+    late = run.between(5.0 * period)
     rests = find_rests(late)
     # The last rest may have been cut off by the end of the run.
     assert len(rests) in (5, 6)

@@ -6,6 +6,7 @@ from oscillators import friction_oscillator, impact_oscillator
 from test_events import START, drop
 
 from fecontact import (
+    CVODE,
     ConstantFriction,
     ContactSystem,
     InputError,
@@ -14,6 +15,7 @@ from fecontact import (
     NormalLaw,
     RigidStart,
     RoughSurface,
+    SetValued,
     Status,
     basis_from_matrices,
     normal_law,
@@ -27,17 +29,18 @@ def test_cvode_agrees():
     pytest.importorskip("sksundae")
     system = friction_oscillator(3)
     one = simulate(system, 1.0, outputs=201, rtol=1e-8)
-    other = simulate(system, 1.0, outputs=201, method="CVODE", rtol=1e-8)
+    other = simulate(system, 1.0, outputs=201, solver=CVODE(), rtol=1e-8)
     assert other.status is Status.FINISHED
     size = np.abs(one.states).max(axis=0)
     assert (np.abs(one.states - other.states).max(axis=0) < 2e-4 * size + 1e-15).all()
     assert other.energies.imbalance < 1e-4
-    assert other.statistics["method"] == "CVODE"
+    assert other.statistics["solver"] == "cvode"
 
 
 def test_cvode_drops_on_a_spring():
     pytest.importorskip("sksundae")
-    run = simulate(drop(), 1.1, initial=START, outputs=[0.0, 1.0, 1.1], method="CVODE", rtol=1e-9)
+    run = simulate(drop(), 1.1, initial=START, outputs=[0.0, 1.0, 1.1], solver=CVODE(),
+                   rtol=1e-9)
     assert run.states[1:, 0] == pytest.approx([-1.332162981855, -0.856394405035], rel=1e-6)
 
 
@@ -68,12 +71,15 @@ def test_users_are_told_what_smoothing_costs():
 
 def test_options_of_set_valued_runs():
     system = friction_oscillator(2, **{"drive.amplitude_x": 0.0})
-    run = simulate(system, 0.1, method="set-valued", static_coefficient=0.9, scheme="events")
+    run = simulate(system, 2.3, outputs=2301,
+                   solver=SetValued(static_coefficient=0.9, scheme="events"))
     assert run.status is Status.FINISHED
-    with pytest.raises(InputError, match=r"scheme = 'events' is for method = 'set-valued' alone"):
-        simulate(system, 0.1, scheme="events")
-    with pytest.raises(InputError, match=r"static_coefficient = 0\.9 is for"):
-        simulate(system, 0.1, static_coefficient=0.9, method="LSODA")
+    # The belt stretches the spring of 5610 N/m by 1 mm/s until the contact holds no longer.
+    pull = np.abs(run.friction_force[:, 0]) / run.normal_force[:, 0]
+    assert pull.max() == pytest.approx(0.9, rel=1e-3)
+    assert run.time[np.argmax(pull)] == pytest.approx(0.9 * 14.0 / 5.61, rel=1e-3)
+    assert run.statistics["solver"] == "set-valued"
+    assert run.statistics["static_coefficient"] == 0.9
 
 
 def test_a_deep_start_is_warned_of():
@@ -124,7 +130,8 @@ def test_energies_beyond_all_numbers_have_a_status(change):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": rows})
-    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), load=Load(14.0))
+    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), ConstantFriction(0.0),
+                           load=Load(14.0))
     start = "rest"
     if change == "velocity":
         start = RigidStart(velocity=(1e300, 0.0, 0.0))

@@ -235,7 +235,7 @@ def test_png_frames_have_the_size_and_the_body_moves(tmp_path):
 def test_movie_has_its_frames_and_duration(tmp_path):
     trajectory = run(basis(columns=20, rows=4), times=31)
     path = render(trajectory, tmp_path / "run.mp4", frames=12, fps=8, size=SMALL, title="Bouncing",
-                  start=0.005)
+                  t_start=0.005)
     assert imageio_ffmpeg.count_frames_and_secs(str(path)) == (12, pytest.approx(1.5, abs=0.01))
     frames = imageio_ffmpeg.read_frames(str(path))
     facts = next(frames)

@@ -136,7 +136,7 @@ def test_strobe_says_what_it_lacks():
         strobed_states(run, period=3.0)
     with pytest.raises(InputError, match=r"phase = 1\.5"):
         strobed_states(run, period=0.1, phase=1.5)
-    with pytest.raises(InputError, match=r"start = 2\.0 must be a time of the run"):
-        strobed_states(run, period=0.1, start=2.0)
+    with pytest.raises(InputError, match=r"t_start = 2\.0 must be a time of the run"):
+        strobed_states(run, period=0.1, t_start=2.0)
     with pytest.raises(InputError, match="at least eight per period"):
         periodicity(run, period=0.1, largest=1)

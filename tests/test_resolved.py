@@ -116,7 +116,7 @@ def test_set_valued_runs_are_repeated_with_what_they_were_told():
     """A ball on a rigid stop: rebounds of e, e^2 ... that are shorter than the times between."""
     system = point_mass("y", load=fc.Load(9.81 * MASS))
     run = fc.simulate(system, 0.55, initial=np.sqrt(MASS) * np.array([0.1, 0.0]), outputs=12,
-                      method="set-valued", restitution=0.5)
+                      solver=fc.SetValued(restitution=0.5))
     found = resolved(run)
     assert not found.note
     fine, rate = found.trajectory, found.trajectory.velocity("B")[:, 1]
@@ -136,7 +136,7 @@ def test_files_read_back_are_drawn_alike(tmp_path, capsys):
                                   resolved(run).trajectory.normal_force)
     assert execute(["plot", str(case), "history", "-o", str(tmp_path / "history.svg")]) == 0
     assert b"straight lines" not in (tmp_path / "history.svg").read_bytes()
-    assert execute(["plot", str(case), "phase", "--axis", "y", "--start", "0.01"]) == 0
+    assert execute(["plot", str(case), "phase", "--axis", "y", "--t-start", "0.01"]) == 0
 
 
 def test_pictures_say_where_they_are_too_coarse(tmp_path):

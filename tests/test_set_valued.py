@@ -6,7 +6,9 @@ import pytest
 
 from fecontact.core.errors import InputError
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
+from fecontact.integrate.simulate import simulate
 from fecontact.integrate.smoothing_cost import smoothing_cost
+from fecontact.integrate.solvers import SetValued
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.excitation import Drive, Load, PointLoad
 from fecontact.laws.friction.bristle import LuGreFriction
@@ -283,11 +285,12 @@ def test_cost_of_smoothing():
     ({"restitution": 1.0}, r"restitution = 1\.0"), ({"restitution": "hard"}, "= 'hard'"),
     ({"static_coefficient": -1.0}, "static_coefficient"), ({"scheme": "event"}, "mean 'events'"),
     ({"static_coefficient": (1.0, 2.0)}, "1 contact nodes"), ({"restitution": 0.5}, "friction"),
+    ({"restitution": 0.5, "scheme": "stepping"}, "'stepping' has no rigid stops"),
 ])
 def test_options_are_checked(options, message):
-    system = block(load=Load(1.0))
+    system = block(friction=ConstantFriction(0.5), load=Load(1.0))
     with pytest.raises(InputError, match=message):
-        integrate_set_valued(system, start(system, 0.0), np.linspace(0.0, 1.0, 3), **options)
+        simulate(system, 1.0, initial=start(system, 0.0), outputs=3, solver=SetValued(**options))
 
 
 def test_friction_with_memory_has_no_set_valued_limit():

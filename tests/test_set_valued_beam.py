@@ -8,6 +8,7 @@ from fecontact.core.errors import InputError
 from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import Scipy
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ExponentialFriction
@@ -77,7 +78,7 @@ def test_smoothed_runs_approach_it(basis, reference):
     exact, errors = velocity_of_b(basis, run.states), []
     for slope in (1e4, 1e5, 1e6):
         smooth = simulate(beam(basis, slope), TIMES[-1], initial=state, outputs=TIMES,
-                          method="LSODA")
+                          solver=Scipy("LSODA"))
         errors.append(np.abs(smooth.velocity("B")[:, 0] - exact).max() / np.abs(exact).max())
     assert errors[0] > 1.7 * errors[1] > 2.9 * errors[2]
     assert errors[2] < 3e-3

@@ -11,6 +11,7 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.integrate.initial_state import RigidStart, initial_state
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import Rodas5P, Scipy
 from fecontact.integrate.trajectory import ContactState, Status, Trajectory
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ExponentialFriction
@@ -63,7 +64,8 @@ def test_contact_time_of_uniform_roughness(method, tolerance):
     """A run of 2 T ends at the height v0 T."""
     system = mass_in_y(MASS, normal=RoughSurface(C, R, 0.0))
     T = 2.8043642107 * DEEPEST / V0
-    run = simulate(system, 2.0 * T, initial=at(system, y_rate=-V0), method=method, outputs=201)
+    run = simulate(system, 2.0 * T, initial=at(system, y_rate=-V0), solver=Scipy(method),
+                   outputs=201)
     assert run.status is Status.FINISHED
     height, rate = run.displacement(0)[-1, 1], run.velocity(0)[-1, 1]
     assert 2.0 * T - height / rate == pytest.approx(T, rel=tolerance)
@@ -134,7 +136,8 @@ def test_drop_on_a_spring(method, tolerance):
     system = mass_in_y(1.0, normal=RoughSurface(100.0, width, 0.0), load=Load(10.0),
                        gap=2.0 - 0.5 * width)
     times = [0.0, 0.54031242374324, 0.88545615307643, 1.0, 1.1]
-    run = simulate(system, 1.1, initial=at(system, y_rate=-1.0), outputs=times, method=method)
+    run = simulate(system, 1.1, initial=at(system, y_rate=-1.0), outputs=times,
+                   solver=Scipy(method))
     assert run.displacement(0)[:, 1] == pytest.approx(
         [0.0, -2.0, -2.0, -1.332162981855, -0.856394405035], abs=tolerance)
     assert run.energies.load_work[-1] == pytest.approx(8.56394405, abs=1e-3)
@@ -172,7 +175,7 @@ def test_den_hartog(r, beta, amplitude, tolerance):
                            drive=Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=r))
     period = 2.0 * np.pi / r
     times = np.concatenate([[0.0], np.linspace(29.0, 30.0, 401) * period])
-    run = simulate(system, times[-1], outputs=times, method="LSODA", rtol=1e-7)
+    run = simulate(system, times[-1], outputs=times, solver=Scipy("LSODA"), rtol=1e-7)
     x = run.displacement("B")[1:, 0]
     assert 0.5 * np.ptp(x) == pytest.approx(amplitude, rel=tolerance)
 
@@ -202,7 +205,7 @@ def test_hopf_point_of_steady_sliding(smoothing, critical, tolerance):
 
 @pytest.mark.parametrize(("method", "tolerance"), [("Radau", 5e-6), ("LSODA", 3e-4), ("BDF", 5e-4)])
 def test_stick_slip_on_the_belt(method, tolerance):
-    run = simulate(oscillator(), 6.0, outputs=12001, method=method)
+    run = simulate(oscillator(), 6.0, outputs=12001, solver=Scipy(method))
     late = run.time > 3.0
     x, t = run.displacement("B")[late, 0], run.time[late]
     up = np.flatnonzero((x[:-1] < 1.4e-3) & (x[1:] >= 1.4e-3))
@@ -257,7 +260,7 @@ def test_third_mode_vibrates_at_the_drive_while_the_contact_sticks():
                        T=T, positions=np.zeros((3, 2)), tributary=[1.0])
     system = oscillator(amplitude=0.5e-3).with_(basis=basis)
     times = np.concatenate([[0.0], np.linspace(8.0, 12.0, 8001) * 2.0 * np.pi / 13.8])
-    run = simulate(system, times[-1], outputs=times, method="LSODA")
+    run = simulate(system, times[-1], outputs=times, solver=Scipy("LSODA"))
     state = run.contact_state[:, 0]
     runs = np.split(np.arange(len(state)), np.flatnonzero(np.diff(state)) + 1)
     longest = max((k for k in runs if state[k[0]] == ContactState.STICK), key=len)
@@ -293,7 +296,7 @@ def pendulum(angular_frequency):
 def test_regimes_of_the_impact_oscillator(w, repeats):
     period = 2.0 * np.pi / w
     times = np.concatenate([[0.0], np.linspace(52.0, 60.0, 8 * 200 + 1) * period])
-    run = simulate(pendulum(w), times[-1], outputs=times, method="LSODA")
+    run = simulate(pendulum(w), times[-1], outputs=times, solver=Scipy("LSODA"))
     y = run.displacement("B")[1:, 1]
     misses = [np.abs(y[200 * k:] - y[: -200 * k]).max() / np.ptp(y) for k in (1, 2, 3, 4)]
     assert int(np.argmax(np.array(misses) < 3e-3)) + 1 == repeats
@@ -318,7 +321,7 @@ DRIVEN = {"ground": Ground(speed=0.05), "drive": Drive(
 
 
 def test_energy_balance_and_methods_agree_on_a_driven_beam():
-    runs = {method: simulate(beam(**DRIVEN), 0.03, outputs=301, method=method)
+    runs = {method: simulate(beam(**DRIVEN), 0.03, outputs=301, solver=Scipy(method))
             for method in ("Radau", "BDF", "LSODA")}
     place = {method: run.displacement("B") for method, run in runs.items()}
     size = np.abs(place["Radau"]).max(axis=0)
@@ -455,9 +458,9 @@ def test_rigid_start_about_a_hinge():
 
 def test_restart_continues_the_same_motion():
     system = beam(**DRIVEN)
-    whole = simulate(system, 0.012, outputs=[0.0, 0.006, 0.012], method="LSODA", rtol=1e-8)
-    first = simulate(system, 0.006, outputs=3, method="LSODA", rtol=1e-8)
-    second = simulate(system, 0.012, t_start=0.006, initial=first, outputs=3, method="LSODA",
+    whole = simulate(system, 0.012, outputs=[0.0, 0.006, 0.012], solver=Scipy("LSODA"), rtol=1e-8)
+    first = simulate(system, 0.006, outputs=3, solver=Scipy("LSODA"), rtol=1e-8)
+    second = simulate(system, 0.012, t_start=0.006, initial=first, outputs=3, solver=Scipy("LSODA"),
                       rtol=1e-8)
     assert second.time == pytest.approx([0.006, 0.009, 0.012], rel=1e-15)
     assert (second.states[0] == first.states[-1]).all()
@@ -482,7 +485,7 @@ def test_outputs():
     assert simulate(system, 0.5, outputs=np.int64(3)).time.tolist() == [0.0, 0.25, 0.5]
     assert simulate(system, 0.1).time.shape == (1001,)
     assert run.statistics["steps"] > 0
-    assert run.statistics["method"] == "Rodas5P"
+    assert run.statistics["solver"] == "rodas5p"
     assert run.statistics["right_hand_sides"] > run.statistics["steps"]
 
 
@@ -503,13 +506,13 @@ def test_interrupted_runs_keep_what_they_have(method):
         if time > 0.3:
             raise KeyboardInterrupt
 
-    run = simulate(oscillator(), 1.0, outputs=101, method=method, progress=stop)
+    run = simulate(oscillator(), 1.0, outputs=101, solver=Scipy(method), progress=stop)
     assert run.status is Status.INTERRUPTED
     assert "interrupted" in run.status.value
     assert (np.diff(seen) > 0.0).all()
     assert run.time[-1] == seen[-1]  # the last state, though it is no output
     assert len(run.time) == len(run.states) == len(run.work) < 101
-    whole = simulate(oscillator(), 1.0, outputs=101, method=method)
+    whole = simulate(oscillator(), 1.0, outputs=101, solver=Scipy(method))
     kept = len(run.time) - 1
     assert (run.time[:kept] == whole.time[:kept]).all()
     assert run.states[:kept] == pytest.approx(whole.states[:kept], rel=1e-12, abs=1e-20)
@@ -548,19 +551,19 @@ def test_a_checkpoint_goes_on_bit_for_bit(tmp_path):
         if time > 3.0:
             raise KeyboardInterrupt
 
-    part = simulate(oscillator(), 10.0, outputs=21, progress=stop, checkpoint=path)
+    part = simulate(oscillator(), 10.0, outputs=21, progress=stop, solver=Rodas5P(path))
     assert part.status is Status.INTERRUPTED
     assert 3.0 < part.time[-1] < 10.0
     with pytest.raises(InputError, match="checkpoint of another run"):
-        simulate(oscillator(), 10.0, outputs=21, checkpoint=path, rtol=1e-5)
-    rest = simulate(oscillator(), 10.0, outputs=21, checkpoint=path)
+        simulate(oscillator(), 10.0, outputs=21, solver=Rodas5P(path), rtol=1e-5)
+    rest = simulate(oscillator(), 10.0, outputs=21, solver=Rodas5P(path))
     whole = simulate(oscillator(), 10.0, outputs=21)
     assert (rest.states == whole.states).all()
     assert (rest.work == whole.work).all()
     assert not path.exists()
     path.write_text("no checkpoint")
     with pytest.raises(InputError, match="not a checkpoint"):
-        simulate(oscillator(), 10.0, outputs=21, checkpoint=path)
+        simulate(oscillator(), 10.0, outputs=21, solver=Rodas5P(path))
 
 
 def test_other_errors_in_progress_are_passed_on():
@@ -577,7 +580,7 @@ def test_a_motion_that_grows_beyond_all_numbers(method):
     rows = np.array([[[0.0], [1.0], [0.0]]])
     basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": rows}, damping=[[-1e4]])
     run = simulate(ContactSystem(basis, SURFACE), 1.0, initial=np.array([1.0, 0.0]), outputs=10001,
-                   method=method)
+                   solver=Scipy(method))
     assert run.status is Status.FAILED
     assert "message" in run.statistics
     assert run.statistics["steps"] < 20000
@@ -592,7 +595,8 @@ def test_a_motion_that_grows_beyond_all_numbers(method):
 @pytest.mark.parametrize(("options", "message"), [
     ({"rtol": 0.0}, r"rtol = 0\.0"), ({"rtol": 0.1}, r"rtol = 0\.1"), ({"rtol": 1e-15}, "1e-15"),
     ({"rtol": float("nan")}, "rtol = nan"), ({"rtol": "fine"}, "rtol = 'fine'"),
-    ({"method": "radau"}, "did you mean 'Radau'"), ({"method": None}, "method = None"),
+    ({"solver": "radau"}, r"solver = 'radau' must be Rodas5P\(\)"),
+    ({"solver": Scipy}, r"solver = Scipy must be"), ({"solver": None}, "solver = None"),
     ({"outputs": 1}, "outputs = 1"), ({"outputs": True}, "outputs"), ({"outputs": 2.5}, "outputs"),
     ({"outputs": [0.0, 0.5]}, "t_end"), ({"outputs": [0.1, 1.0]}, "outputs"),
     ({"outputs": [0.0, 0.5, 0.5, 1.0]}, "ascending"), ({"outputs": [[0.0, 1.0]]}, "outputs"),

@@ -118,7 +118,7 @@ def test_nodal_contact_forces_add_up_to_the_contact_forces(tmp_path):
 def test_read_case_is_equal_to_the_last_bit(tmp_path, frames):
     written = replace(run(times=31, waviness=3e-6), status=Status.INTERRUPTED,
                       work=np.random.default_rng(1).normal(size=(31, 8)),
-                      statistics={"steps": 12, "seconds": 0.1 + 0.2, "method": "Radau",
+                      statistics={"steps": 12, "seconds": 0.1 + 0.2, "solver": "radau",
                                   "factorisations": np.int64(3), "rtol": np.float64(1e-6)})
     written = replace(written, system=written.system.with_(
         **{"friction.static_coefficient": (0.1, 0.2, 0.3, 0.4, 1 / 3), "gap": (0, 1e-6, 0, 0, 0)}))
@@ -178,7 +178,7 @@ def test_frames_are_the_output_times_nearest_to_even_spacing():
     assert np.array_equal(frame_indices(time, 11), np.arange(0, 101, 10))
     assert np.array_equal(frame_indices(time, 101), np.arange(101))
     assert np.array_equal(frame_indices(time, 500), np.arange(101))
-    assert np.array_equal(frame_indices(time, 3, start=0.5), [50, 75, 100])
+    assert np.array_equal(frame_indices(time, 3, t_start=0.5), [50, 75, 100])
     assert np.array_equal(frame_indices(time, 1), [0])
     assert not len(frame_indices(time, 0))
     crowded = np.concatenate([np.linspace(0.0, 0.01, 1000), [0.5, 1.0]])
@@ -187,7 +187,7 @@ def test_frames_are_the_output_times_nearest_to_even_spacing():
     with pytest.raises(InputError, match="frames = -1"):
         frame_indices(time, -1)
     with pytest.raises(InputError, match=r"no output time from 2.0 s"):
-        frame_indices(time, 5, start=2.0)
+        frame_indices(time, 5, t_start=2.0)
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])

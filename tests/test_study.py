@@ -13,6 +13,8 @@ from fecontact.fem.mesh_files import write_mesh
 from fecontact.fem.points import Patch
 from fecontact.fem.shapes import Beam, Block, Pendulum
 from fecontact.integrate.initial_state import RigidStart
+from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import SOLVERS, SetValued
 from fecontact.laws.excitation import Load
 from fecontact.laws.friction.stribeck import ExponentialFriction
 from fecontact.laws.ground.ground import Ground
@@ -145,6 +147,23 @@ def test_changes_by_dotted_names(tiny):
     assert changed.load == tiny.load
 
 
+def test_solvers_have_one_name_in_files_and_in_python(tiny):
+    """Every solver can be named, and takes its own options from [simulation]."""
+    assert sorted(SOLVERS) == ["bdf", "cvode", "lsoda", "radau", "rodas5p", "set-valued"]
+    for name, solver in SOLVERS.items():
+        assert tiny.with_(**{"simulation.solver": name}).simulation.chosen_solver() == solver
+    told = {"simulation.solver": "set-valued", "simulation.scheme": "stepping",
+            "simulation.static_coefficient": 0.9}
+    study = tiny.with_(**told)
+    assert study.simulation.chosen_solver() == SetValued(static_coefficient=0.9, scheme="stepping")
+    run = study.run()
+    same = simulate(study.system(), 1e-3, outputs=11,
+                    solver=SetValued(static_coefficient=0.9, scheme="stepping"))
+    assert np.array_equal(run.states, same.states)
+    assert run.statistics["solver"] == "set-valued"
+    assert not np.array_equal(run.states, tiny.run().states)
+
+
 def test_basis_keys_reach_the_basis(tiny):
     plain = tiny.basis()
     damped = tiny.with_(**{"basis.dashpots": {"B": [2.0, 0.0], "3": [0.0, 5.0]}}).basis()
@@ -254,7 +273,14 @@ MISTAKES = [
     ({"simulation.t_end": 0}, r"\[simulation\]: t_end = 0\.0 must be a finite time after"),
     ({"simulation.rtol": 0}, r"\[simulation\]: rtol = 0\.0 must be a finite number above zero"),
     ({"simulation.max_step": 0}, r"\[simulation\]: max_step = 0\.0 must be a finite number above"),
-    ({"simulation.method": "Eulr"}, r"\[simulation\]: method = 'Eulr' must be one of"),
+    ({"simulation.solver": "rodas"},
+     r"\[simulation\]: solver = 'rodas' must be one of .* \(did you mean 'rodas5p'\?\)"),
+    ({"simulation.restitution": 0.5},
+     r"\[simulation\]: restitution = 0\.5 is for solver = 'set-valued' alone, not 'rodas5p'"),
+    ({"simulation.solver": "set-valued", "simulation.restitution": 1.0},
+     r"\[simulation\]: restitution = 1\.0 must be a number from 0 to below 1\.$"),
+    ({"simulation.solver": "radau", "simulation.stop": ["stick"]},
+     r"\[simulation\]: events and stop are for solver = 'rodas5p' alone, not 'radau'"),
     ({"geometry.shape": "bem"}, r"\[geometry\]: shape = \"bem\" must be one of .*mean 'beam'"),
     ({"geometry.length": -1}, r"\[geometry\]: length = -1\.0 must be a finite number above zero"),
     ({"geometry.file": "x.msh"}, r"\[geometry\] must have either a shape .* or the file of a"),
@@ -274,7 +300,8 @@ MISTAKES = [
     ({"drive.motion_x": {"law": "sweep", "amplitude": 1, "start_frequency_hz": 0,
                          "end_frequency_hz": 1, "duration": 1, "kind": "logarithmic"}},
      r"\[drive\.motion_x\]: start_frequency_hz = 0\.0 must be a finite number above zero"),
-    ({"render.start": 0.2, "render.end": 0.1}, r"\[render\]: end = 0\.1 must not be before start"),
+    ({"render.t_start": 0.2, "render.t_end": 0.1},
+     r"\[render\]: t_end = 0\.1 must not be before t_start"),
     ({"output.points": [1.5]}, r"points = \[1\.5\] must be a list of texts in quotes or whole num"),
 ]
 

@@ -242,7 +242,7 @@ def rate(run):
 """)
     study = Study.read(path)
     table = sweep(study, {"ground.speed": [6e-3, 7e-3, 9e-3, 12e-3],
-                          "friction.static_coefficient": [0.7, 0.8]}, Serial(), after=0.5,
+                          "friction.static_coefficient": [0.7, 0.8]}, Serial(), t_start=0.5,
                   summaries=["growth.py:rate", "dominant_frequency"])
     mass = 1.0 / study.basis().T[0, 0, 0] ** 2
     assert mass == pytest.approx(7850.0 * 0.12 * 0.06 * 0.1, rel=1e-9)
@@ -372,7 +372,7 @@ def test_progress_is_told(study, tmp_path):
     ({"ground.speed": [1.0]}, {"summaries": ["stick_part"]},
      r"no summary 'stick_part' \(did you mean 'stick_fraction'\?\)"),
     ({"ground.speed": [1.0]}, {"summaries": ["own.py:none"]}, "own.py has no function 'none'"),
-    ({"ground.speed": [1.0]}, {"after": 1.0}, "after = 1 must lie before the end of the run"),
+    ({"ground.speed": [1.0]}, {"t_start": 1.0}, "t_start = 1 must lie before the end of the run"),
     ({"ground.speed": [1.0]}, {"sample": 3}, r"no key 'sample' \(did you mean 'samples'\?\)"),
     ({"ground.speed": [1.0]}, {"executor": 3}, "must have the methods of"),
     ({"ground.speed": [1.0]}, {"workers": 0}, "workers = 0 must be a whole number from 1"),

@@ -15,7 +15,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.sweep.summaries import SUMMARIES, functions_for, since, summarise, unit_of
+from fecontact.sweep.summaries import SUMMARIES, functions_for, summarise, unit_of
 from fecontact.system.contact_system import ContactSystem
 
 V, STIFFNESS, DEPTH, MU = 0.02, 3e5, 4e-5, 0.3
@@ -39,8 +39,8 @@ def run():
                       node_friction_work=np.outer(t, [1.0, 2.0, 4.0, 3.0]))
 
 
-def values(run, *names, after=None, **known):
-    return summarise(run, functions_for(names, **known), after)
+def values(run, *names, t_start=None, **known):
+    return summarise(run, functions_for(names, **known), t_start)
 
 
 def test_displacements_and_velocities(run):
@@ -81,20 +81,20 @@ def test_power_and_wear(run):
     depth = 1e-13 * 4.0 * 0.02 / (0.05 * 0.03)  # the third node has worked most
     assert found["wear_depth"] == pytest.approx(depth)
     assert found["wear_rate"] == pytest.approx(depth / 0.02)
-    late = values(run, *names, after=0.015, **known)
+    late = values(run, *names, t_start=0.015, **known)
     assert late["friction_power"] == pytest.approx(5.0)
     assert late["wear_depth"] == pytest.approx(depth / 4.0)
     assert late["wear_rate"] == pytest.approx(depth / 0.02)
 
 
 def test_the_late_part_counts_from_its_first_time(run):
-    late = since(run, 0.01)
+    late = run.between(0.01)
     assert late.time[0] == pytest.approx(0.01)
     assert len(late.states) == len(late.time) == len(late.friction_work) == 4001
     assert (late.work[0] == 0.0).all()
-    assert values(run, "open_fraction", after=0.0101) == {"open_fraction": 1.0}
-    with pytest.raises(InputError, match=r"run ends at 0\.02 s and leaves no two output times aft"):
-        since(run, 0.03)
+    assert values(run, "open_fraction", t_start=0.0101) == {"open_fraction": 1.0}
+    with pytest.raises(InputError, match=r"fewer than two output times from t_start = 0\.03 s"):
+        run.between(0.03)
 
 
 def test_every_summary_has_a_sentence_a_unit_and_a_finite_value(run):
@@ -123,7 +123,7 @@ def test_number_of_periods(run):
     assert values(replace(motion, modal_coordinates=q + 1e-5 * t[:, None]), "periods") == {
         "periods": 0.0}
     with pytest.raises(InputError, match="periods: count_periods: 9 points cannot show 16"):
-        values(motion, "periods", after=52.0)
+        values(motion, "periods", t_start=52.0)
 
 
 def test_lyapunov_exponents_of_the_impact_oscillator():
@@ -134,7 +134,7 @@ def test_lyapunov_exponents_of_the_impact_oscillator():
         period = 2.0 * np.pi / w
         motion = simulate(system, 250 * period, outputs=251,
                           initial=RigidStart(displacement=(0.0, 1e-4, 0.0)))
-        found.append(values(motion, "lyapunov_exponent", after=50 * period)["lyapunov_exponent"])
+        found.append(values(motion, "lyapunov_exponent", t_start=50 * period)["lyapunov_exponent"])
     assert found[0] == pytest.approx(6.0, abs=1.0)
     assert found[1] < -0.05
 

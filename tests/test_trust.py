@@ -80,7 +80,7 @@ def test_what_is_stored_needs_no_code(stored):
     safe = fc.read_case(stored).trajectory
     assert not ran(stored)
     energies, contact = safe.energies, safe.contact_state
-    part = fc.window(safe, 5e-4, 1e-3)
+    part = safe.between(5e-4, 1e-3)
     assert not ran(stored)
     whole = fc.read_case(stored, trust=True).trajectory
     assert ran(stored)
@@ -91,7 +91,7 @@ def test_what_is_stored_needs_no_code(stored):
     assert np.array_equal(contact, whole.contact_state)
     assert np.array_equal(energies.contact, whole.energies.contact)
     assert energies.imbalance == whole.energies.imbalance
-    assert np.array_equal(part.contact_state, fc.window(whole, 5e-4, 1e-3).contact_state)
+    assert np.array_equal(part.contact_state, whole.between(5e-4, 1e-3).contact_state)
 
 
 def test_what_needs_the_law_says_so(stored):

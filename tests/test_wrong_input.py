@@ -64,7 +64,7 @@ def test_no_branch_to_draw(tmp_path):
 def test_planes_of_basins_that_no_start_lies_on(first, names):
     with pytest.raises(InputError, match=names):
         basins(impact_oscillator(modes=2), first, (Axis("B", "y", "velocity"), [0.0, 0.02]),
-               transient=10)
+               transient_periods=10)
 
 
 def test_branches_do_not_switch_a_drive_on():

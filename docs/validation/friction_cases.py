@@ -14,7 +14,9 @@ from fecontact import (
     HyperbolicFriction,
     LinearContact,
     Load,
+    Rodas5P,
     RoughSurface,
+    SetValued,
     simulate,
     static_equilibrium,
 )
@@ -32,7 +34,7 @@ def section() -> str:
     rows = coulomb_decay() + den_hartog() + leine() + unexcited() + hopf() + flutter()
     return f"""## Friction of one mass
 
-"Set-valued" is friction without smoothing (`method="set-valued"`), the rest has the smoothing
+"Set-valued" is friction without smoothing (`solver=SetValued()`), the rest has the smoothing
 slope k_s that is given. Smoothing changes the belt's period by 6 % at k_s = 1e3 s/m: that is the
 model, and the numbers agree with those of the smoothed law.
 
@@ -45,12 +47,12 @@ def coulomb_decay() -> list[Comparison]:
     times = np.pi / 100.0 * np.arange(6)
     exact = 1e-3 * np.array([0.85, -0.65, 0.45, -0.25, 0.05, 0.05])
     rows = []
-    for name, slope, method, rtol in (("set-valued", 1e6, "set-valued", 1e-10),
-                                      ("k_s = 1e6 s/m", 1e6, "Rodas5P", 1e-8)):
+    for name, slope, solver, rtol in (("set-valued", 1e6, SetValued(), 1e-10),
+                                      ("k_s = 1e6 s/m", 1e6, Rodas5P(), 1e-8)):
         system = mass_in_plane(stiffness=np.diag([1e4, 0.0]), normal=GENTLE, load=Load(2.0),
                                friction=ConstantFriction(0.5, smoothing_slope=slope))
         x = simulate(system, times[-1], initial=in_plane(system, 0.85e-3), outputs=times,
-                     method=method, rtol=rtol).displacement(0)[:, 0]
+                     solver=solver, rtol=rtol).displacement(0)[:, 0]
         rows += [Comparison(f"SDND100, {name}: turning point {k} [mm]", 1e3 * exact[k], 1e3 * x[k])
                  for k in (1, 4)]
     return rows
@@ -68,7 +70,7 @@ def den_hartog() -> list[Comparison]:
         times = np.concatenate([[0.0], np.linspace(periods - 1, periods, 401)])
         times *= 2.0 * np.pi / ratio
         x = simulate(system, times[-1], initial=in_plane(system, 0.0), outputs=times,
-                     method="set-valued", rtol=1e-9).displacement(0)[1:, 0]
+                     solver=SetValued(), rtol=1e-9).displacement(0)[1:, 0]
         rows.append(Comparison(f"Den Hartog, r = {ratio:g}, beta = {beta:g}, set-valued: X k / P",
                                wanted, 0.5 * np.ptp(x)))
     return rows
@@ -82,7 +84,7 @@ def leine() -> list[Comparison]:
             stiffness=np.diag([1.0, 0.0]), normal=GENTLE, load=Load(1.0), ground=Ground(speed=0.2),
             friction=HyperbolicFriction(1.0, 0.0, 1.0 / 3.0, smoothing_slope=slope or 1e6))
         run = simulate(system, 60.0, initial=in_plane(system, 0.5, 0.2), outputs=60001,
-                       method="Rodas5P" if slope else "set-valued", rtol=1e-9)
+                       solver=Rodas5P() if slope else SetValued(), rtol=1e-9)
         x = run.displacement(0)[:, 0]
         name = f"k_s = {slope:g}" if slope else "set-valued"
         rows += [Comparison(f"belt (Leine), {name}: period", period,
@@ -103,10 +105,10 @@ def oscillator(speed: float, slope: float) -> ContactSystem:
 def unexcited() -> list[Comparison]:
     """Periods of stick-slip of the friction oscillator of section 4.3 without excitation."""
     rows = []
-    for name, slope, method, wanted in (("set-valued", 1e6, "set-valued", 1.361213293),
-                                        ("k_s = 1e6 s/m", 1e6, "Rodas5P", 1.264348)):
+    for name, slope, solver, wanted in (("set-valued", 1e6, SetValued(), 1.361213293),
+                                        ("k_s = 1e6 s/m", 1e6, Rodas5P(), 1.264348)):
         system = oscillator(1e-3, slope)
-        run = simulate(system, 12.0, initial=in_plane(system, 0.0), outputs=48001, method=method,
+        run = simulate(system, 12.0, initial=in_plane(system, 0.0), outputs=48001, solver=solver,
                        rtol=1e-9)
         rows.append(Comparison(f"section 4.3 without excitation, {name}: period [s]", wanted,
                                mean_period(run.time, run.displacement(0)[:, 0], 1.5e-3)))

@@ -8,7 +8,7 @@ from comparison import Comparison, comparisons, table
 from matplotlib import rc_context
 from pictures import save
 
-from fecontact import Trajectory, periodicity, simulate, window
+from fecontact import Scipy, Trajectory, periodicity, simulate
 from fecontact.output.plots.style import STYLE
 
 FIGURES = {
@@ -26,7 +26,7 @@ FIGURES = {
 def section(images: Path) -> str:
     """Text with tables; a picture into a folder."""
     runs = {name: friction.settled(friction.CASES[name](), rtol=1e-7) for name in FIGURES}
-    shown = {name: window(run, run.time[-1] - 16 * friction.PERIOD) for name, run in runs.items()}
+    shown = {name: run.between(run.time[-1] - 16 * friction.PERIOD) for name, run in runs.items()}
     with rc_context(STYLE):
         figure = friction.figure(shown)
     save(figure, images / "friction-phase.png")
@@ -40,7 +40,7 @@ def slips_table(runs: dict[str, Trajectory]) -> str:
     rows = []
     for name, run in runs.items():
         lengths = 1e3 * np.array([slip.distance for slip in friction.slips(run)])
-        found = periodicity(run, start=float(run.time[0]), largest=8)
+        found = periodicity(run, t_start=float(run.time[0]), largest=8)
         rows.append((name, found.periods or "none up to 8", f"{found.misfit:.0e}", len(lengths),
                      friction.different(lengths), f"{lengths.min():.3f} to {lengths.max():.3f}"))
     return table(("case", "repeats after periods", "misfit", "slips in 100 periods",
@@ -64,8 +64,8 @@ def solvers() -> list[Comparison]:
     rows = []
     for method in ("LSODA", "Radau"):
         again = simulate(run.system, end + 4.0 * friction.PERIOD, initial=run, outputs=1601,
-                         method=method, rtol=1e-8)
-        orbit = window(run, end - 4.0 * friction.PERIOD)
+                         solver=Scipy(method), rtol=1e-8)
+        orbit = run.between(end - 4.0 * friction.PERIOD)
         rows.append(Comparison(f"two modes: largest x of the orbit by {method} [mm]",
                                1e3 * orbit.displacement("B")[:, 0].max(),
                                1e3 * again.displacement("B")[:, 0].max()))

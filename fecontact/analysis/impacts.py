@@ -65,14 +65,14 @@ class Impacts:
         """
         return self.separation_velocity / self.impact_velocity
 
-    def per_period(self, period: float, start: float, end: float) -> NDArray[np.intp]:
-        """Number of touch-downs in each whole period [s] from ``start`` to ``end`` [s]."""
+    def per_period(self, period: float, t_start: float, t_end: float) -> NDArray[np.intp]:
+        """Number of touch-downs in each whole period [s] from ``t_start`` to ``t_end`` [s]."""
         require_positive("per_period", period=period)
-        count = int((end - start) / period * (1.0 + 1e-9))
+        count = int((t_end - t_start) / period * (1.0 + 1e-9))
         if count < 1:
-            raise InputError(f"end = {end!r} must be at least one period of {period!r} s after "
-                             f"start = {start!r}.")
-        edges = start + period * np.arange(count + 1)
+            raise InputError(f"t_end = {t_end!r} must be at least one period of {period!r} s after "
+                             f"t_start = {t_start!r}.")
+        edges = t_start + period * np.arange(count + 1)
         return np.asarray(np.histogram(self.touch_down, edges)[0])
 
 

@@ -69,7 +69,7 @@ def strobed_states(
     *,
     period: float | None = None,
     phase: float = 0.0,
-    start: float | None = None,
+    t_start: float | None = None,
 ) -> Strobe:
     """States of a run once per period, at the times ``(k + phase) period``.
 
@@ -84,7 +84,7 @@ def strobed_states(
         [s]; that of the drive by default.
     phase : float
         Part of the period, 0 to 1, counted from t = 0.
-    start : float, optional
+    t_start : float, optional
         Transients before this time are left out [s]; the middle of the run by default.
 
     Raises
@@ -100,7 +100,7 @@ def strobed_states(
     require_positive("strobed_states", period=period)
     if not 0.0 <= phase <= 1.0:
         raise InputError(f"strobed_states: phase = {phase!r} must be from 0 to 1.")
-    begin = _start(trajectory, start)
+    begin = _start(trajectory, t_start)
     tiny = 1e-9 * period
     first = int(np.ceil((begin - tiny) / period - phase))
     last = int(np.floor((t[-1] + tiny) / period - phase))
@@ -181,21 +181,21 @@ def periodicity(
     trajectory: Trajectory,
     *,
     period: float | None = None,
-    start: float | None = None,
+    t_start: float | None = None,
     largest: int = 16,
     tolerance: float = 2e-3,
 ) -> Periodicity:
     """Number of drive periods after which a run repeats, or None.
 
     Compares displacements and velocities of B and the contact nodes once per period; each
-    tolerance is relative to the range that the quantity has in the run after ``start``.
+    tolerance is relative to the range that the quantity has in the run after ``t_start``.
 
     Parameters
     ----------
     trajectory : Trajectory
-        A run over at least ``3 largest`` periods after ``start``, with at least eight outputs per
+        A run over at least ``3 largest`` periods after ``t_start``, with at least eight outputs per
         period, from which the size of the attractor is taken.
-    period, start
+    period, t_start
         As for :func:`strobed_states`.
     largest, tolerance
         As for :func:`count_periods`.
@@ -207,8 +207,8 @@ def periodicity(
     """
     require_kind("periodicity", Trajectory, trajectory=trajectory)
     basis = trajectory.system.basis
-    found = strobed_states(trajectory, period=period, start=start)
-    late = trajectory.time >= _start(trajectory, start)
+    found = strobed_states(trajectory, period=period, t_start=t_start)
+    late = trajectory.time >= _start(trajectory, t_start)
     if np.count_nonzero(late) < 8 * (len(found.time) - 1):
         raise InputError(f"The run has {np.count_nonzero(late)} outputs in {len(found.time) - 1} "
                          f"periods, too few to show the size of the motion; give it at least "
@@ -230,14 +230,14 @@ def periodicity(
                          tolerance=tolerance)
 
 
-def _start(trajectory: Trajectory, start: float | None) -> float:
+def _start(trajectory: Trajectory, t_start: float | None) -> float:
     t = trajectory.time
-    if start is None:
+    if t_start is None:
         return 0.5 * float(t[0] + t[-1])
-    if not t[0] <= start < t[-1]:
-        raise InputError(f"start = {start!r} must be a time of the run, from {t[0]:g} s to below "
-                         f"{t[-1]:g} s.")
-    return float(start)
+    if not t[0] <= t_start < t[-1]:
+        raise InputError(f"t_start = {t_start!r} must be a time of the run, from {t[0]:g} s to "
+                         f"below {t[-1]:g} s.")
+    return float(t_start)
 
 
 def _returns(x: Array, k: int) -> Array:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import SetValued
 from fecontact.integrate.trajectory import Status, Trajectory
 
 Flags = NDArray[np.bool_]
@@ -103,7 +104,7 @@ def _resolved(run: Trajectory) -> Resolved:
         parts = min(max(average, _FEWEST), _MOST) if level == 0 else _MORE
         parts = min(parts, _room(run) // int(flags.sum()))
         why = "this history was not computed by a run"
-        if "method" in run.statistics:
+        if "solver" in run.statistics:
             why = "between them the run took too many steps" if average > left else ""
         if parts < 2:
             why = "it moves too fast for its duration to be kept"
@@ -235,10 +236,10 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
                     events=None, **_cut(run, rows, _STATE))
     used = run.statistics
     options: dict[str, Any] = {"rtol": min(float(used.get("rtol", 1e-6)), 1e-2)}
-    if used["method"] == "set-valued":
-        options |= {name: used.get(name) for name in ("restitution", "static_coefficient")}
-        options |= {"method": "set-valued", "scheme": used.get("scheme")}
     try:
+        if used["solver"] == SetValued().name:
+            options["solver"] = SetValued(used.get("restitution"), used.get("static_coefficient"),
+                                          used.get("scheme", "auto"))
         with warnings.catch_warnings():
             # Whatever there is to be said was said of the run itself.
             warnings.simplefilter("ignore")

@@ -9,7 +9,6 @@ import numpy as np
 
 from fecontact.analysis.frequency_response import Place, frequency_response
 from fecontact.analysis.histories import Point, usual_axis
-from fecontact.analysis.window import window
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots import analysis
@@ -96,8 +95,8 @@ def redraw(
     path: Path,
     choice: Choice | None = None,
     *,
-    start: float | None = None,
-    end: float | None = None,
+    t_start: float | None = None,
+    t_end: float | None = None,
 ) -> Path:
     """Draw a stored run once more; the file.
 
@@ -111,7 +110,7 @@ def redraw(
         A .png, .pdf or .svg file.
     choice : Choice, optional
         What to draw.
-    start, end : float, optional
+    t_start, t_end : float, optional
         The part of the run [s].
 
     Raises
@@ -122,7 +121,8 @@ def redraw(
     if kind not in KINDS:
         raise InputError(f"There is no plot '{kind}'{nearest(kind, KINDS)}; there are: "
                          f"{choices(KINDS)}.")
-    part = trajectory if start is None and end is None else window(trajectory, start, end)
+    whole = t_start is None and t_end is None
+    part = trajectory if whole else trajectory.between(t_start, t_end)
     chosen = choice or Choice()
     if chosen.axis is None:
         chosen = replace(chosen, axis=usual_axis(part.system))

@@ -148,7 +148,7 @@ def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") ->
     with progress_bar("Drawing", settings.frames) as progress:
         return render(trajectory, target, frames=settings.frames, fps=settings.fps,
                       size=settings.size, colour=settings.colour, scale=settings.scale,
-                      title=settings.title, start=settings.start, end=settings.end,
+                      title=settings.title, t_start=settings.t_start, t_end=settings.t_end,
                       progress=lambda done, total: progress(done * settings.frames / total))
 
 

@@ -159,7 +159,7 @@ def ensemble(
 def strobe(
     systems: ContactSystem | Sequence[ContactSystem],
     *,
-    transient: int,
+    transient_periods: int,
     keep: int,
     period: float | ArrayLike | None = None,
     **settings: Any,
@@ -170,7 +170,7 @@ def strobe(
     ----------
     systems : ContactSystem or sequence of E ContactSystem
         What moves.
-    transient : int
+    transient_periods : int
         Periods that are not kept.
     keep : int
         States kept, one per period from there on.
@@ -189,7 +189,8 @@ def strobe(
     InputError
         For a system without a period of its own if none is given, and as :func:`ensemble`.
     """
-    for name, value, least in (("transient", transient, 0), ("keep", keep, 1)):
+    for name, value, least in (
+            ("transient_periods", transient_periods, 0), ("keep", keep, 1)):
         if not (isinstance(value, Integral) and value >= least):
             raise InputError(f"{name} = {value!r} must be a whole number from {least} on.")
     given = [systems] if isinstance(systems, ContactSystem) else list(systems)
@@ -199,9 +200,9 @@ def strobe(
         periods = np.array(period, dtype=float)
         if not (np.isfinite(periods).all() and (periods > 0.0).all()):
             raise InputError(f"period = {period!r} must be above zero and finite.")
-    counts = np.arange(transient, transient + keep, dtype=float)
-    first = 1 if transient else 0
-    if transient:
+    counts = np.arange(transient_periods, transient_periods + keep, dtype=float)
+    first = 1 if transient_periods else 0
+    if transient_periods:
         counts = np.concatenate([[0.0], counts])
     found = ensemble(systems, periods.reshape(-1, 1) * counts if periods.ndim else periods * counts,
                      **settings)

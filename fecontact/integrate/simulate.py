@@ -4,18 +4,17 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from numbers import Real
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.core.checks import as_path
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError
 from fecontact.core.memory import require_memory
 from fecontact.core.types import Array
 from fecontact.integrate.events import Watched, as_watched
 from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.integrate.solvers import RODAS5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION, POWERS
@@ -29,8 +28,6 @@ _GROWTH, _LOOKS = 1e-2, 200
 # Shortest run [s], and in spacings of floating-point numbers at its times.
 _SHORTEST, _SPACINGS = 1e-100, 1e5
 
-METHODS = ("Rodas5P", "Radau", "BDF", "LSODA", "CVODE", "set-valued")
-
 
 def simulate(
     system: ContactSystem,
@@ -39,14 +36,9 @@ def simulate(
     t_start: float | None = None,
     initial: Initial = "rest",
     outputs: int | ArrayLike = 1001,
-    method: str = "Rodas5P",
+    solver: Solver = RODAS5P,
     rtol: float = 1e-6,
     max_step: float | None = None,
-    restitution: float | None = None,
-    static_coefficient: float | Sequence[float] | None = None,
-    scheme: str | None = None,
-    checkpoint: str | Path | None = None,
-    keep_checkpoint: bool = False,
     events: Watched | Sequence[Watched] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
@@ -65,29 +57,17 @@ def simulate(
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or the times themselves,
         ascending, the first ``t_start``, the last ``t_end``.
-    method : 'Rodas5P', 'Radau', 'BDF', 'LSODA', 'CVODE' or 'set-valued'
-        The compiled integrator; a stiff solver of scipy, or of scikit-sundae if that is
-        installed, as a reference; or friction without smoothing, sticking by constraint.
+    solver : Rodas5P, SetValued, Scipy or CVODE
+        The compiled integrator, the default; friction without smoothing and rigid stops; stiff
+        solvers of scipy and SUNDIALS, as references. Each takes the options that are its own.
     rtol : float
         Relative tolerance; absolute ones follow from it, the penetration scale of the normal law
         and the width of the friction smoothing.
     max_step : float, optional
         Longest step [s]; by default, and at most, a part of the shortest period of drive, loads
-        and waves. Touches and slips within a step are found without it by 'Rodas5P'.
-    restitution : float, optional
-        For 'set-valued' alone: rigid stops with Newton's coefficient of restitution, from 0 to
-        below 1, in place of the normal law.
-    static_coefficient : float or (n,) sequence, optional
-        For 'set-valued' alone: limit of \|R\|/F in stick [-]; default that of the law.
-    scheme : 'auto', 'events' or 'stepping', optional
-        For 'set-valued' alone: from event to event, for few nodes, or by implicit steps.
-    checkpoint : path, optional
-        For 'Rodas5P': a file that keeps a long run every minute and when it is interrupted. If it
-        is there, the run goes on from it, to the same numbers; at the end it is removed.
-    keep_checkpoint : bool
-        Leave the file there at the end, to be removed once the run is written.
+        and waves. Touches and slips within a step are found without it by Rodas5P.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        For 'Rodas5P': what to watch for, located within the steps and kept in
+        For Rodas5P: what to watch for, located within the steps and kept in
         :attr:`Trajectory.events`; the run ends at those that say so.
     progress : callable, optional
         Called with the time reached [s] now and then.
@@ -120,21 +100,10 @@ def simulate(
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_max_step(max_step)
-    if method not in METHODS:
-        raise InputError(f"method = {method!r} must be one of {choices(METHODS)}"
-                         f"{nearest(str(method), METHODS)}.")
-    for name, value in (("restitution", restitution), ("scheme", scheme),
-                        ("static_coefficient", static_coefficient)):
-        if value is not None and method != "set-valued":
-            raise InputError(f"{name} = {value!r} is for method = 'set-valued' alone, not "
-                             f"'{method}'; laws have damping and coefficients of their own.")
-    if checkpoint is not None and method != "Rodas5P":
-        raise InputError(f"A checkpoint is for method = 'Rodas5P' alone, not '{method}'.")
-    if events is not None and method != "Rodas5P":
-        raise InputError(f"Events are for method = 'Rodas5P' alone, not '{method}'.")
-    if checkpoint is not None and not as_path(checkpoint, "a checkpoint").parent.is_dir():
-        raise InputError(f"checkpoint = {str(checkpoint)!r} cannot be written: there is no folder "
-                         f"{Path(checkpoint).parent}.")
+    require_solver(solver)
+    if events is not None and not solver.locates_events:
+        raise InputError(f"Events are located by Rodas5P() alone, not by {solver!r}; leave them "
+                         f"out, or find what happened between the outputs afterwards.")
     if progress is not None and not callable(progress):
         raise InputError(f"progress = {progress!r} must be a function of the time reached.")
     watched = as_watched(events)
@@ -142,58 +111,21 @@ def simulate(
     if not isinstance(initial, str | Trajectory):
         _warn_of_depth(system, state, t_start)
     m = system.basis.modes
-    rest: dict[str, Any] = {}
-    if method == "Rodas5P":
-        from fecontact.integrate.rodas5p.driver import integrate
-
-        run = integrate(system, state, times, rtol=rtol, max_step=max_step, progress=progress,
-                        checkpoint=None if checkpoint is None else Path(checkpoint),
-                        events=watched)
-        times, states, work, status, statistics, found = run
-        if checkpoint is not None and not keep_checkpoint and status is not Status.INTERRUPTED:
-            Path(checkpoint).unlink(missing_ok=True)
-        rest["events"] = found if watched else None
-        rest["node_friction_work"] = work[:, len(POWERS) :]
-        work = work[:, : len(POWERS)]
-    elif method == "set-valued":
-        from fecontact.integrate.nonsmooth.driver import integrate_set_valued
-        from fecontact.integrate.reference.scipy import longest_step
-
-        longest = None if max_step is None else longest_step(system, times, max_step)
-        found = integrate_set_valued(system, state, times, rtol=rtol, restitution=restitution,
-                                     static_coefficient=static_coefficient,
-                                     scheme=scheme or "auto", longest=longest,
-                                     progress=progress)
-        times, states, work = found.time, found.states, found.work
-        status = found.status
-        # With what the run was told, it can be repeated.
-        statistics = found.statistics | {
-            "restitution": restitution, "static_coefficient": None if static_coefficient is None
-            else np.asarray(static_coefficient, dtype=float).tolist()}
-        rest = {"node_friction_work": found.node_friction_work,
-                "held_normal_force": found.normal_force,
-                "held_friction_force": found.friction_force}
-    elif method == "CVODE":
-        from fecontact.integrate.reference import cvode
-
-        times, states, work, status, statistics = cvode.integrate(
-            system, state, times, rtol=rtol, max_step=max_step, progress=progress)
-    else:
-        from fecontact.integrate.reference import scipy as scipy_solvers
-
-        times, states, work, status, statistics = scipy_solvers.integrate(
-            system, state, times, method=method, rtol=rtol, max_step=max_step,
-            progress=progress)
+    found = solver.run(Task(system, state, times, float(rtol), max_step, watched, progress))
+    states = found.states
     trajectory = Trajectory(
-        system, times, states[:, :m], states[:, m : 2 * m], work, status, statistics,
-        memory=states[:, 2 * m :] if system.memory else None, **rest)
-    if status in (Status.FINISHED, Status.EVENT):
-        trajectory = replace(trajectory, status=_checked(trajectory, method, rtol))
+        system, found.time, states[:, :m], states[:, m : 2 * m], found.work, found.status,
+        {"solver": solver.name, "rtol": float(rtol), **found.statistics},
+        memory=states[:, 2 * m :] if system.memory else None,
+        node_friction_work=found.node_friction_work, held_normal_force=found.normal_force,
+        held_friction_force=found.friction_force, events=found.events if watched else None)
+    if found.status in (Status.FINISHED, Status.EVENT):
+        trajectory = replace(trajectory, status=_checked(trajectory, solver, rtol))
     warn_of_limits(trajectory.limits_exceeded, "In this run")
     return trajectory
 
 
-def _checked(run: Trajectory, method: str, rtol: float) -> Status:
+def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
     """The status of a run that has come to its end, by its energies at some output times."""
     some = np.unique(np.linspace(0, len(run.time) - 1, min(len(run.time), _LOOKS)).astype(int))
     histories = ("time", "modal_coordinates", "modal_velocities", "work", "memory",
@@ -207,7 +139,7 @@ def _checked(run: Trajectory, method: str, rtol: float) -> Status:
         if not (np.isfinite(amounts).all() and np.isfinite(forces).all()
                 and np.isfinite(run.states).all() and np.isfinite(run.work).all()):
             return Status.ENERGY_NOT_FINITE
-        grown = method != "set-valued" and energies.growth > max(_GROWTH, 1e3 * rtol)
+        grown = solver.smooth and energies.growth > max(_GROWTH, 1e3 * rtol)
     return Status.ENERGY_GREW if grown and run.status is Status.FINISHED else run.status
 
 

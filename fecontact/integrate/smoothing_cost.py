@@ -1,6 +1,5 @@
 """What the smoothing of friction, or the compliance of a stop, changes in a run."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,9 +7,9 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.integrate.initial_state import Initial, initial_state
-from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.integrate.nonsmooth.problem import CREEP, STEEP
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import SET_VALUED, SetValued, Task
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.friction_curve import coefficient, largest_coefficient
 from fecontact.system.contact_system import ContactSystem
@@ -53,8 +52,7 @@ def smoothing_cost(
     initial: Initial = "rest",
     outputs: int = 4001,
     rtol: float = 1e-6,
-    restitution: float | None = None,
-    static_coefficient: float | Sequence[float] | None = None,
+    solver: SetValued = SET_VALUED,
 ) -> SmoothingCost:
     """Run a system with its own laws and with set-valued ones from the same start, and compare.
 
@@ -70,8 +68,8 @@ def smoothing_cost(
         Number of times at which the runs are compared, at least 20.
     rtol : float
         Relative tolerance of both.
-    restitution, static_coefficient
-        As for :func:`fecontact.integrate.nonsmooth.driver.integrate_set_valued`.
+    solver : SetValued
+        Of the set-valued run.
 
     Raises
     ------
@@ -81,12 +79,12 @@ def smoothing_cost(
         If there is no equilibrium to start from.
     """
     require_kind("smoothing_cost", ContactSystem, system=system)
+    require_kind("smoothing_cost", SetValued, solver=solver)
     if not isinstance(outputs, int) or outputs < 20:
         raise InputError(f"smoothing_cost: outputs = {outputs!r} must be at least 20.")
     state = initial_state(system, initial, 0.0)
     smoothed = simulate(system, t_end, t_start=0.0, initial=state, outputs=outputs, rtol=rtol)
-    exact = integrate_set_valued(system, state, smoothed.time, rtol=rtol, restitution=restitution,
-                                 static_coefficient=static_coefficient)
+    exact = solver.run(Task(system, state, smoothed.time, rtol))
     for name, run in (("smoothed", smoothed), ("set-valued", exact)):
         if run.status is not Status.FINISHED:
             raise InputError(f"smoothing_cost: the {name} run ended early at t = "
@@ -101,26 +99,24 @@ def smoothing_cost(
     row = int(np.argmax(amplitudes))
     largest = float(np.abs(ours - theirs)[:, row].max())
     difference = largest / float(amplitudes[row]) if amplitudes[row] > 0.0 else np.inf
-    before, after = _break_away(system, static_coefficient)
-    what = ("a rigid stop in place of the compliant contact" if restitution is not None
+    before, after = _break_away(system, solver)
+    what = ("a rigid stop in place of the compliant contact" if solver.restitution is not None
             else "friction without smoothing")
     sentence = (f"Over {t_end:.4g} s {what} moves {places[row]} by {100.0 * difference:.2g} % of "
                 f"its amplitude {amplitudes[row]:.3g} m")
-    sentence += "." if restitution is not None else (
+    sentence += "." if solver.restitution is not None else (
         f"; the smoothed contact breaks away at {before:.4g} F_N, not at {after:.4g} F_N.")
     return SmoothingCost(difference, places[row], float(amplitudes[row]), before, after, sentence)
 
 
-def _break_away(
-    system: ContactSystem, static_coefficient: float | Sequence[float] | None
-) -> tuple[float, float]:
+def _break_away(system: ContactSystem, solver: SetValued) -> tuple[float, float]:
     """Largest R/F with and without smoothing, of the node where they differ most."""
     n = system.basis.contact_nodes
     smooth, sharp = np.empty(n), np.empty(n)
     for nodes, _, law in system.law_groups("friction"):
         smooth[nodes] = largest_coefficient(law)[0]
         sharp[nodes] = coefficient(replace(law, smoothing_slope=STEEP), CREEP)
-    if static_coefficient is not None:
-        sharp[:] = static_coefficient
+    if solver.static_coefficient is not None:
+        sharp[:] = solver.static_coefficient
     worst = int(np.argmax(np.abs(smooth - sharp)))
     return float(smooth[worst]), float(sharp[worst])

@@ -1,8 +1,9 @@
 """What a run returns: modal histories, and everything that follows from them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,43 @@ class Energies:
 
 
 @dataclass(frozen=True, eq=False)
+class Solution:
+    """What a solver has computed at N output times, and of a run that ended early the last state.
+
+    Attributes
+    ----------
+    time : (N,) array
+        [s].
+    states : (N, 2 m + n s) array
+        y = [q, q', z].
+    work : (N, 8) array
+        Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
+        [J]. What impacts on rigid stops take is with ``contact_damping``.
+    status : Status
+        How the run ended.
+    statistics : mapping
+        Counts of steps, rejected steps, events and the like, seconds, a message of the solver.
+    node_friction_work : (N, n) array or None
+        Energy that friction at each node has taken since the first time [J].
+    normal_force, friction_force : (N, n) arrays or None
+        F and R of each node [N] where they do not follow from the state, as in set-valued
+        contact; F without the impulses of rigid stops.
+    events : Events or None
+        What was watched for, in the order of time.
+    """
+
+    time: Array
+    states: Array
+    work: Array
+    status: Status
+    statistics: dict[str, Any]
+    node_friction_work: Array | None = None
+    normal_force: Array | None = None
+    friction_force: Array | None = None
+    events: Events | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Motion of a contact system at N output times.
 
@@ -159,6 +197,44 @@ class Trajectory:
         """States y = [q, q', z] (N, 2 m + n s)."""
         return np.hstack([self.modal_coordinates, self.modal_velocities,
                           *(() if self.memory is None else (self.memory,))])
+
+    def between(self, t_start: float | None = None, t_end: float | None = None) -> "Trajectory":
+        """The output times from ``t_start`` to ``t_end``, both included where they are times.
+
+        Work and losses count from the first of them, as in a run that began there.
+
+        Parameters
+        ----------
+        t_start, t_end : float, optional
+            [s]; the ends of the run by default.
+
+        Raises
+        ------
+        InputError
+            If there are fewer than two output times between them.
+        """
+        t = self.time
+        for name, value in (("t_start", t_start), ("t_end", t_end)):
+            if value is not None and not (isinstance(value, Real) and value == value):
+                raise InputError(f"{name} = {value!r} must be a time of the run.")
+        first = float(t[0]) if t_start is None else float(t_start)
+        last = float(t[-1]) if t_end is None else float(t_end)
+        rounding = 1e-12 * max(abs(float(t[0])), abs(float(t[-1])))
+        begin = int(np.searchsorted(t, first - rounding, side="left"))
+        chosen = slice(begin, int(np.searchsorted(t, last + rounding, side="right")))
+        if chosen.stop - begin < 2:
+            raise InputError(f"There are fewer than two output times from t_start = {first:g} s to "
+                             f"t_end = {last:g} s; the run goes from {t[0]:g} s to {t[-1]:g} s.")
+        kept: dict[str, Any] = {
+            name: values[chosen]
+            for name in ("time", "modal_coordinates", "modal_velocities", "memory",
+                         "held_normal_force", "held_friction_force")
+            if (values := getattr(self, name)) is not None}
+        friction = self.node_friction_work
+        return replace(
+            self, work=self.work[chosen] - self.work[begin],
+            node_friction_work=None if friction is None else friction[chosen] - friction[begin],
+            **kept)
 
     def displacement(self, point: str | int | tuple[float, float]) -> Array:
         """Displacement x, y [m] and rotation phi [rad] (N, 3) of a point.

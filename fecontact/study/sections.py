@@ -18,6 +18,7 @@ from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.points import Patch
 from fecontact.integrate.initial_state import RigidStart
+from fecontact.integrate.solvers import Solver, solver_by_name
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
@@ -195,9 +196,9 @@ class SimulationSettings:
         Start of the run [s].
     outputs : int
         Number of equally spaced output times, both ends included.
-    method : str
-        Integrator: 'Rodas5P', compiled; 'Radau', 'BDF', 'LSODA' of scipy; 'CVODE' of
-        scikit-sundae; 'set-valued' friction.
+    solver : str
+        'rodas5p', compiled; 'set-valued' friction; 'radau', 'bdf' and 'lsoda' of scipy; 'cvode'
+        of scikit-sundae.
     rtol : float
         Relative tolerance.
     max_step : float, optional
@@ -209,7 +210,7 @@ class SimulationSettings:
     scheme : str, optional
         For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
     events : bool
-        For 'Rodas5P': whether to locate touch-down, lift-off, stick and slip of every contact
+        For 'rodas5p': whether to locate touch-down, lift-off, stick and slip of every contact
         node, and keep them with the result.
     stop : list of str
         Events at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
@@ -221,7 +222,7 @@ class SimulationSettings:
     t_end: float | None = None
     t_start: float = 0.0
     outputs: int = 1001
-    method: str = "Rodas5P"
+    solver: str = "rodas5p"
     rtol: float = 1e-6
     max_step: float | None = None
     restitution: float | None = None
@@ -242,6 +243,17 @@ class SimulationSettings:
         require_positive("SimulationSettings", rtol=self.rtol)
         if self.max_step is not None:
             require_positive("SimulationSettings", max_step=self.max_step)
+        with located("SimulationSettings:", "SetValued"):
+            solver = self.chosen_solver()
+        if (self.events or self.stop) and not solver.locates_events:
+            raise InputError(f"SimulationSettings: events and stop are for solver = 'rodas5p' "
+                             f"alone, not '{self.solver}'; leave them out.")
+
+    def chosen_solver(self) -> Solver:
+        """The solver with its options."""
+        return solver_by_name(self.solver, {
+            "restitution": self.restitution, "static_coefficient": self.static_coefficient,
+            "scheme": self.scheme})
 
 
 @dataclass(frozen=True)
@@ -286,7 +298,7 @@ class RenderSettings:
         Factor by which displacements are drawn larger; by default the largest is well visible.
     title : str, optional
         Shown at the top.
-    start, end : float, optional
+    t_start, t_end : float, optional
         Part of the run to draw [s].
     """
 
@@ -296,8 +308,8 @@ class RenderSettings:
     colour: Literal["displacement", "von_mises"] = "displacement"
     scale: float | None = None
     title: str | None = None
-    start: float | None = None
-    end: float | None = None
+    t_start: float | None = None
+    t_end: float | None = None
 
     def __post_init__(self) -> None:
         if self.frames < 1:
@@ -309,9 +321,9 @@ class RenderSettings:
                              f"height in pixels, at least [320, 180].")
         if self.scale is not None:
             require_scale("RenderSettings", self.scale)
-        for name in ("start", "end"):
+        for name in ("t_start", "t_end"):
             if getattr(self, name) is not None:
                 require_finite("RenderSettings", **{name: getattr(self, name)})
-        if self.start is not None and self.end is not None and not self.start <= self.end:
-            raise InputError(f"RenderSettings: end = {self.end!r} must not be before start = "
-                             f"{self.start!r}.")
+        if self.t_start is not None and self.t_end is not None and not self.t_start <= self.t_end:
+            raise InputError(f"RenderSettings: t_end = {self.t_end!r} must not be before t_start = "
+                             f"{self.t_start!r}.")

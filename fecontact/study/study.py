@@ -1,7 +1,7 @@
 """A whole study in one TOML file: from the geometry to the run and its pictures."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import Rodas5P
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
@@ -287,10 +288,13 @@ class Study:
     ) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
 
-        The checkpoint is left out for methods that have none. It stays when the run has ended:
+        The checkpoint is left out for solvers that have none. It stays when the run has ended:
         remove it once the run is written.
         """
         settings, t_end, system = self.simulation, self.t_end, self.system()
+        solver = settings.chosen_solver()
+        if isinstance(solver, Rodas5P):
+            solver = replace(solver, checkpoint=checkpoint, keep_checkpoint=True)
         with located(f"{_title(self.path)}: [output]:"):
             # Found out after a long run, a wrong name would be found out too late.
             for point in self.output.points:
@@ -298,15 +302,10 @@ class Study:
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=settings.initial, outputs=settings.outputs,
-                            method=settings.method, rtol=settings.rtol,
-                            max_step=settings.max_step,
-                            restitution=settings.restitution,
-                            static_coefficient=settings.static_coefficient,
-                            scheme=settings.scheme, progress=progress,
+                            solver=solver, rtol=settings.rtol, max_step=settings.max_step,
+                            progress=progress,
                             events=(ContactEvents(settings.stop)
-                                    if settings.events or settings.stop else None),
-                            checkpoint=checkpoint if settings.method == "Rodas5P" else None,
-                            keep_checkpoint=True)
+                                    if settings.events or settings.stop else None))
 
     @cached_property
     def _mesh(self) -> Mesh:

@@ -135,7 +135,7 @@ class Strobing:
 
     Parameters
     ----------
-    transient : int
+    transient_periods : int
         Periods that are left out.
     keep : int
         Periods after them.
@@ -145,15 +145,16 @@ class Strobing:
     axis : 'x' or 'y'
     """
 
-    transient: int = 100
+    transient_periods: int = 100
     keep: int = 64
     point: str | int = "B"
     axis: Literal["x", "y"] = "x"
 
     def __post_init__(self) -> None:
-        require_kind("Strobing", int, transient=self.transient, keep=self.keep)
-        if self.transient < 0:
-            raise InputError(f"Strobing: transient = {self.transient} must be zero or above.")
+        require_kind("Strobing", int, transient_periods=self.transient_periods, keep=self.keep)
+        if self.transient_periods < 0:
+            raise InputError(f"Strobing: transient_periods = {self.transient_periods} must be "
+                             f"zero or above.")
         if not 1 <= self.keep <= _MOST_PERIODS:
             raise InputError(f"Strobing: keep = {self.keep} must be from 1 to {_MOST_PERIODS}.")
 
@@ -183,7 +184,7 @@ class SweepSettings:
     summaries : list
         Numbers to keep of each case, by name: see :mod:`fecontact.sweep.summaries`;
         'FILE.py:FUNCTION' for a function of your own.
-    after : float, optional
+    t_start : float, optional
         Summaries count from this time on [s]; the whole run by default.
     wear_coefficient : float, optional
         Volume worn away per friction work [m^3/J], for the summaries of wear.
@@ -192,8 +193,9 @@ class SweepSettings:
     batch : int, optional
         Cases computed in one go; by default up to 64, fewer when there are few.
     strobe : Strobing, optional
-        ``strobe = { transient = 100, keep = 64 }``: faster runs without histories, over so many
-        periods of the excitation in the place of ``t_end``; the only summary is then 'periods'.
+        ``strobe = { transient_periods = 100, keep = 64 }``: faster runs without histories, over so
+        many periods of the excitation in the place of ``t_end``; the only summary is then
+        'periods'.
     """
 
     axes: Mapping[str, Axis] = field(default_factory=dict)
@@ -201,7 +203,7 @@ class SweepSettings:
     samples: int | None = None
     seed: int = 0
     summaries: tuple[str, ...] = _SUMMARIES
-    after: float | None = None
+    t_start: float | None = None
     wear_coefficient: float | None = None
     keep: Literal["none", "histories", "fields"] = "none"
     batch: int | None = None
@@ -218,12 +220,12 @@ class SweepSettings:
             raise InputError("SweepSettings: summaries is empty; name at least one.")
         if self.wear_coefficient is not None:
             require_positive("SweepSettings", wear_coefficient=self.wear_coefficient)
-        if self.strobe is not None and (self.keep != "none" or self.after is not None
+        if self.strobe is not None and (self.keep != "none" or self.t_start is not None
                                         or self.summaries not in (_SUMMARIES, ("periods",))):
-            raise InputError("SweepSettings: strobe keeps no histories, so that keep, after and "
+            raise InputError("SweepSettings: strobe keeps no histories, so that keep, t_start and "
                              "summaries other than 'periods' cannot stand beside it.")
-        if self.after is not None and not math.isfinite(self.after):
-            raise InputError(f"SweepSettings: after = {self.after!r} must be finite.")
+        if self.t_start is not None and not math.isfinite(self.t_start):
+            raise InputError(f"SweepSettings: t_start = {self.t_start!r} must be finite.")
 
 
 def flat_axes(table: Any) -> Any:

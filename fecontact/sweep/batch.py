@@ -45,7 +45,7 @@ class Batch:
         Modal bases as :func:`packed` gives them, files of them, or the reason why there is none;
         those that are missing are computed by the worker.
     summaries : tuple of str
-    after, wear_coefficient : float or None
+    t_start, wear_coefficient : float or None
         See :class:`fecontact.study.sweep_section.SweepSettings`.
     files : str or None
         Folder for a file of each case; None for no files.
@@ -59,7 +59,7 @@ class Batch:
     path: str | None
     cases: tuple[Case, ...]
     summaries: tuple[str, ...]
-    after: float | None = None
+    t_start: float | None = None
     wear_coefficient: float | None = None
     bases: Mapping[str, bytes | Path | str] = field(default_factory=dict)
     files: str | None = None
@@ -114,7 +114,7 @@ def _row(batch: Batch, base: Study, case: Case, summaries: dict[float, Functions
             summaries[thickness] = functions_for(
                 batch.summaries, study.folder, wear_coefficient=batch.wear_coefficient,
                 thickness=thickness)
-        values = summarise(trajectory, summaries[thickness], batch.after)
+        values = summarise(trajectory, summaries[thickness], batch.t_start)
     except UnwritableError:
         raise
     except FecontactError as error:

@@ -50,7 +50,7 @@ def strobed_rows(
                                                         strict=True):
             if status is Status.INTERRUPTED:
                 raise KeyboardInterrupt
-            rows[case.key] = (_row(case, system, states[strobing.transient > 0 :], strobing)
+            rows[case.key] = (_row(case, system, states[strobing.transient_periods > 0 :], strobing)
                               if status is Status.FINISHED
                               else Row(case=case.key, values={}, reason=status.value))
     return [rows[case.key] for case in cases]
@@ -59,10 +59,10 @@ def strobed_rows(
 def strobe_times(period: float, strobing: Strobing) -> Array:
     """The start, and from the last period of the transient on eight times a period [s].
 
-    The last time is the last that is kept: ``transient + keep - 1`` periods.
+    The last time is the last that is kept: ``transient_periods + keep - 1`` periods.
     """
     phases = np.arange(-_PHASES + 1, _PHASES * (strobing.keep - 1) + 1)
-    later = (strobing.transient + phases / _PHASES) * period
+    later = (strobing.transient_periods + phases / _PHASES) * period
     return np.concatenate([[0.0], later[later > 0.0]])
 
 

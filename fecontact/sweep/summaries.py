@@ -7,7 +7,7 @@ node. ``FILE.py:FUNCTION`` is a function of the user: it takes a Trajectory and 
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ class Summary:
 
 def summarise(
     trajectory: Trajectory, functions: Mapping[str, Callable[[Trajectory], float]],
-    after: float | None = None,
+    t_start: float | None = None,
 ) -> dict[str, float]:
     """Summaries of a run from a time on [s]; see :func:`functions_for`.
 
@@ -50,7 +50,7 @@ def summarise(
     FecontactError
         As the functions do; with the name of the summary.
     """
-    late = trajectory if after is None else since(trajectory, after)
+    late = trajectory if t_start is None else trajectory.between(t_start)
     values = {}
     for name, function in functions.items():
         try:
@@ -58,22 +58,6 @@ def summarise(
         except FecontactError as error:
             raise type(error)(f"{name}: {error}") from None
     return values
-
-
-def since(trajectory: Trajectory, after: float) -> Trajectory:
-    """The part of a run from a time on [s]."""
-    kept = trajectory.time >= after
-    if np.count_nonzero(kept) < 2:
-        raise InputError(f"The run ends at {trajectory.time[-1]:g} s and leaves no two output "
-                         f"times after {after:g} s; run it longer, or put after earlier.")
-    histories = ("time", "modal_coordinates", "modal_velocities", "memory", "held_normal_force",
-                 "held_friction_force")
-    changed = {name: value[kept] for name in histories
-               if (value := getattr(trajectory, name)) is not None}
-    for name in ("work", "node_friction_work"):  # from the first time
-        if (value := getattr(trajectory, name)) is not None:
-            changed[name] = value[kept] - value[kept][0]
-    return replace(trajectory, **changed)
 
 
 def functions_for(
@@ -263,7 +247,7 @@ def periods(trajectory: Trajectory) -> float:
     """Number of drive periods after which the run repeats; 0 if it does not."""
     from fecontact.analysis.periodicity import periodicity
 
-    found = periodicity(trajectory, start=float(trajectory.time[0]))
+    found = periodicity(trajectory, t_start=float(trajectory.time[0]))
     return float(found.periods or 0)
 
 

@@ -102,9 +102,9 @@ def sweep(
     vars(base).update({name: value for name, value in vars(study).items() if name[0] == "_"})
     if wanted.strobe is None:
         _ = base.t_end
-    if wanted.after is not None and wanted.after >= base.t_end:
-        raise InputError(f"[sweep]: after = {wanted.after:g} must lie before the end of the run, "
-                         f"t_end = {base.t_end:g}.")
+    if wanted.t_start is not None and wanted.t_start >= base.t_end:
+        raise InputError(f"[sweep]: t_start = {wanted.t_start:g} must lie before the end of the "
+                         f"run, t_end = {base.t_end:g}.")
     functions_for(wanted.summaries, base.folder, wear_coefficient=wanted.wear_coefficient,
                   thickness=base.body_settings.thickness)
     work = _Work.of(base, wanted, plan(wanted))
@@ -151,7 +151,7 @@ class _Work:
 
     @classmethod
     def of(cls, study: Study, settings: SweepSettings, cases: Plan) -> "_Work":
-        request = {"summaries": list(settings.summaries), "after": settings.after,
+        request = {"summaries": list(settings.summaries), "t_start": settings.t_start,
                    "wear_coefficient": settings.wear_coefficient, "keep": settings.keep,
                    "frames": study.output.frames if settings.keep == "fields" else 0,
                    "strobe": None if settings.strobe is None else to_table(settings.strobe)}
@@ -171,7 +171,7 @@ class _Work:
         path = self.study.path
         common = Batch(
             self.study.tables(defaults=False), None if path is None else str(path.absolute()), (),
-            self.settings.summaries, self.settings.after, self.settings.wear_coefficient,
+            self.settings.summaries, self.settings.t_start, self.settings.wear_coefficient,
             files=str(store.cases.absolute()) if store.files else None,
             frames=self.study.output.frames if self.settings.keep == "fields" else 0,
             strobe=self.settings.strobe)

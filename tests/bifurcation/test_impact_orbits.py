@@ -22,7 +22,7 @@ NEAR_GRAZING = np.array([4.49523e-5, -2.348e-7, -1.77e-3, -1.08e-3])    # 33.707
 
 def rounds(w, y, count, transient=0, rtol=1e-10):
     """States after each of the last periods of a run, (count, 4)."""
-    return strobe(impact_orbits.oscillator(w), transient=transient, keep=count, initial=y,
+    return strobe(impact_orbits.oscillator(w), transient_periods=transient, keep=count, initial=y,
                   rtol=rtol).states[0]
 
 

@@ -112,7 +112,7 @@ def test_the_drives_frequency_moves_the_ends_of_the_segments():
     field = impact_orbits.field_at(64.32)
     end = observe(field, branch, "B", "y").points[-1]
     assert end.parameter == pytest.approx(64.5, rel=1e-9)
-    run = strobe(impact_orbits.oscillator(64.5), transient=150, keep=2, initial=np.zeros(4),
+    run = strobe(impact_orbits.oscillator(64.5), transient_periods=150, keep=2, initial=np.zeros(4),
                  rtol=1e-9)
     row = field.displacement_row("B", "y")
     assert end.values["observed_section"] == pytest.approx(run.states[0, -1:] @ row, rel=1e-5)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -94,7 +95,8 @@ def basins(
     second: tuple[Axis, ArrayLike],
     *,
     base: ArrayLike | None = None,
-    transient: int | float,
+    transient_periods: int | None = None,
+    transient: float | None = None,
     keep: int = 32,
     section: Crossing | None = None,
     tolerance: float = 1e-3,
@@ -113,8 +115,10 @@ def basins(
         of the ``base`` state.
     base : (size,) array, optional
         State to start from; default zero.
-    transient : int or float
-        Periods of the excitation before sections count, or, with a ``section``, seconds.
+    transient_periods : int, optional
+        Periods of the excitation before states count; needed without a ``section``.
+    transient : float, optional
+        Time before passages of the ``section`` count [s]; needed with one.
     keep : int
         States on the section that are looked at, at least 4.
     section : Crossing, optional
@@ -152,12 +156,20 @@ def basins(
     settings: dict[str, Any] = {"initial": states, "rtol": rtol, "workers": workers,
                                 "progress": progress}
     if section is None:
-        found = strobe(system, transient=int(transient), keep=keep, **settings)
+        if transient_periods is None or transient is not None:
+            raise InputError("basins: without a section give transient_periods, the periods of "
+                             "the excitation before states count, and no transient.")
+        found = strobe(system, transient_periods=transient_periods, keep=keep, **settings)
         sets: list[Array | None] = [
             points if fine else None
             for points, fine in zip(found.states, found.finished, strict=True)]
         still = [False] * len(sets)
     else:
+        if transient_periods is not None or not (
+                isinstance(transient, Real) and 0.0 < transient < np.inf):
+            raise InputError(f"basins: transient = {transient!r} must be a time above zero [s] "
+                             f"before passages of the section count, without "
+                             f"transient_periods.")
         found = ensemble(system, [0.0, float(transient), 2.0 * float(transient)],
                          events=section, **settings)
         sets, still = [], []

@@ -64,7 +64,7 @@ def brute_force(
     parameter: Change,
     values: ArrayLike,
     *,
-    transient: int = 200,
+    transient_periods: int = 200,
     keep: int = 100,
     initial: Any = "rest",
     down: bool = True,
@@ -88,7 +88,7 @@ def brute_force(
         makes the system for a value, ``(system, value) -> system``.
     values : (V,) array
         Ascending.
-    transient, keep : int
+    transient_periods, keep : int
         Periods that are not kept, and states that are, of each value.
     initial : any
         Start of the first value of each chain; see :func:`fecontact.ensemble`.
@@ -132,7 +132,8 @@ def brute_force(
     order = np.minimum(order, count - 1)
     both = [order] + ([count - 1 - order] if down else [])
     index = np.concatenate(both)
-    found = strobe([made[k] for k in index], transient=transient, keep=keep, initial=initial,
+    found = strobe([made[k] for k in index], transient_periods=transient_periods, keep=keep,
+                   initial=initial,
                    chain=length, rtol=rtol, workers=workers, progress=progress)
     states = np.empty((2, count, keep, system.size))
     for way, part in enumerate(both):

@@ -119,9 +119,7 @@ def _run(
                             f"{run.status.value}")
     if not extra:
         return run
-    from fecontact.analysis.window import window
-
-    return window(run, float(outputs[0]))
+    return run.between(float(outputs[0]))
 
 
 def _period(run: Trajectory, longest: float) -> float:

@@ -24,8 +24,8 @@ def render(
         help="Quantity that colours the body.")] = None,
     scale: Annotated[float | None, Parameter(
         help="Factor by which displacements are drawn larger.")] = None,
-    start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
-    end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
+    t_start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
+    t_end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
     trust: Trust = False,
 ) -> None:
     """Draw a run as a movie or as numbered pictures; [render] of the study holds the defaults."""
@@ -36,7 +36,7 @@ def render(
 
     changes: dict[str, Any] = {
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
-        "start": start, "end": end}
+        "t_start": t_start, "t_end": t_end}
     stored = stored_run(file, trust)
     from fecontact.core.tables import located
 
@@ -65,8 +65,8 @@ def plot(
     quantity: Annotated[str, Parameter(
         help="Of spectra: velocity, displacement, normal_force, ...")] = "velocity",
     highest: Annotated[float | None, Parameter(help="End of the frequencies [Hz].")] = None,
-    start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
-    end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
+    t_start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
+    t_end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
     trust: Trust = False,
@@ -82,7 +82,7 @@ def plot(
     choice = Choice(quantity, tuple(point_of(text) for text in point or ()), axis, highest)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"):
-        say_written(redraw(stored.trajectory, kind, target, choice, start=start, end=end))
+        say_written(redraw(stored.trajectory, kind, target, choice, t_start=t_start, t_end=t_end))
     note_age(file, stored.current)
 
 

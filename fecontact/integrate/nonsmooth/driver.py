@@ -2,65 +2,26 @@
 
 import time as clock
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from numbers import Real
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.reference.scipy import longest_step
-from fecontact.integrate.trajectory import Status
+from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS
-
-SCHEMES = ("auto", "events", "stepping")
 
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
 _STEPS_PER_CALL = 2000
 # Errors of velocities count relative to this part of what drive and loads bring about.
 _DRIVEN = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class SetValuedRun:
-    """Motion with set-valued contact at N output times.
-
-    The friction force of a sticking node and the normal force of a closed rigid stop hold it in
-    place; they are not functions of the state and are kept here.
-
-    Attributes
-    ----------
-    time : (N,) array
-        [s].
-    states : (N, 2 m) array
-        [q, q'].
-    work : (N, 8) array
-        Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
-        [J]. What impacts on rigid stops take is with ``contact_damping``.
-    node_friction_work : (N, n) array
-        Energy that friction at each node has taken since the first time [J].
-    friction_force, normal_force : (N, n) arrays
-        R and F of each node [N]; F without the impulses of rigid stops.
-    status : Status
-        How the run ended.
-    statistics : mapping
-        Scheme, counts of steps, rejected steps, events and impacts, seconds.
-    """
-
-    time: Array
-    states: Array
-    work: Array
-    node_friction_work: Array
-    friction_force: Array
-    normal_force: Array
-    status: Status
-    statistics: dict[str, Any]
 
 
 def integrate_set_valued(
@@ -74,7 +35,7 @@ def integrate_set_valued(
     static_coefficient: float | Sequence[float] | None = None,
     longest: float | None = None,
     progress: Callable[[float], None] | None = None,
-) -> SetValuedRun:
+) -> Solution:
     r"""Integrate with friction whose smoothing slope k_s is infinite.
 
     .. math::
@@ -111,14 +72,14 @@ def integrate_set_valued(
 
     Returns
     -------
-    SetValuedRun
+    Solution
         Also of a run that ended early.
 
     Raises
     ------
     InputError
-        For values out of range, friction that cannot be unsmoothed, or a scheme that cannot run
-        the system.
+        For friction that cannot be unsmoothed, or a scheme that cannot run the system; ranges are
+        checked by :class:`fecontact.integrate.solvers.SetValued`.
 
     References
     ----------
@@ -161,8 +122,8 @@ def integrate_set_valued(
             raise
         ended = Status.INTERRUPTED
     statistics: dict[str, Any] = {
-        "method": "set-valued", "scheme": scheme, "rtol": rtol, "steps": int(counts[0]),
-        "rejected": int(counts[1]), "events": int(counts[2]), "impacts": int(counts[3]),
+        "scheme": scheme, "steps": int(counts[0]), "rejected": int(counts[1]),
+        "events": int(counts[2]), "impacts": int(counts[3]),
         "seconds": clock.perf_counter() - begin}
     if outcome > 1:
         ended = Status.MINIMUM_STEP if outcome == kinds.STUCK else Status.NOT_FINITE
@@ -174,8 +135,9 @@ def integrate_set_valued(
         friction = np.vstack([friction, friction[-1:]])
         normal = np.vstack([normal, normal[-1:]])
     end = 2 * m + efforts
-    return SetValuedRun(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(),
-                        states[:, end:].copy(), friction, normal, ended, statistics)
+    return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
+                    statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
+                    friction_force=friction)
 
 
 def _problem(
@@ -185,8 +147,6 @@ def _problem(
     longest: float,
 ) -> kinds.Problem:
     n = system.basis.contact_nodes
-    if restitution is not None and not (isinstance(restitution, Real) and 0.0 <= restitution < 1.0):
-        raise InputError(f"restitution = {restitution!r} must be a number from 0 to below 1.")
     groups = [(_unsmoothed(law), share) for _, share, law in system.law_groups("friction")]
     tables = [law.table(share) for law, share in groups]
     width = max(table.shape[1] for table in tables)
@@ -229,18 +189,12 @@ def _clusters(Tx: Array) -> tuple[Integers, Array]:
     return cluster, np.array(rows)
 
 
-def _static(given: Any, n: int) -> Array:
-    if given is None:
-        return np.full(n, -1.0)
-    try:
-        values = np.asarray(given, dtype=float)
-        values = np.broadcast_to(values, (n,)).copy()
-    except (TypeError, ValueError):
-        values = np.array([np.nan])
-    if not (np.isfinite(values).all() and (values >= 0.0).all()):
-        raise InputError(f"static_coefficient = {given!r} must be a number, zero or above, or one "
+def _static(given: float | Sequence[float] | None, n: int) -> Array:
+    values = np.atleast_1d(np.asarray(-1.0 if given is None else given, dtype=float))
+    if len(values) not in (1, n):
+        raise InputError(f"static_coefficient has {len(values)} values; give one number, or one "
                          f"for each of the {n} contact nodes.")
-    return values
+    return np.broadcast_to(values, (n,)).copy()
 
 
 def _require_free_stops(
@@ -263,12 +217,7 @@ def _require_free_stops(
 
 
 def _chosen(problem: kinds.Problem, scheme: str) -> str:
-    if scheme not in SCHEMES:
-        raise InputError(f"scheme = {scheme!r} must be one of {choices(SCHEMES)}"
-                         f"{nearest(str(scheme), SCHEMES)}.")
     if problem.restitution >= 0.0:
-        if scheme == "stepping":
-            raise InputError("scheme = 'stepping' has no rigid stops; use 'events'.")
         return "events"
     moving = problem.rows[np.any(problem.rows != 0.0, axis=1)]
     scale = np.abs(moving).max(initial=0.0)

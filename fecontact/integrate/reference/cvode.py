@@ -2,14 +2,13 @@
 
 import time as clock
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import MissingLibraryError
 from fecontact.core.types import Array
 from fecontact.integrate.reference import scipy
-from fecontact.integrate.trajectory import Status
+from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 
 
@@ -21,21 +20,21 @@ def integrate(
     rtol: float,
     progress: Callable[[float], None] | None,
     max_step: float | None = None,
-) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
+) -> Solution:
     """Integrate with CVODE's backward differentiation formulas, from break to break.
 
     See :func:`fecontact.integrate.reference.scipy.integrate`, whose equations these are.
 
     Raises
     ------
-    InputError
+    MissingLibraryError
         If scikit-sundae is not installed.
     """
     try:
         from sksundae.cvode import CVODE  # type: ignore[import-untyped]
     except ImportError:
-        raise InputError("method = 'CVODE' needs scikit-sundae: pip install "
-                         "'fecontact[cvode]'.") from None
+        raise MissingLibraryError("The solver CVODE needs scikit-sundae: pip install "
+                                  "'fecontact[cvode]'.") from None
     begin = clock.perf_counter()
     rate, derivative, tolerance, counts = scipy.with_work(system, state, rtol)
 
@@ -80,7 +79,5 @@ def integrate(
                     result[done - 1] = y
     except KeyboardInterrupt:
         status = Status.INTERRUPTED
-    statistics = {"method": "CVODE", "rtol": rtol, **counts,
-                  "seconds": clock.perf_counter() - begin}
-    size = len(state)
-    return times[:done], result[:done, :size], result[:done, size:], status, statistics
+    size, statistics = len(state), {**counts, "seconds": clock.perf_counter() - begin}
+    return Solution(times[:done], result[:done, :size], result[:done, size:], status, statistics)

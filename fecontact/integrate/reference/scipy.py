@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.integrate.trajectory import Status
+from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS, powers, right_hand_side
-
-METHODS = ("Radau", "BDF", "LSODA")
 
 
 def integrate(
@@ -23,16 +21,12 @@ def integrate(
     rtol: float,
     progress: Callable[[float], None] | None,
     max_step: float | None = None,
-) -> tuple[Array, Array, Array, Status, dict[str, Any]]:
+) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``.
 
     The powers of drive, ground, belt, damping and friction are integrated along with the state;
     their error is controlled too, so that the energy balance closes to the tolerance.
-
-    Returns
-    -------
-    times (k,), states (k, 2 m + n s), work (k, 8), status, statistics
-        If the run ended early, those until then, and the last state that was reached.
+    ``method`` is 'Radau', 'BDF' or 'LSODA'.
     """
     import scipy.integrate
 
@@ -80,12 +74,11 @@ def integrate(
                 progress(float(solver.t))
     except KeyboardInterrupt:
         status = Status.INTERRUPTED
-    statistics = {"method": method, "rtol": rtol, "steps": steps, **counts,
-                  "seconds": clock.perf_counter() - begin}
+    statistics = {"steps": steps, **counts, "seconds": clock.perf_counter() - begin}
     times, result = times[:done], result[:done]
     if status is not Status.FINISHED and solver.t > times[-1] and np.isfinite(solver.y).all():
         times, result = np.append(times, solver.t), np.vstack([result, solver.y])
-    return times, result[:, :size], result[:, size:], status, statistics
+    return Solution(times, result[:, :size], result[:, size:], status, statistics)
 
 
 def with_work(

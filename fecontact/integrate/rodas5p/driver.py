@@ -9,7 +9,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.integrate.events import Events, Watched
+from fecontact.integrate.events import Watched
 from fecontact.integrate.reference.scipy import energy_scale
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
@@ -19,7 +19,7 @@ from fecontact.integrate.rodas5p.run import Run, Vary
 from fecontact.integrate.rodas5p.state import Control, progress_for, room_for
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import variation_for
-from fecontact.integrate.trajectory import Status
+from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS
 
@@ -193,14 +193,8 @@ def integrate(
     progress: Callable[[float], None] | None = None,
     checkpoint: Path | None = None,
     events: Sequence[Watched] = (),
-) -> tuple[Array, Array, Array, Status, dict[str, Any], Events]:
-    """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`.
-
-    Returns
-    -------
-    times (k,), states (k, 2 m + n s), work (k, 8 + n), status, statistics, events
-        If the run ended early, those until then, and the last state that was reached.
-    """
+) -> Solution:
+    """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
     run = start(system, state, times, rtol=rtol, max_step=max_step, events=events)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
@@ -215,8 +209,7 @@ def integrate(
         ended = Status.INTERRUPTED
         if kept is not None:
             kept.write()
-    statistics: dict[str, Any] = {"method": "Rodas5P", "rtol": rtol, **run.statistics,
-                                  "seconds": clock.perf_counter() - begin}
+    statistics: dict[str, Any] = {**run.statistics, "seconds": clock.perf_counter() - begin}
     if ended is None:
         ended = ENDS[result]
     if ended not in (Status.FINISHED, Status.EVENT):
@@ -227,7 +220,9 @@ def integrate(
     if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
         times = np.append(times, run.time)
         states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
-    return times, states, work, ended, statistics, run.events
+    powers = len(POWERS)
+    return Solution(times, states, work[:, :powers], ended, statistics,
+                    node_friction_work=work[:, powers:], events=run.events)
 
 
 ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,

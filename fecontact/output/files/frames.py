@@ -14,7 +14,7 @@ from fecontact.reduction.modal_basis import Field
 
 
 def frame_indices(
-    time: Array, frames: int, start: float | None = None, end: float | None = None
+    time: Array, frames: int, t_start: float | None = None, t_end: float | None = None
 ) -> NDArray[np.intp]:
     """Output times to show: the nearest ones to ``frames`` evenly spaced times, each once.
 
@@ -24,24 +24,24 @@ def frame_indices(
         Ascending [s].
     frames : int
         Largest number of times, zero or above.
-    start, end : float, optional
+    t_start, t_end : float, optional
         First and last time to choose from [s].
 
     Raises
     ------
     InputError
-        If ``frames`` is not such a number, or no output time lies between start and end.
+        If ``frames`` is not such a number, or no output time lies between t_start and t_end.
     """
-    for name, value in (("start", start), ("end", end)):
+    for name, value in (("t_start", t_start), ("t_end", t_end)):
         if value is not None and not (isinstance(value, Real) and value == value):
             raise InputError(f"{name} = {value!r} must be a time of the run.")
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 0:
         raise InputError(f"frames = {frames!r} must be a whole number, zero or above.")
-    first = 0 if start is None else int(np.searchsorted(time, start, side="left"))
-    last = len(time) if end is None else int(np.searchsorted(time, end, side="right"))
+    first = 0 if t_start is None else int(np.searchsorted(time, t_start, side="left"))
+    last = len(time) if t_end is None else int(np.searchsorted(time, t_end, side="right"))
     if first >= last:
-        raise InputError(f"There is no output time from {start} s to {end} s; the run has times "
-                         f"from {time[0]:g} s to {time[-1]:g} s.")
+        raise InputError(f"There is no output time from {t_start} s to {t_end} s; the run has "
+                         f"times from {time[0]:g} s to {time[-1]:g} s.")
     chosen = np.arange(first, last)
     if frames >= len(chosen):
         return chosen

@@ -125,7 +125,8 @@ def poincare_figure(
     if axis not in _AXES:
         raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
     row = _AXES.index(axis)
-    found = strobed_states(trajectory, period=period, phase=phase, start=float(trajectory.time[0]))
+    found = strobed_states(trajectory, period=period, phase=phase,
+                           t_start=float(trajectory.time[0]))
     basis = trajectory.system.basis
     drawn = resolved(trajectory)
     x, v = (values(point)[:, row] for values in (
@@ -272,7 +273,7 @@ def plot_spectrum(
     Parameters
     ----------
     trajectory : Trajectory
-        The run, transients cut off by :func:`fecontact.analysis.window.window`.
+        The run, transients cut off by :meth:`Trajectory.between`.
     path : str or Path
         A .png, .pdf or .svg file; it is replaced if it exists.
     quantity, point, axis

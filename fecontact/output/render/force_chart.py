@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.resolved import resolved
-from fecontact.analysis.window import window
 from fecontact.core.units import suitable_unit
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import STATE_COLOURS
@@ -59,7 +58,7 @@ class ForceChart:
         motion, trajectory = self.motion, self.motion.trajectory
         first, last = float(motion.times[0]), float(motion.times[-1])
         if last > first:
-            trajectory = resolved(window(trajectory, first, last)).trajectory
+            trajectory = resolved(trajectory.between(first, last)).trajectory
         part = (first <= trajectory.time) & (trajectory.time <= last)
         time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
         forces = {"normal force": (trajectory.normal_force, _DARK),

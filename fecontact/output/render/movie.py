@@ -44,8 +44,8 @@ def render(
     colour: Colour = "displacement",
     scale: float | None = None,
     title: str | None = None,
-    start: float | None = None,
-    end: float | None = None,
+    t_start: float | None = None,
+    t_end: float | None = None,
     progress: Progress | None = None,
 ) -> Path:
     """Draw a run as a movie or as numbered pictures, whole or not at all.
@@ -78,7 +78,7 @@ def render(
         Factor of the displacements; by default a round one that makes the largest visible.
     title : str, optional
         Shown at the top.
-    start, end : float, optional
+    t_start, t_end : float, optional
         Part of the run to draw [s].
     progress : callable, optional
         Called as ``progress(done, total)`` after each frame.
@@ -103,7 +103,7 @@ def render(
     require_frame_rate("A movie", fps)
     _require_size(size)
     require_field(trajectory)
-    indices = frame_indices(trajectory.time, frames, start, end)
+    indices = frame_indices(trajectory.time, frames, t_start, t_end)
     if not len(indices):
         raise InputError("frames = 0 makes no movie; give at least 1.")
     motion = Motion(trajectory, indices, colour, scale)

@@ -1,0 +1,294 @@
+"""Solvers of runs: each with the options that are its own, and one method that integrates."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from numbers import Real
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fecontact.core.checks import as_path
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array
+from fecontact.integrate.events import Watched
+from fecontact.integrate.trajectory import Solution, Status
+from fecontact.system.contact_system import ContactSystem
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What a solver is to integrate.
+
+    Attributes
+    ----------
+    system : ContactSystem
+        What moves.
+    state : (2 m + n s,) array
+        y = [q, q', z] at the first time.
+    times : (N,) array
+        Output times, ascending [s].
+    rtol : float
+        Relative tolerance.
+    max_step : float or None
+        Longest step [s].
+    events : sequence of ContactEvents, Crossing and Event
+        What to watch for; empty unless the solver ``locates_events``.
+    progress : callable or None
+        To be called with the time reached [s] now and then.
+    """
+
+    system: ContactSystem
+    state: Array
+    times: Array
+    rtol: float
+    max_step: float | None = None
+    events: Sequence[Watched] = ()
+    progress: Callable[[float], None] | None = None
+
+
+class Solver(ABC):
+    """What integrates a system in time; a frozen dataclass of its options.
+
+    Attributes
+    ----------
+    locates_events : bool
+        Whether it locates what :func:`fecontact.simulate` is told to watch for.
+    smooth : bool
+        Whether forces are functions of the state, so that energy which grows without work is an
+        error.
+    """
+
+    locates_events: ClassVar[bool] = False
+    smooth: ClassVar[bool] = True
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What ``solver`` is in study files and in the statistics of a run."""
+
+    @abstractmethod
+    def run(self, task: Task) -> Solution:
+        """Integrate; what was computed until then, if the run ends early."""
+
+
+@dataclass(frozen=True)
+class Rodas5P(Solver):
+    """The compiled Rosenbrock method of order 5, for smooth laws of contact and friction.
+
+    Parameters
+    ----------
+    checkpoint : path, optional
+        A file that keeps a long run every minute and when it is interrupted. If it is there, the
+        run goes on from it, to the same numbers; at the end it is removed.
+    keep_checkpoint : bool
+        Leave the file there at the end, to be removed once the run is written.
+
+    Raises
+    ------
+    InputError
+        If the checkpoint is no path.
+
+    References
+    ----------
+    G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P, BIT 63 (2023) 27.
+    """
+
+    checkpoint: str | Path | None = None
+    keep_checkpoint: bool = False
+
+    locates_events: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if self.checkpoint is not None:
+            as_path(self.checkpoint, "a checkpoint")
+
+    @property
+    def name(self) -> str:
+        """``rodas5p``."""
+        return "rodas5p"
+
+    def run(self, task: Task) -> Solution:
+        """See :meth:`Solver.run`; InputError for a checkpoint of another run."""
+        from fecontact.integrate.rodas5p.driver import integrate
+
+        path = None if self.checkpoint is None else Path(self.checkpoint)
+        if path is not None and not path.parent.is_dir():
+            raise InputError(f"checkpoint = {str(path)!r} cannot be written: there is no folder "
+                             f"{path.parent}.")
+        found = integrate(task.system, task.state, task.times, rtol=task.rtol,
+                          max_step=task.max_step, progress=task.progress, checkpoint=path,
+                          events=task.events)
+        if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
+            path.unlink(missing_ok=True)
+        return found
+
+
+@dataclass(frozen=True)
+class SetValued(Solver):
+    r"""Friction without smoothing, sticking by constraint, and rigid stops.
+
+    .. math::
+
+        |R_j| \le \mu(0^+) F_j \ \text{ where } v_j = 0, \qquad
+        R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
+
+    Friction laws have to have a ``smoothing_slope``, whose limit this is.
+
+    Parameters
+    ----------
+    restitution : float, optional
+        Rigid stops in place of the normal law, with Newton's coefficient of restitution, from 0
+        to below 1.
+    static_coefficient : float or (n,) sequence, optional
+        Limit of \|R\|/F in stick [-], for all contact nodes or each; default that of the law.
+    scheme : 'auto', 'events' or 'stepping'
+        From event to event, for few nodes, or by implicit steps, for any number of them.
+
+    Raises
+    ------
+    InputError
+        For values out of range.
+    """
+
+    restitution: float | None = None
+    static_coefficient: float | Sequence[float] | None = None
+    scheme: str = "auto"
+
+    smooth: ClassVar[bool] = False
+    schemes: ClassVar[tuple[str, ...]] = ("auto", "events", "stepping")
+
+    def __post_init__(self) -> None:
+        if self.restitution is not None and not (
+                isinstance(self.restitution, Real) and 0.0 <= self.restitution < 1.0):
+            raise InputError(f"SetValued: restitution = {self.restitution!r} must be a number from "
+                             f"0 to below 1.")
+        if self.scheme not in self.schemes:
+            raise InputError(f"SetValued: scheme = {self.scheme!r} must be one of "
+                             f"{choices(self.schemes)}{nearest(str(self.scheme), self.schemes)}.")
+        if self.restitution is not None and self.scheme == "stepping":
+            raise InputError("SetValued: scheme = 'stepping' has no rigid stops; use 'events', or "
+                             "leave restitution out.")
+        if self.static_coefficient is not None:
+            try:
+                values = np.asarray(self.static_coefficient, dtype=float)
+            except (TypeError, ValueError):
+                values = np.array([np.nan])
+            if values.ndim > 1 or not (np.isfinite(values).all() and (values >= 0.0).all()):
+                raise InputError(f"SetValued: static_coefficient = {self.static_coefficient!r} "
+                                 f"must be a number, zero or above, or one for each contact node.")
+            # Tuples make the solver hashable, and plain numbers go into files.
+            object.__setattr__(self, "static_coefficient",
+                               float(values) if values.ndim == 0 else tuple(values.tolist()))
+
+    @property
+    def name(self) -> str:
+        """``set-valued``."""
+        return "set-valued"
+
+    def run(self, task: Task) -> Solution:
+        """See :meth:`Solver.run`; InputError for a system that it cannot run."""
+        from fecontact.integrate.nonsmooth.driver import integrate_set_valued
+        from fecontact.integrate.reference.scipy import longest_step
+
+        found = integrate_set_valued(
+            task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
+            static_coefficient=self.static_coefficient, scheme=self.scheme,
+            longest=longest_step(task.system, task.times, task.max_step), progress=task.progress)
+        # With what the run was told, it can be repeated.
+        told = {"restitution": self.restitution, "static_coefficient": self.static_coefficient}
+        return replace(found, statistics=found.statistics | told)
+
+
+@dataclass(frozen=True)
+class Scipy(Solver):
+    """A solver of ``scipy.integrate``, as a reference.
+
+    Parameters
+    ----------
+    method : 'Radau', 'BDF' or 'LSODA'
+        Its name there.
+
+    Raises
+    ------
+    InputError
+        For another one.
+    """
+
+    method: str = "Radau"
+
+    methods: ClassVar[tuple[str, ...]] = ("Radau", "BDF", "LSODA")
+
+    def __post_init__(self) -> None:
+        if self.method not in self.methods:
+            raise InputError(f"Scipy: method = {self.method!r} must be one of "
+                             f"{choices(self.methods)}{nearest(str(self.method), self.methods)}.")
+
+    @property
+    def name(self) -> str:
+        """The method in small letters."""
+        return self.method.lower()
+
+    def run(self, task: Task) -> Solution:
+        """See :meth:`Solver.run`."""
+        from fecontact.integrate.reference.scipy import integrate
+
+        return integrate(task.system, task.state, task.times, method=self.method, rtol=task.rtol,
+                         max_step=task.max_step, progress=task.progress)
+
+
+@dataclass(frozen=True)
+class CVODE(Solver):
+    """CVODE of SUNDIALS by scikit-sundae, which has to be installed, as a reference."""
+
+    @property
+    def name(self) -> str:
+        """``cvode``."""
+        return "cvode"
+
+    def run(self, task: Task) -> Solution:
+        """See :meth:`Solver.run`; MissingLibraryError without scikit-sundae."""
+        from fecontact.integrate.reference.cvode import integrate
+
+        return integrate(task.system, task.state, task.times, rtol=task.rtol,
+                         max_step=task.max_step, progress=task.progress)
+
+
+# What functions take unless they are told otherwise.
+RODAS5P, SET_VALUED = Rodas5P(), SetValued()
+
+SOLVERS: dict[str, Solver] = {solver.name: solver for solver in (
+    RODAS5P, SET_VALUED, *(Scipy(method) for method in Scipy.methods), CVODE())}
+
+
+def solver_by_name(name: str, options: Mapping[str, Any]) -> Solver:
+    """A solver by its name in files; options that are None are left at their defaults.
+
+    Raises
+    ------
+    InputError
+        For another name, options of other solvers, and values out of range.
+    """
+    if name not in SOLVERS:
+        raise InputError(f"solver = {name!r} must be one of {choices(SOLVERS)}"
+                         f"{nearest(str(name), SOLVERS)}.")
+    given = {key: value for key, value in options.items() if value is not None}
+    for key, value in given.items():
+        owners = [other for other, solver in SOLVERS.items() if key in _options(solver)]
+        if name not in owners:
+            raise InputError(f"{key} = {value!r} is for solver = {choices(owners)} alone, not "
+                             f"'{name}'; leave it out.")
+    return replace(SOLVERS[name], **given)  # type: ignore[type-var]
+
+
+def _options(solver: Any) -> set[str]:
+    return {entry.name for entry in fields(solver)}
+
+
+def require_solver(solver: Any) -> None:
+    """InputError for what is no solver, such as its name or its class."""
+    if not isinstance(solver, Solver):
+        shown = solver.__name__ if isinstance(solver, type) else repr(solver)
+        raise InputError(f"solver = {shown} must be Rodas5P(), SetValued(), Scipy('Radau') or "
+                         f"CVODE(), with their options.")
