@@ -532,6 +532,8 @@ laws none.py:X | none.py
 laws .py: | .py
 demo tiny.toml/x | tiny.toml
 doctor now | now
+completion nushell | nushell
+completion | shell
 rnu | rnu
 --debg | --debg
 """

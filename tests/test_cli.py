@@ -383,6 +383,32 @@ def test_doctor_says_what_to_install(cli, monkeypatch):
     assert "To repair: sudo apt-get install -y --no-install-recommends libnowhere7" in out
 
 
+def test_completion_makes_bash_complete_commands_options_and_choices(cli, tmp_path):
+    code, script, _ = cli("completion", "bash")
+    assert code == 0
+    (tmp_path / "completion.sh").write_text(script)
+
+    def completed(*words):
+        ask = (f"source completion.sh; complete -p fecontact >/dev/null || exit 1; "
+               f"COMP_WORDS=({' '.join(words)}); COMP_CWORD={len(words) - 1}; "
+               f'_fecontact; echo "${{COMPREPLY[@]}}"')
+        done = subprocess.run(["bash", "-c", ask], cwd=tmp_path, capture_output=True, text=True,
+                              check=True)
+        return done.stdout.split()
+
+    assert completed("fecontact", "mo") == ["modes"]
+    assert completed("fecontact", "export", "--fo") == ["--format"]
+    assert "csv" in completed("fecontact", "export", "x.toml", "--format", "''")
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish", "powershell"])
+def test_completion_names_every_command_to_the_shell(cli, shell):
+    code, script, _ = cli("completion", shell)
+    assert code == 0
+    for command in ("init", "mesh", "modes", "run", "sweep", "branch", "completion"):
+        assert command in script
+
+
 def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
     from fecontact.cli import demo
 
