@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oscillators import basis, impact_oscillator
+from systems import basis, impact_oscillator
 
 from fecontact import (
     Axis,

@@ -9,6 +9,7 @@ import time
 import tomllib
 
 import pytest
+from tiny_study import TINY
 
 from fecontact.cli import doctor as examination
 from fecontact.cli import execute
@@ -17,18 +18,6 @@ from fecontact.fem.mesh_files import read_mesh
 from fecontact.integrate.trajectory import Status
 from fecontact.output.files.case import read_case
 from fecontact.study.study import Study
-
-TINY = """
-geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.01 }
-body = { material = "steel", thickness = 0.02 }
-basis = { modes = 5, contact_nodes = 4, damping = 0.01 }
-normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
-ground = { speed = 0.1 }
-load = { normal = 10.0 }
-simulation = { t_end = 5e-4, outputs = 11 }
-output = { frames = 3 }
-render = { frames = 2, size = [320, 180] }
-"""
 
 
 @pytest.fixture
@@ -435,7 +424,7 @@ def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
 def test_script_for_system_libraries_agrees_with_the_doctor():
     from pathlib import Path
 
-    script = Path(__file__).parent.parent / ".ci" / "system-libraries"
+    script = Path(__file__).parents[2] / ".ci" / "system-libraries"
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
                           check=False, env=os.environ | {"PATH": ""})
     assert done.returncode == (1 if system_libraries.missing() else 0)

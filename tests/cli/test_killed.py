@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from sweep_study import Serial, files_below, write_study
-from test_cli import TINY
+from tiny_study import TINY
 
 from fecontact import read_case, read_table, sweep
 from fecontact.cli import execute

@@ -7,7 +7,7 @@ import sys
 import time
 
 import pytest
-from test_cli import TINY
+from tiny_study import TINY
 
 from fecontact import InputError
 from fecontact.cli import execute

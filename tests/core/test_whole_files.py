@@ -32,11 +32,11 @@ linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="locks a
 
 def in_process(code, *arguments, check=True):
     """Run a script in a process of its own, in which the synthetic runs are at hand."""
-    here = Path(__file__).parent
+    tests = Path(__file__).parents[1]
     return subprocess.run(
         [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)], check=check,
         capture_output=True, text=True, timeout=120,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(here.parent), str(here)])})
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tests.parent), str(tests)])})
 
 
 def listed(folder):

@@ -17,7 +17,7 @@ try:
 except (ImportError, OSError) as error:
     pytest.skip(f"Gmsh does not load: {error}", allow_module_level=True)
 
-MESHES = Path(__file__).parent.parent / "meshes"
+MESHES = Path(__file__).parents[2] / "meshes"
 
 SHAPES = [
     Beam(),

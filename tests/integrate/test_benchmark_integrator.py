@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from fecontact.integrate.rodas5p import driver, step_loop
 
-FOLDER = Path(__file__).parents[1] / "benchmarks"
+FOLDER = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oscillators import impact_oscillator
+from systems import impact_oscillator
 
 from fecontact import InputError, Status, ensemble, forcing_period, simulate, strobe
 from fecontact.integrate.rodas5p import driver

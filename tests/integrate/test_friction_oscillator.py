@@ -1,16 +1,12 @@
 """The friction oscillator of section 4.3: what the source reports of it."""
 
-import sys
 from pathlib import Path
 
+import friction_oscillator as example
 import numpy as np
 import pytest
 
 import fecontact as fc
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
-
-import friction_oscillator as example
 
 
 def lengths(run):

@@ -1,9 +1,10 @@
 """Section 4.2 of the source: regimes of a pendulum that strikes a stop, on mesh and two modes."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
+import impact_calibration as calibration
+import impact_oscillator as impact
 import numpy as np
 import pytest
 
@@ -12,12 +13,7 @@ from fecontact.fem.mesh_files import read_mesh
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.simulate import simulate
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
-
-import impact_calibration as calibration
-import impact_oscillator as impact
-
-MESH = Path(__file__).parents[1] / "meshes" / "impact_pendulum.msh"
+MESH = Path(__file__).parents[2] / "meshes" / "impact_pendulum.msh"
 PERIODS = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
 STARTS = ((0.0, 0.0), (4e-4, 0.0), (1e-4, -0.02))  # height [m], velocity [m/s]
 

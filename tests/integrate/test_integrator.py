@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from test_simulate import mass_in_plane, mass_in_y, oscillator
+from systems import mass_in_plane, mass_in_y
+from test_simulate import oscillator
 
 from fecontact.core.errors import InputError
 from fecontact.integrate.rodas5p import driver as control

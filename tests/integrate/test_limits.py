@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oscillators import friction_oscillator, impact_oscillator
+from systems import friction_oscillator, impact_oscillator
 from test_events import START, drop
 
 from fecontact import (

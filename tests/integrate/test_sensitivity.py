@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.linalg
-from oscillators import friction_oscillator, impact_oscillator
+from systems import friction_oscillator, impact_oscillator
 
 from fecontact import (
     Drive,

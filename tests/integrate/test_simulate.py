@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 from scipy.optimize import brentq
+from systems import DRIVEN, SURFACE, beam, impact_oscillator, mass_in_plane, mass_in_y
 
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.fem.elastic_body import ElasticBody, Material
@@ -23,24 +24,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.statics import static_equilibrium
 
 RTOL = 1e-6
-SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 BALANCE = 20.0 * RTOL
-
-
-def mass_in_y(mass=1.0, spring=0.0, **parts):
-    """A mass that moves up and down only."""
-    rows = np.array([[0.0], [1.0], [0.0]])
-    basis = basis_from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
-    return ContactSystem(basis, **{"normal": SURFACE, **parts})
-
-
-def mass_in_plane(mass=1.0, spring=0.0, **parts):
-    """A mass that moves along the ground and up and down."""
-    rows = np.zeros((3, 2))
-    rows[0, 0] = rows[1, 1] = 1.0
-    basis = basis_from_matrices(mass * np.eye(2), np.diag([spring, 0.0]),
-                                {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **{"normal": SURFACE, **parts})
 
 
 def at(system, x=0.0, y=0.0, x_rate=0.0, y_rate=0.0):
@@ -275,25 +259,11 @@ def test_third_mode_vibrates_at_the_drive_while_the_contact_sticks():
     assert np.ptp(passed) / (len(passed) - 1) == pytest.approx(1.0 / expected, rel=5e-3)
 
 
-def pendulum(angular_frequency):
-    """The impact oscillator of section 3: rigid and first bending mode."""
-    tip = 1.0 / np.sqrt(0.092)
-    T = np.zeros((3, 3, 2))
-    T[0, 1] = T[2, 1] = [tip, 0.6 * tip]
-    w = 2.0 * np.pi * 230.0
-    basis = ModalBasis(angular_frequencies=[0.0, w], damping=np.diag([0.0, 0.06 * w]), T=T,
-                       positions=np.zeros((3, 2)), tributary=[1.0])
-    return ContactSystem(
-        basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
-        drive=Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
-                    angular_frequency=angular_frequency))
-
-
 @pytest.mark.parametrize(("w", "repeats"), [(64.32, 1), (30.84, 2), (37.41, 4)])
 def test_regimes_of_the_impact_oscillator(w, repeats):
     period = 2.0 * np.pi / w
     times = np.concatenate([[0.0], np.linspace(52.0, 60.0, 8 * 200 + 1) * period])
-    run = simulate(pendulum(w), times[-1], outputs=times, method="LSODA")
+    run = simulate(impact_oscillator(w=w), times[-1], outputs=times, method="LSODA")
     y = run.displacement("B")[1:, 1]
     misses = [np.abs(y[200 * k:] - y[: -200 * k]).max() / np.ptp(y) for k in (1, 2, 3, 4)]
     assert int(np.argmax(np.array(misses) < 3e-3)) + 1 == repeats
@@ -303,19 +273,6 @@ def test_regimes_of_the_impact_oscillator(w, repeats):
 
 
 # Bodies ------------------------------------------------------------------------------------------
-
-def beam(n=4, modes=6, **parts):
-    body = ElasticBody(rectangle(0.2, 0.02, 12, 2), Material(), 0.01)
-    basis = modal_basis(body, modes, contact="bottom", contact_nodes=n, B=(0.0, 0.01),
-                        C=(0.1, 0.02), damping=0.01)
-    return ContactSystem(basis, **{
-        "normal": RoughSurface(1e7, 1e-5, 100.0), "load": Load(50.0),
-        "friction": ExponentialFriction(0.4, 0.2, 100.0, 1e4), **parts})
-
-
-DRIVEN = {"ground": Ground(speed=0.05), "drive": Drive(
-    stiffness_x=1e5, damping_x=5.0, amplitude_x=1e-4, angular_frequency=300.0)}
-
 
 def test_energy_balance_and_methods_agree_on_a_driven_beam():
     runs = {method: simulate(beam(**DRIVEN), 0.03, outputs=301, method=method)

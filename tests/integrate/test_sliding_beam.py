@@ -1,13 +1,8 @@
 """A beam sliding over waves: its motion and wear converge with contact nodes and modes."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
-
 import sliding_beam as example
 
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from oscillators import basis
+from systems import basis
 
 from fecontact import (
     ContactEvents,

@@ -34,7 +34,7 @@ def test_window_counts_from_its_own_start(trajectory):
 
 
 def test_window_of_a_run_keeps_its_balance():
-    from test_simulate import DRIVEN, beam
+    from systems import DRIVEN, beam
 
     whole = simulate(beam(**DRIVEN), 0.01, outputs=401)
     part = window(whole, 0.004)
@@ -109,9 +109,9 @@ def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
 
 def test_a_pendulum_is_drawn_across_the_ground(tmp_path):
     """It has no motion along it: the drive's axis is the usual one, and zeros can be drawn."""
-    from test_simulate import pendulum
+    from systems import impact_oscillator
 
-    trajectory = simulate(pendulum(64.32), 0.5, outputs=801)
+    trajectory = simulate(impact_oscillator(w=64.32), 0.5, outputs=801)
     for kind in ("phase", "spectrum", "spectrogram", "receptance"):
         plot_kinds.redraw(trajectory, kind, tmp_path / f"{kind}.svg")
     assert b"velocity y" in (tmp_path / "phase.svg").read_bytes()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oscillators import impact_oscillator
+from systems import impact_oscillator
 
 from fecontact import Axis, InputError, basins, brute_force
 from fecontact.bifurcation.attractors.basins import Attractor, Basins

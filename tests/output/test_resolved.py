@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from oscillators import friction_oscillator, impact_oscillator
 from synthetic import run as made_by_hand
+from systems import friction_oscillator, impact_oscillator
 
 import fecontact as fc
 from fecontact.analysis.resolved import resolved

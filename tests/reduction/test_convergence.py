@@ -1,13 +1,8 @@
 """Contact forces converge with mesh and nodes; loads on single nodes do not."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
-
 from contact_convergence import row
 
 

@@ -16,8 +16,7 @@ from fecontact import basis_from_matrices, modal_basis
 from fecontact.core.errors import InputError
 from fecontact.reduction.matrix_files import AssembledMatrix, read_matrix
 
-DATA = Path(__file__).parent / "data"
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+DATA = Path(__file__).parents[1] / "data"
 
 import from_other_programs as example  # noqa: E402
 
@@ -381,7 +380,7 @@ def test_unsound_matrices_are_refused_before_they_are_used(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", _READ, *(str(tmp_path / name) for name in UNSOUND)],
         capture_output=True, text=True, check=False, timeout=100,
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])})
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])})
     assert done.returncode == 0, done.stderr[-500:]
     lines = done.stdout.splitlines()
     assert len(lines) == len(UNSOUND)

@@ -11,7 +11,7 @@ from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.reduction.matrix_files.uff import read_uff
 from fecontact.reduction.reduce_body import modal_basis
 
-BLOCK = Path(__file__).parent / "data" / "block.uff"
+BLOCK = Path(__file__).parents[1] / "data" / "block.uff"
 NODES = [11, 12, 40]
 
 

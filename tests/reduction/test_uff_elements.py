@@ -9,7 +9,7 @@ import pytest
 from fecontact import read_uff
 from fecontact.core.errors import InputError
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 
 ELEMENTS = """    -1
   2412

@@ -9,7 +9,7 @@ import sys
 import warnings
 
 import pytest
-from test_cli import TINY
+from tiny_study import TINY
 
 import fecontact as fe
 from fecontact.cli import execute

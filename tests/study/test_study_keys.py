@@ -12,7 +12,7 @@ from fecontact.laws.registry import is_kind, law_names
 from fecontact.study.reference_page import study_keys
 from fecontact.study.study import Study
 
-PAGE = Path(__file__).parents[1] / "docs" / "study.md"
+PAGE = Path(__file__).parents[2] / "docs" / "study.md"
 
 
 def classes_within(hint):

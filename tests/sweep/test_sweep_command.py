@@ -137,7 +137,7 @@ def test_ctrl_c_says_how_to_go_on(cli, tmp_path, monkeypatch):
 
 def test_example_of_stick_and_slip(cli, tmp_path):
     """Below ln(N (mu_0 - mu_inf) lambda / b) / lambda it sticks and slips, above it slides."""
-    code, _, _ = cli("sweep", Path(__file__).parents[1] / "examples/sweep_stick_slip.toml",
+    code, _, _ = cli("sweep", Path(__file__).parents[2] / "examples/sweep_stick_slip.toml",
                      "-o", tmp_path, "--set", 'sweep.axes={"ground.speed"=[6e-3, 11e-3], '
                      '"friction.static_coefficient"=[0.7, 0.8]}')
     assert code == 0
@@ -225,7 +225,7 @@ def test_a_script_without_main_guard_is_told(tmp_path):
     done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True,
                           text=True, timeout=180.0,
                           env={**os.environ,
-                               "PYTHONPATH": str(Path(__file__).parents[1])})
+                               "PYTHONPATH": str(Path(__file__).parents[2])})
     assert done.returncode == 1
     assert "must call sweep below if __name__ == '__main__'" in done.stderr.splitlines()[-1]
 

@@ -96,7 +96,7 @@ def cluster(tmp_path):
     address = f"tcp://127.0.0.1:{free_port()}"
     quiet = {"cwd": tmp_path, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL,
              "env": os.environ | {"OPENBLAS_NUM_THREADS": "1",
-                                  "PYTHONPATH": str(Path(__file__).parents[1])}}
+                                  "PYTHONPATH": str(Path(__file__).parents[2])}}
     scheduler = subprocess.Popen(
         [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port",
          address.rpartition(":")[2], "--no-dashboard"], **quiet)

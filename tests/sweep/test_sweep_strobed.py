@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from oscillators import impact_oscillator
 from sweep_study import Serial, files_below
+from systems import impact_oscillator
 
 from fecontact import Study, plot_strobed, read_table, strobe, sweep
 from fecontact.core.errors import InputError

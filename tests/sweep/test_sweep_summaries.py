@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import synthetic
-from oscillators import impact_oscillator
+from systems import impact_oscillator
 
 from fecontact import RigidStart, simulate
 from fecontact.core.errors import InputError
