@@ -6,16 +6,19 @@ READY  := $(VENV)/.ready
 SYSTEM := $(VENV)/.system-libraries
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow check bench validation clean
+.PHONY: help setup demo test test-fast test-slow check bench validation clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
-	  while IFS='|' read -r name what; do printf '  %-12s %s\n' "$$name" "$$what"; done
+	  while IFS='|' read -r name what; do printf '  %-16s %s\n' "$$name" "$$what"; done
 
 setup: $(READY) $(SYSTEM) ## install everything into .venv
 
 demo: $(READY) $(SYSTEM) ## two studies from geometry to movie, into demo-output/
 	@$(BIN)/fecontact demo demo-output
+
+test-fast: $(READY) $(SYSTEM) ## run the tests that take seconds
+	@$(BIN)/python -m pytest -q -n auto -m 'not slow and not long'
 
 test: $(READY) $(SYSTEM) ## run the tests
 	@$(BIN)/python -m pytest -q -n auto

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oscillators import friction_oscillator
+from systems import friction_oscillator
 
 import fecontact
 from fecontact import modal_basis

@@ -16,7 +16,8 @@ from fecontact.study.study import Study
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-PAGES = {"README.md": ROOT / "README.md", **{path.name: path for path in sorted(DOCS.glob("*.md"))}}
+PAGES = {path.name: path for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md",
+                                      *sorted(DOCS.glob("*.md")))}
 TEXTS = {name: path.read_text() for name, path in PAGES.items()}
 BLOCK = re.compile(r"(?:<!-- not run: (?P<reason>[^>]+) -->\n)?```(?P<language>\w*)\n"
                    r"(?P<text>.*?)```", re.DOTALL)

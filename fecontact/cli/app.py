@@ -4,11 +4,27 @@ Libraries that take time to load are imported inside the commands, so that help 
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
 from fecontact.cli.commands import about, branch, run, study, sweep
+from fecontact.core.errors import InputError
+
+
+def completion(
+    shell: Annotated[Literal["bash", "zsh", "fish", "powershell"], Parameter(
+        help="The shell to write for.")],
+    /,
+) -> None:
+    """Print a script that completes commands and options; let your shell read it at its start."""
+    try:
+        script = app.generate_completion(shell=shell)
+    except ValueError as error:
+        raise InputError(f"the installed cyclopts writes no completion for {shell}; install a "
+                         f"newer one with pip install --upgrade cyclopts.") from error
+    print(script, end="")
+
 
 COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.init,
@@ -24,6 +40,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     about.laws,
     about.demo,
     about.doctor,
+    completion,
 )
 
 

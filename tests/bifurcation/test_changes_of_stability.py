@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from collocation_fields import two_masses_field
 from scipy.optimize import brentq
-from systems_for_bifurcations import (
+from systems import (
     belt,
     lorenz_field,
     mode_coupling,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems_for_bifurcations import two_mass_field, two_mass_jacobian
+from systems import two_mass_field, two_mass_jacobian
 
 from fecontact import read_branch, write_branch
 from fecontact.bifurcation.continuation.branch import Status

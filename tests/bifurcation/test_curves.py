@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems_for_bifurcations import friction_slope, lorenz_field, two_mass_field, two_mass_jacobian
+from systems import friction_slope, lorenz_field, two_mass_field, two_mass_jacobian
 
 from fecontact.bifurcation.continuation.branch import Status
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems_for_bifurcations import mode_coupling, two_mass_field
+from systems import mode_coupling, two_mass_field
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems_for_bifurcations import (
+from systems import (
     belt,
     friction_slope,
     lorenz_field,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from systems_for_bifurcations import (
+from systems import (
     belt,
     friction_slope,
     lorenz_field,

@@ -1,18 +1,13 @@
 """Orbits of the impact oscillator against runs that know nothing of derivatives."""
 
-import sys
-from pathlib import Path
 
+import impact_orbits
 import numpy as np
 import pytest
 
 from fecontact import ContactEvents, doubled_by_shooting, simulate, strobe
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.integrate.sensitivity import sensitivity
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-
-import impact_orbits
 
 # States near orbits of one period, from which Newton's method finds them.
 NEAR_SINGLE = np.array([5.1745e-5, 6.98e-7, -5.14e-4, -8.89e-4])    # 39.2 rad/s

@@ -1,13 +1,12 @@
 """What begins on branches by shooting, driven systems, and settled motions as starts."""
 
-import sys
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
+import impact_orbits
 import numpy as np
 import pytest
-from systems_for_bifurcations import (
+from systems import (
     belt,
     lorenz_field,
     two_mass_field,
@@ -34,10 +33,6 @@ from fecontact.bifurcation.orbits.period_doubling import (
 )
 from fecontact.bifurcation.orbits.samples import motion_of, observe, orbit_history
 from fecontact.core.errors import AnalysisError, InputError
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-
-import impact_orbits
 
 FEW = Settings(step=5e-3, largest_step=0.05, points=60)
 

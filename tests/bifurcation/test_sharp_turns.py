@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from systems_for_bifurcations import belt
+from systems import belt
 from test_continuation import Plane
 
 from fecontact import simulate

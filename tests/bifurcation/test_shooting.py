@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems_for_bifurcations import belt, lorenz_field, two_mass_field
+from systems import belt, lorenz_field, two_mass_field
 
 from fecontact import simulate
 from fecontact.bifurcation.continuation.problem import Settings

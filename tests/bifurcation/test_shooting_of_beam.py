@@ -1,17 +1,12 @@
 """Shooting with many states: a beam of 20 modes on 40 contact nodes that sticks and slips."""
 
-import sys
-from pathlib import Path
 
+import beam_stick_slip as example
 import numpy as np
 import pytest
 
 from fecontact import contact_field, sensitivity, simulate
 from fecontact.core.errors import InputError
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-
-import beam_stick_slip as example
 
 SPEED = 0.05
 

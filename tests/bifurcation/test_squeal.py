@@ -1,13 +1,8 @@
 """The example of a beam that squeals: border of flutter, pictures."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-
 import squeal
 
 import fecontact as fc

@@ -1,13 +1,8 @@
 """The example of section 4.4 gives the printed values."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-
 import two_mass_friction as example
 
 from fecontact import simulate

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
-from systems_for_bifurcations import (
+from systems import (
     belt,
     friction_slope,
     lorenz,

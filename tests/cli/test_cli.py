@@ -1,0 +1,430 @@
+"""The command line: the way from a new study to a movie, and what it says when things go wrong."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+
+import pytest
+from tiny_study import TINY
+
+from fecontact.cli import doctor as examination
+from fecontact.cli import execute
+from fecontact.core import system_libraries
+from fecontact.fem.mesh_files import read_mesh
+from fecontact.integrate.trajectory import Status
+from fecontact.output.files.case import read_case
+from fecontact.study.study import Study
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "tiny.toml"
+    path.write_text(TINY)
+    return path
+
+
+@pytest.fixture
+def cli(capsys):
+    """Run a command line in this process: exit code, stdout, stderr."""
+
+    def run(*tokens):
+        code = execute([str(token) for token in tokens])
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        return code, said.out, said.err
+
+    return run
+
+
+def heed_interrupts():
+    """In a new process: shells make what runs in the background deaf to Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def files_below(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_load_beyond_the_limits_of_the_model_is_warned_of(cli, study):
+    """1 kN on 0.3e6 N/m: 3.3 mm, 640 times the roughness; at 100 N it is 65 times."""
+    words = "warning: In this run contact node"
+    code, _, err = cli("run", study, "--set", "load.normal=1000.0")
+    assert code == 0
+    assert err.count(words) == 1
+    for command in (["plot", study, "history"], ["export", study, "--format", "csv"]):
+        code, _, err = cli(*command)
+        assert (code, err.count(words)) == (0, 1)
+    code, _, err = cli("run", study, "--set", "load.normal=100.0")
+    assert (code, err) == (0, "")
+
+
+def test_a_study_without_a_normal_law_is_told_what_to_give(cli, study):
+    study.write_text("".join(line for line in TINY.splitlines(keepends=True)
+                             if not line.startswith("normal")))
+    assert cli("mesh", study)[0] == 0
+    code, _, err = cli("run", study)
+    assert code == 1
+    assert "lacks the section [normal]" in err
+    assert "`fecontact laws rough-surface` says how to choose" in err
+    code, out, _ = cli("laws", "rough-surface")
+    assert code == 0
+    assert "How to choose." in out
+
+
+def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli("init", "beam.toml")[0] == 0
+    small = ["--set", "geometry.element_size=0.01", "--set", "basis.contact_nodes=5",
+             "--set", "basis.modes=6", "--set", "simulation.t_end=1e-3",
+             "--set", "simulation.outputs=21", "--set", "output.frames=4",
+             "--set", "output.points=[\"B\", 2]"]
+
+    code, out, _ = cli("mesh", "beam.toml", *small)
+    assert code == 0
+    assert re.search("boundary contact +20 edges", out)
+    assert len(read_mesh("results/beam.msh").nodes) == 63
+
+    code, out, _ = cli("modes", "beam.toml", *small)
+    assert code == 0
+    assert out.count("rigid") == 3
+    assert out.count("vibration") == 3
+    # Euler-Bernoulli: first bending frequency of a free beam, 0.2 m x 4 mm of steel
+    first = next(line for line in out.splitlines() if "vibration" in line)
+    assert float(first.split()[1]) == pytest.approx(531.6, rel=5e-3)
+
+    code, out, err = cli("run", "beam.toml", *small)
+    assert (code, err) == (0, "")
+    for word in ("energy imbalance", "largest displacement", "contact stick", "steps"):
+        assert word in out
+    case = read_case("results/beam.vtkhdf")
+    assert case.trajectory.time[-1] == pytest.approx(1e-3)
+    assert Study.from_toml(case.study, "x").basis_settings.contact_nodes == 5
+
+    code, out, _ = cli("export", "results/beam.vtkhdf", "--format", "pvd", "--frames", 2)
+    assert code == 0
+    assert len(list(tmp_path.glob("results/beam-pvd/**/*.vtu"))) == 2
+
+    code, out, err = cli("render", "beam.toml", "--frames", 2, "--size", 320, 180,
+                         "--colour", "displacement", "--scale", 10)
+    assert code == 0
+    assert "computed with other values than beam.toml" in err
+    assert (tmp_path / "results/beam.mp4").stat().st_size > 1000
+    code, _, err = cli("render", "results/beam.vtkhdf", "--frames", 1, "--size", 320, 180,
+                       "-o", "pictures/p.png")
+    assert (code, err) == (0, "")
+    plots = {f"results/beam-{what}.png" for what in
+             ("modes", "history", "phase", "contact", "energies")}
+    assert plots <= files_below(tmp_path)
+    assert not [name for name in files_below(tmp_path) if ".part" in name]
+
+
+def test_results_go_to_the_folder_asked_for(cli, study, tmp_path):
+    assert cli("run", study, "-o", "a/b")[0] == 0
+    assert "a/b/tiny.vtkhdf" in files_below(tmp_path)
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_run_that_is_up_to_date_is_drawn_without_a_note(cli, study, tmp_path):
+    assert cli("run", study)[0] == 0
+    study.write_text(TINY.replace("frames = 2", "frames = 1"))
+    code, _, err = cli("render", study)
+    assert (code, err) == (0, "")
+
+
+def test_steep_ground_is_noted(cli, study):
+    _, out, _ = cli("run", study, "--set", "ground.amplitude=1e-4", "--set",
+                    "ground.wavelength=1e-3")
+    assert "slope reaches 0.63; above 0.3" in out
+
+
+@pytest.mark.parametrize("shape", ["beam", "pendulum", "block"])
+def test_init_writes_every_shape_and_never_overwrites(cli, shape, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli("init", "--shape", shape)[0] == 0
+    text = (tmp_path / "study.toml").read_text()
+    assert tomllib.loads(text)["geometry"]["shape"] == shape
+    assert text.startswith("# ")
+    (tmp_path / "study.toml").write_text("mine")
+    code, _, err = cli("init", "--shape", shape)
+    assert code == 1
+    assert "study.toml exists" in err
+    assert (tmp_path / "study.toml").read_text() == "mine"
+    assert cli("init", "--force")[0] == 0
+    assert (tmp_path / "study.toml").read_text() != "mine"
+
+
+MISTAKES = [
+    (["run", "tyni.toml"], "tyni.toml does not exist (did you mean 'tiny.toml'?)"),
+    (["run", "bad.toml"], "bad.toml is not valid TOML"),
+    (["run", "."], "cannot be read as a study"),
+    (["run", "tiny.toml", "--set", "ground.sped=1"], "did you mean 'speed'"),
+    (["run", "tiny.toml", "--set", "ground.speed=fast"], 'speed = "fast" must be a number.'),
+    (["run", "tiny.toml", "--set", "ground.speed"], "must have the form KEY=VALUE"),
+    (["run", "tiny.toml", "--set", "basis.contact=botom"], "no boundary named 'botom'"),
+    (["modes", "tiny.toml", "--set", "basis.modes=9999"], "number of unknowns"),
+    (["run", "tiny.toml", "--set", "basis.contact_nodes=999"], "contact_nodes = 999"),
+    (["run", "tiny.toml", "-o", "tiny.toml/x"], "The folder tiny.toml/x cannot be written"),
+    (["run", "tiny.toml", "-o", "tiny.toml"], "The folder tiny.toml cannot be written"),
+    (["mesh", "tiny.toml", "--set", "body.youngs_modulus=-1"], "youngs_modulus = -1"),
+    (["mesh", "tiny.toml", "--set", "body.density=-1"], "density = -1.0 must be"),
+    (["mesh", "tiny.toml", "--set", "body.thickness=-1"], "thickness = -1.0 must be"),
+    (["mesh", "tiny.toml", "--set", "normal.roughness_height=-1"], "roughness_height = -1.0"),
+    (["mesh", "text.toml"], "no complete section"),
+    (["mesh", "solid.toml"], "solid"),
+    (["mesh", "absent.toml"], "there is no such file"),
+    (["run", "tiny.toml", "--set", "simulation.solver=euler"], "solver = 'euler' must be"),
+    (["render", "tiny.toml"], "run the study first: fecontact run tiny.toml"),
+    (["render", "none.vtkhdf"], "none.vtkhdf does not exist"),
+    (["render", "bad.toml"], "bad.toml is not valid TOML"),
+    (["render", "text.msh"], "text.msh is not an HDF5 file"),
+    (["export", "none.vtkhdf"], "none.vtkhdf does not exist"),
+    (["init", "study.txt"], "study.txt must end in .toml"),
+    (["init", "tiny.toml/x.toml"], "The folder tiny.toml cannot be written"),
+    (["demo", "tiny.toml/x"], "The folder tiny.toml/x cannot be written"),
+]
+
+
+@pytest.mark.parametrize(("tokens", "message"), MISTAKES, ids=lambda value: str(value)[:60])
+def test_mistakes_are_one_sentence_and_leave_nothing_behind(tokens, message, cli, study, tmp_path):
+    (tmp_path / "bad.toml").write_text("[ground]\nspeed = = 1\n")
+    (tmp_path / "text.msh").write_text("hello")
+    (tmp_path / "solid.msh").write_text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
+        "$EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n")
+    for name in ("text", "solid", "absent"):
+        (tmp_path / f"{name}.toml").write_text(f'[geometry]\nfile = "{name}.msh"\n')
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
+    code, _, err = cli(*tokens)
+    assert code == 1
+    assert err.startswith("error: ")
+    assert message in err
+    assert err.count("\n") == 1
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+
+
+def test_settings_of_a_movie_out_of_range(cli, study):
+    assert cli("run", study)[0] == 0
+    for option, message in ((["--fps", -1], "fps = -1.0 must be a number from 0.01"),
+                            (["--frames", 0], "frames = 0 must be at least 1"),
+                            (["--size", 5, 5], "must be an even width and height"),
+                            (["--t-start", 7], "no output time"),
+                            (["-o", "movie.avi"], "must end in .mp4")):
+        code, _, err = cli("render", "results/tiny.vtkhdf", *option)
+        assert code == 1
+        assert message in err
+
+
+@pytest.mark.parametrize("tokens", [["rnu"], ["run"], ["run", "a.toml", "--sett", "x=1"],
+                                    ["init", "--shape", "bem"], ["render", "a", "--fps", "many"]])
+def test_command_lines_that_cannot_be_understood(tokens, cli):
+    code, _, err = cli(*tokens)
+    assert code == 2
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+
+
+def test_debug_shows_where_an_error_comes_from(tmp_path):
+    with pytest.raises(ValueError, match="does not exist"):
+        execute(["--debug", "run", str(tmp_path / "none.toml")])
+
+
+def test_errors_that_should_not_happen_are_said_in_one_sentence(cli, study, monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(Study, "mesh", broken)
+    code, _, err = cli("mesh", study)
+    assert code == 1
+    assert "ZeroDivisionError" in err
+    assert "--debug" in err
+    assert err.count("\n") == 1
+
+
+def test_a_run_that_fails_is_written_and_reported(cli, study, monkeypatch):
+    whole = Study.run
+
+    def stopped(self, progress=None, checkpoint=None):
+        trajectory = whole(self, progress, checkpoint)
+        object.__setattr__(trajectory, "status", Status.FAILED)
+        return trajectory
+
+    monkeypatch.setattr(Study, "run", stopped)
+    code, out, err = cli("run", study)
+    assert code == 1
+    assert "did not reach its end" in err
+    assert "results/tiny.vtkhdf" in out
+    assert read_case("results/tiny.vtkhdf").trajectory.status is Status.FAILED
+
+
+def test_ctrl_c_while_drawing_leaves_nothing(cli, study, monkeypatch, tmp_path):
+    from fecontact.output.plots import run as plots
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plots, "plot_modes", interrupted)
+    code, _, err = cli("modes", study)
+    assert code == 130
+    assert err == "error: interrupted.\n"
+    assert files_below(tmp_path) == {"tiny.toml"}
+    assert not (tmp_path / "results").exists()
+
+
+def command(*tokens, **options):
+    return subprocess.run([sys.executable, "-m", "fecontact", *tokens], capture_output=True,
+                          text=True, check=False, timeout=120, **options)
+
+
+def test_ctrl_c_writes_what_was_computed(cli, study, tmp_path):
+    # Once before, so that everything is compiled.
+    assert cli("run", study, "--set", "ground.amplitude=1e-5", "-o", tmp_path / "before")[0] == 0
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fecontact", "run", str(study), "--set", "simulation.t_end=1e5",
+         "--set", "simulation.outputs=100001", "--set", "ground.amplitude=1e-5"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts)
+    # The folder is made when everything is loaded; the run begins right after.
+    deadline = time.monotonic() + 90
+    while not (tmp_path / "results").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(5.0)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err
+    assert "The run was interrupted" in out
+    case = read_case(tmp_path / "results/tiny.vtkhdf")
+    assert case.trajectory.status is Status.INTERRUPTED
+    assert 0.0 < case.trajectory.time[-1] < 1e5
+
+
+def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
+    from fecontact.integrate.rodas5p.run import Run
+
+    longer = ("--set", "simulation.t_end=0.05", "--set", "simulation.outputs=101")
+    assert cli("run", study, "--resume")[0] == 1
+    assert cli("run", study, *longer, "--output", tmp_path / "whole")[0] == 0
+    whole = read_case(tmp_path / "whole" / "tiny.vtkhdf").trajectory
+    advance, calls = Run.advance, []
+
+    def interrupted(self, steps):
+        calls.append(steps)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return advance(self, 100)
+
+    monkeypatch.setattr(Run, "advance", interrupted)
+    code, out, _ = cli("run", study, *longer)
+    assert code == 130
+    assert "interrupted" in out
+    part = read_case("results/tiny.vtkhdf").trajectory
+    assert 0.0 < part.time[-1] < 0.05
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert cli("run", study, *longer, "--resume")[0] == 0
+    resumed = read_case("results/tiny.vtkhdf").trajectory
+    assert (resumed.states == whole.states).all()
+    assert (resumed.friction_work == whole.friction_work).all()
+    assert not (tmp_path / "results" / "tiny.checkpoint").exists()
+
+
+def test_help_comes_at_once_and_version_is_said():
+    begin = time.perf_counter()
+    done = command("--help")
+    assert time.perf_counter() - begin < 2.0  # 0.2 s on a machine with nothing else to do
+    assert done.returncode == 0
+    assert "wavy ground" in done.stdout
+    loaded = subprocess.run(
+        [sys.executable, "-c", "import sys, fecontact.cli; print(*sys.modules)"],
+        capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numpy", "numba", "scipy", "skfem", "gmsh", "vtk", "matplotlib"} & set(loaded)
+    assert command("--version").stdout.strip().count(".") == 2
+    failed = command("run", "none.toml")
+    assert (failed.returncode, failed.stdout) == (1, "")
+    assert failed.stderr == "error: none.toml does not exist.\n"
+
+
+def test_output_into_a_pipe_that_closes(study):
+    done = subprocess.run(f"{sys.executable} -m fecontact --help | true", shell=True,
+                          capture_output=True, text=True, check=False)
+    assert "Traceback" not in done.stderr
+
+
+def test_doctor_finds_this_computer_well(cli):
+    code, out, err = cli("doctor")
+    assert (code, err) == (0, "")
+    assert "All is well." in out
+    for name in ("numpy", "gmsh", "pictures (VTK)", "movies (ffmpeg)", "libGL.so.1"):
+        assert name in out
+
+
+def test_doctor_says_what_to_install(cli, monkeypatch):
+    monkeypatch.setattr(examination, "_attempt", lambda code: "it is broken")
+    monkeypatch.setattr(system_libraries, "PACKAGES", {"libnowhere.so.7": "libnowhere7"})
+    monkeypatch.setattr(system_libraries.shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(system_libraries.os, "geteuid", lambda: 1000)
+    code, out, _ = cli("doctor")
+    assert code == 1
+    assert "it is broken" in out
+    assert "To repair: sudo apt-get install -y --no-install-recommends libnowhere7" in out
+
+
+def test_completion_makes_bash_complete_commands_options_and_choices(cli, tmp_path):
+    code, script, _ = cli("completion", "bash")
+    assert code == 0
+    (tmp_path / "completion.sh").write_text(script)
+
+    def completed(*words):
+        ask = (f"source completion.sh; complete -p fecontact >/dev/null || exit 1; "
+               f"COMP_WORDS=({' '.join(words)}); COMP_CWORD={len(words) - 1}; "
+               f'_fecontact; echo "${{COMPREPLY[@]}}"')
+        done = subprocess.run(["bash", "-c", ask], cwd=tmp_path, capture_output=True, text=True,
+                              check=True)
+        return done.stdout.split()
+
+    assert completed("fecontact", "mo") == ["modes"]
+    assert completed("fecontact", "export", "--fo") == ["--format"]
+    assert "csv" in completed("fecontact", "export", "x.toml", "--format", "''")
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish", "powershell"])
+def test_completion_names_every_command_to_the_shell(cli, shell):
+    code, script, _ = cli("completion", shell)
+    assert code == 0
+    for command in ("init", "mesh", "modes", "run", "sweep", "branch", "completion"):
+        assert command in script
+
+
+def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
+    from fecontact.cli import demo
+
+    full = demo.template
+
+    def small(shape):
+        study = Study.from_toml(full(shape)).with_(**{
+            "simulation.t_end": 2e-3, "simulation.outputs": 21, "output.frames": 2,
+            "render.frames": 1, "render.t_start": 0.0, "render.t_end": 1.0,
+            "render.size": [320, 180]})
+        return study.to_toml()
+
+    monkeypatch.setattr(demo, "template", small)
+    code, out, err = cli("demo", tmp_path / "d")
+    assert code == 0, err
+    assert "total" in out
+    assert files_below(tmp_path / "d") == {
+        f"{name}{end}" for name in ("beam_on_wavy_ground", "pendulum_on_stop")
+        for end in (".toml", ".msh", ".vtkhdf", ".mp4", "-modes.png", "-history.png",
+                    "-phase.png", "-contact.png", "-energies.png")}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the script is for Linux")
+def test_script_for_system_libraries_agrees_with_the_doctor():
+    from pathlib import Path
+
+    script = Path(__file__).parents[2] / ".ci" / "system-libraries"
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
+                          check=False, env=os.environ | {"PATH": ""})
+    assert done.returncode == (1 if system_libraries.missing() else 0)

@@ -1,0 +1,75 @@
+"""What is refused, and what succeeds, where input is unusual."""
+
+import numpy as np
+import pytest
+from systems import friction_oscillator, impact_oscillator
+
+from fecontact import (
+    Axis,
+    ContactEvents,
+    Event,
+    InputError,
+    basins,
+    brute_force,
+    contact_field,
+    equilibrium_branch,
+    event,
+    plot_branches,
+)
+from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.cli.plot_kinds import Choice, point_of
+from fecontact.core.errors import AnalysisError
+
+
+def plane(t, y, p):
+    return y[0] - p[0]
+
+
+@pytest.mark.parametrize(("make", "names"), [
+    (lambda: Event(plane, [0.0]), "kernel = .*@fecontact.event"),
+    (lambda: Event(event(plane), "a"), "parameters = 'a'"),
+    (lambda: Event(event(plane), [np.nan]), r"parameters = \[nan\]"),
+    (lambda: event(None), "not None"),
+    (lambda: ContactEvents(stop=None), "stop = None"),
+    (lambda: Axis("B", "q"), "axis = 'q'"),
+    (lambda: Axis("B", "y", "speed"), "of = 'speed'"),
+    (lambda: Choice(highest_hz=-5.0), "highest = -5.0"),
+    (lambda: Choice(highest_hz=np.nan), "highest = nan"),
+    (lambda: point_of("nan,0.1"), "nan,0.1"),
+    (lambda: brute_force(impact_oscillator(), "drive.angular_frequency", "abc"), "values must be"),
+])
+def test_refused(make, names):
+    with pytest.raises(InputError, match=names):
+        make()
+
+
+@pytest.mark.parametrize("bounds", [(1.0, 2.0, 3.0), "ab", 1.0, (2.0, 1.0)])
+def test_bounds_of_branches(bounds):
+    with pytest.raises(InputError, match=r"bounds = .* must be two values"):
+        Settings(bounds=bounds)
+
+
+def test_no_branch_to_draw(tmp_path):
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot_branches([], tmp_path / "none.png")
+
+
+@pytest.mark.parametrize(("first", "names"), [
+    (None, "first = None"),
+    ((Axis("B", "y"), []), "list of finite values"),
+    ((Axis("B", "y"), [np.nan, 0.0]), "list of finite values"),
+    ((Axis("B", "x"), [0.0, 1e-3]), "each by itself"),
+    ((Axis("B", "y", "velocity"), [0.0, 1e-3]), "each by itself"),
+])
+def test_planes_of_basins_that_no_start_lies_on(first, names):
+    with pytest.raises(InputError, match=names):
+        basins(impact_oscillator(modes=2), first, (Axis("B", "y", "velocity"), [0.0, 0.02]),
+               transient_periods=10)
+
+
+def test_branches_do_not_switch_a_drive_on():
+    """Steady sliding exists without the drive alone; its amplitude is no parameter of it."""
+    system = friction_oscillator(2).with_(**{"drive.amplitude_x": 0.0, "ground.speed": 0.02})
+    field = contact_field(system, ["drive.amplitude_x"])
+    with pytest.raises(AnalysisError, match=r"drive.amplitude_x = 0"):
+        equilibrium_branch(field, "drive.amplitude_x", bounds=(0.0, 1.0))

@@ -1,0 +1,215 @@
+"""Events located in time: closed forms of drops, decays and stick-slip; stops; users' events."""
+
+import numpy as np
+import pytest
+from systems import basis, friction_oscillator, impact_oscillator
+
+from fecontact import (
+    ContactEvents,
+    ContactSystem,
+    Crossing,
+    Event,
+    InputError,
+    JenkinsFriction,
+    LinearContact,
+    Load,
+    Rodas5P,
+    Scipy,
+    Status,
+    event,
+    read_case,
+    simulate,
+    write_case,
+)
+from fecontact.integrate.rodas5p.checkpoint import Checkpoint
+
+
+def drop():
+    """SDND108: mass 1, gravity 10, a spring of 100 whose top lies 2 below the start."""
+    shape = np.array([[0.0], [1.0]])
+    return ContactSystem(basis([0.0], [0.0], shape, shape), normal=LinearContact(100.0, 0.0),
+                         load=Load(10.0), gap=2.0)
+
+
+START = np.array([0.0, -1.0])
+
+
+def test_drop_on_a_spring():
+    run = simulate(drop(), 1.1, initial=START, outputs=3, events=ContactEvents(), rtol=1e-10)
+    assert run.events.only("touch-down").time == pytest.approx([0.54031242374328], abs=1e-9)
+    assert run.events.only("lift-off").time == pytest.approx([0.88545615307643], abs=1e-9)
+    assert run.events.states[0, 0] == pytest.approx(-2.0, abs=1e-8)
+    assert (run.events.node == 0).all()
+    assert run.status is Status.FINISHED
+    # Frictionless: x never moves, so the node sticks while it touches.
+    assert run.events.kind == ("touch-down", "stick", "lift-off")
+
+
+@pytest.mark.parametrize(("stop", "when"), [
+    ("touch-down", 0.54031242374328), ("lift-off", 0.88545615307643)])
+def test_a_run_stops_at_an_event(stop, when):
+    run = simulate(drop(), 1.1, initial=START, outputs=111, events=ContactEvents(stop=stop),
+                   rtol=1e-10)
+    assert run.status is Status.EVENT
+    assert run.time[-1] == pytest.approx(when, abs=1e-9)
+    assert run.events.time[-1] == run.time[-1]
+    assert run.states[-1] == pytest.approx(run.events.states[-1])
+    assert len(run.time) == 2 + int(when / 0.01)
+    assert run.energies.imbalance < 1e-8
+    whole = simulate(drop(), 1.1, initial=START, outputs=111, rtol=1e-10)
+    assert run.states[:-1] == pytest.approx(whole.states[: len(run.time) - 1], abs=1e-9)
+
+
+def test_turning_points_are_crossings():
+    """Free fall from 1 m/s upwards is highest after 0.1 s, 0.05 m higher."""
+    top = Crossing("B", "y", of="velocity", direction="falling")
+    run = simulate(drop(), 0.5, initial=np.array([0.0, 1.0]), events=top, rtol=1e-10)
+    assert run.events.time == pytest.approx([0.1], abs=1e-10)
+    assert run.events.states[0] == pytest.approx([0.05, 0.0], abs=1e-9)
+    assert run.events.kind == ("event 0",)
+    assert run.events.node.tolist() == [-1]
+    rising = Crossing("B", "y", of="velocity", direction="rising")
+    assert len(simulate(drop(), 0.5, initial=np.array([0.0, 1.0]), events=rising).events) == 0
+
+
+@event
+def _energy(t, y, p):
+    return 0.5 * y[1] ** 2 - p[0]
+
+
+def test_own_events():
+    """Free fall with 10 m/s2 from rest: 2 J of kinetic energy at t = 0.2 s."""
+    run = simulate(drop(), 0.5, initial=np.zeros(2), rtol=1e-10,
+                   events=[Event(_energy, [2.0], stop=True), Crossing("B", "y", value=-0.05)])
+    assert run.events.kind == ("event 1", "event 0")
+    assert run.events.time == pytest.approx([0.1, 0.2], abs=1e-10)
+    assert run.status is Status.EVENT
+
+
+def test_stick_and_slip_of_the_belt_oscillator():
+    """Without excitation, constant normal force: period 1.264348 s of the smoothed law."""
+    system = friction_oscillator(2, **{"drive.amplitude_x": 0.0})
+    run = simulate(system, 9.0, outputs=90001, events=ContactEvents(), rtol=1e-8)
+    slips, sticks = run.events.only("slip").time, run.events.only("stick").time
+    assert np.diff(slips)[2:] == pytest.approx(1.264348, rel=1e-4)
+    assert np.diff(sticks)[2:] == pytest.approx(1.264348, rel=1e-4)
+    state = run.contact_state[:, 0]
+    changed = np.flatnonzero(np.diff(state) != 0)
+    found = run.events.time[[kind in ("stick", "slip") for kind in run.events.kind]]
+    found = found[found > 0.0]
+    assert len(found) == len(changed)
+    assert (run.time[changed] <= found).all()
+    assert (found <= run.time[changed + 1]).all()
+
+
+def test_friction_with_memory_by_the_same_definition_as_plots():
+    system = friction_oscillator(2, friction=JenkinsFriction(2e5, 0.4))
+    run = simulate(system, 1.5, outputs=30001, events=ContactEvents(), rtol=1e-7)
+    state = run.contact_state[:, 0]
+    changed = np.flatnonzero(np.diff(state) != 0)
+    found = run.events.time[1:] if run.events.time[0] == 0.0 else run.events.time
+    assert len(changed) > 5
+    assert len(found) == len(changed)
+    assert (run.time[changed] <= found + 1e-9).all()
+    assert (found <= run.time[changed + 1] + 1e-9).all()
+
+
+def test_many_impacts_fill_the_table_more_than_once():
+    """Chatter: hundreds of events, each touch-down followed by a lift-off of the same node."""
+    system = impact_oscillator(2, 9.845)
+    run = simulate(system, 12.0, initial=np.zeros(4), events=ContactEvents())
+    assert len(run.events) > 300
+    assert (np.diff(run.events.time) >= 0.0).all()
+    down, up = run.events.only("touch-down", node=0).time, run.events.only("lift-off").time
+    count = min(len(down), len(up))
+    assert (down[:count] < up[:count]).all()
+    assert (up[: count - 1] < down[1:count]).all()
+    plain = simulate(system, 12.0, initial=np.zeros(4))
+    assert (plain.states == run.states).all()
+
+
+def test_events_are_stored(tmp_path):
+    run = simulate(impact_oscillator(2), 0.5, initial=np.zeros(4), events=ContactEvents())
+    stored = read_case(write_case(tmp_path / "run.h5", run)).trajectory.events
+    assert len(stored) > 5
+    assert (stored.time == run.events.time).all()
+    assert stored.kind == run.events.kind
+    assert (stored.node == run.events.node).all()
+    assert (stored.states == run.events.states).all()
+
+
+def test_bad_input():
+    with pytest.raises(InputError, match="'touchdown' must be one of"):
+        ContactEvents(stop="touchdown")
+    with pytest.raises(InputError, match="axis = 'z'"):
+        Crossing("B", "z")
+    with pytest.raises(InputError, match="direction = 'up'"):
+        Crossing("B", "x", direction="up")
+    with pytest.raises(InputError, match="value = nan"):
+        Crossing("B", "x", value=float("nan"))
+    with pytest.raises(InputError, match="events: 'touch-down' must be"):
+        simulate(drop(), 1.0, initial=START, events=["touch-down"])
+    with pytest.raises(InputError, match=r"Rodas5P\(\) alone, not by Scipy\(method='Radau'\)"):
+        simulate(drop(), 1.0, initial=START, events=ContactEvents(),
+                 solver=Scipy("Radau"))
+
+
+def test_events_survive_a_checkpoint(tmp_path):
+    """A run that is interrupted and taken up again finds the same events."""
+    system, file = impact_oscillator(2, 9.845), tmp_path / "run.checkpoint"
+    whole = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents())
+
+    def stop(time):
+        if time > 5.0:
+            raise KeyboardInterrupt
+
+    part = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(),
+                    solver=Rodas5P(file), progress=stop)
+    assert part.status is Status.INTERRUPTED
+    rest = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(),
+                    solver=Rodas5P(file))
+    assert 0 < len(part.events) < len(whole.events)
+    assert (rest.events.time == whole.events.time).all()
+    assert rest.events.kind == whole.events.kind
+    assert (rest.events.states == whole.events.states).all()
+    assert (rest.states == whole.states).all()
+
+
+def test_kinds_and_functions_that_are_no_events_are_named():
+    run = simulate(drop(), 1.0, initial=np.zeros(2), events=ContactEvents())
+    with pytest.raises(InputError, match=r"kind = 'touchdown' must be one of 'lift-off', "):
+        run.events.only("touchdown")
+    assert len(run.events.only("event 0")) == 0
+
+    @event
+    def root(t, y, p):
+        return np.sqrt(0.5 - t)
+
+    with pytest.raises(InputError, match=r"'event 0' is not a finite number before t = "):
+        simulate(drop(), 1.0, initial=np.zeros(2), events=Event(root))
+
+
+def test_more_events_than_steps_of_a_piece(tmp_path, monkeypatch):
+    """80,000 turning points of a fast oscillator fill the table of events hundreds of times.
+
+    Progress is told, and the checkpoint is kept, all along.
+    """
+    monkeypatch.setattr(Checkpoint, "keep", Checkpoint.write)
+    shape = np.array([[0.0], [1.0]])
+    system = ContactSystem(basis([1000.0], [0.0], shape, shape), normal=LinearContact(1.0),
+                           gap=10.0)
+    file, told = tmp_path / "run.checkpoint", []
+
+    def tell(time):
+        told.append((time, file.exists()))
+
+    run = simulate(system, 40.0, initial=np.array([1e-3, 0.0]), outputs=3, rtol=1e-5,
+                   events=[Crossing("B", "y", of="velocity"), ContactEvents()], progress=tell,
+                   solver=Rodas5P(file))
+    assert run.status is Status.FINISHED
+    assert len(run.events.only("event 0")) in (79_999, 80_000, 80_001)
+    times = [time for time, _ in told]
+    assert len(times) > 3
+    assert (np.diff(times) > 0.0).all()
+    assert all(there for _, there in told[1:])
+    assert not file.exists()

@@ -1,0 +1,130 @@
+"""Figures of spectra, sections, friction work and receptances show the numbers they stand for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import basis, run
+
+from fecontact.analysis.frequency_response import frequency_response
+from fecontact.cli import execute, plot_kinds
+from fecontact.core.errors import InputError
+from fecontact.integrate.simulate import simulate
+from fecontact.laws.excitation import Drive
+from fecontact.output.files.case import write_case
+from fecontact.output.plots import analysis
+
+
+@pytest.fixture(scope="module")
+def trajectory():
+    return run(basis(contact_nodes=4), times=2001)
+
+
+def test_window_counts_from_its_own_start(trajectory):
+    part = trajectory.between(0.005, 0.015)
+    assert (part.time[0], part.time[-1]) == pytest.approx((0.005, 0.015))
+    np.testing.assert_array_equal(part.normal_force, trajectory.normal_force[500:1501])
+    assert not part.work[0].any()
+    np.testing.assert_allclose(part.friction_work[-1], trajectory.friction_work[1500]
+                               - trajectory.friction_work[500], rtol=1e-9, atol=1e-18)
+    assert len(trajectory.between().time) == 2001
+    with pytest.raises(InputError, match="fewer than two output times"):
+        trajectory.between(0.03)
+
+
+def test_window_of_a_run_keeps_its_balance():
+    from systems import DRIVEN, beam
+
+    whole = simulate(beam(**DRIVEN), 0.01, outputs=401)
+    part = whole.between(0.004)
+    assert part.energies.imbalance < 2e-5
+    np.testing.assert_allclose(part.friction_work.sum(axis=1), part.energies.friction,
+                               rtol=1e-6, atol=1e-12)
+
+
+def test_spectrum_shows_peaks_in_suitable_units(trajectory):
+    q = trajectory.modal_coordinates.copy()
+    q[:, 0] = 1e-5 * np.sin(2.0 * np.pi * 2000.0 * trajectory.time)
+    q[:, 1:] = 0.0
+    swinging = replace(trajectory, modal_coordinates=q)
+    panel = analysis.spectrum_figure(swinging, "displacement", 1, "x").axes[0]
+    assert panel.get_ylabel() == "amplitude [µm]"
+    assert panel.get_title() == "displacement x of contact node 1"
+    assert panel.lines[0].get_ydata().max() == pytest.approx(10.0, rel=1e-2)
+    assert [float(text.get_text()) for text in panel.texts] == pytest.approx([2000.0], rel=1e-3)
+    density = analysis.spectrum_figure(trajectory, density=True)
+    assert density.axes[0].get_ylabel() == "density [(m/s)²/Hz]"
+
+
+def test_friction_work_per_length(trajectory):
+    upper, lower = analysis.friction_work_figure(trajectory).axes
+    length = trajectory.system.basis.tributary
+    heights = np.array([bar.get_height() for bar in upper.patches])
+    scale = {"mJ/m": 1e-3, "µJ/m": 1e-6, "J/m": 1.0}[upper.get_ylabel().split("[")[1][:-1]]
+    np.testing.assert_allclose(heights * scale, trajectory.friction_work[-1] / length)
+    slip = np.trapezoid(np.abs(trajectory.slip_velocity) * (trajectory.normal_force > 0.0),
+                        trajectory.time, axis=0)
+    ratio = np.array([bar.get_height() for bar in lower.patches]) / slip
+    np.testing.assert_allclose(ratio, ratio[0])
+
+
+def test_poincare_section_takes_one_point_a_period(trajectory):
+    figure = analysis.poincare_figure(trajectory, "B", "x", period=0.005)
+    points = figure.axes[0].lines[1]
+    times = np.arange(5) * 500
+    x = trajectory.displacement("B")[times, 0]
+    np.testing.assert_allclose(points.get_xdata() * 1e-6, x, atol=1e-12)
+    assert figure.axes[0].get_title() == "B, 5 points"
+
+
+def test_response_figure_names_its_curves(trajectory):
+    body = trajectory.system.basis
+    f = np.linspace(10.0, 3000.0, 50)
+    one = frequency_response(body, f, [("B", "x")])
+    two = frequency_response(body, f, [("B", "x")], [("C", "y"), (2, "y")])
+    figure = analysis.response_figure([one, two], ["drive", "other"])
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert names == ["drive", "other, C y by B x", "other, contact node 2 y by B x"]
+    np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), np.abs(one.values[:, 0, 0]))
+    assert figure.axes[0].get_ylabel() == "receptance [m/N]"
+
+
+def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
+    system = trajectory.system.with_(drive=Drive(stiffness_x=1e5, amplitude_x=1e-5,
+                                                 angular_frequency=2.0 * np.pi * 200.0))
+    case = write_case(tmp_path / "beam.vtkhdf", simulate(system, 0.02, outputs=801), frames=0)
+    for kind in plot_kinds.KINDS:
+        assert execute(["plot", str(case), kind, "--t-start", "0.002"]) == 0
+        assert (tmp_path / f"beam-{kind}.png").read_bytes()[:4] == b"\x89PNG"
+    assert execute(["plot", str(case), "history", "--point", "C", "--point", "2", "-o",
+                    str(tmp_path / "two.svg")]) == 0
+    assert b"contact node 2" in (tmp_path / "two.svg").read_bytes()
+    capsys.readouterr()
+    assert execute(["plot", str(case), "spectrun"]) == 1
+    assert "no plot 'spectrun' (did you mean 'spectrum'?)" in capsys.readouterr().err
+    assert execute(["plot", str(case), "phase", "--point", "D"]) == 1
+    assert "There is no point 'D'" in capsys.readouterr().err
+
+
+def test_a_pendulum_is_drawn_across_the_ground(tmp_path):
+    """It has no motion along it: the drive's axis is the usual one, and zeros can be drawn."""
+    from systems import impact_oscillator
+
+    trajectory = simulate(impact_oscillator(w=64.32), 0.5, outputs=801)
+    for kind in ("phase", "spectrum", "spectrogram", "receptance"):
+        plot_kinds.redraw(trajectory, kind, tmp_path / f"{kind}.svg")
+    assert b"velocity y" in (tmp_path / "phase.svg").read_bytes()
+    for kind in ("spectrum", "spectrogram"):
+        plot_kinds.redraw(trajectory, kind, tmp_path / f"{kind}.png",
+                          plot_kinds.Choice("total_friction_force"))
+    with pytest.raises(InputError, match="B x does not move by a force at B x"):
+        plot_kinds.redraw(trajectory, "receptance", tmp_path / "none.png",
+                          plot_kinds.Choice(axis="x"))
+
+
+def test_points_of_a_command_line():
+    assert plot_kinds.point_of("B") == "B"
+    assert plot_kinds.point_of("12") == 12
+    assert plot_kinds.point_of("0.1,0.02") == (0.1, 0.02)
+    with pytest.raises(InputError, match="place x,y in m"):
+        plot_kinds.point_of("1,b")

@@ -1,0 +1,243 @@
+"""``fecontact sweep``: from a study file to a table and plots, and what it says."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sweep_study import Serial, write_study
+
+from fecontact import SweepTable, plot_sobol, plot_sweep, read_table, sweep
+from fecontact.cli import execute
+from fecontact.cli.commands import sweep as command
+from fecontact.cli.sweep_progress import clock, note
+from fecontact.core.errors import InputError
+from fecontact.sweep import executors, plots
+from fecontact.sweep.statistics import Estimate, SobolIndices
+
+SWEEP = """
+[sweep]
+summaries = ["amplitude_x", "stick_fraction", "own.py:failing"]
+[sweep.axes]
+ground.speed = { start = 1e-3, end = 4e-3, count = 8, spacing = "log" }
+friction.static_coefficient = [0.6, 0.7, 0.8]
+"""
+
+
+@pytest.fixture
+def cli(capsys, monkeypatch):
+    """Run a command line, sweeps in this process: exit code, stdout, stderr."""
+    monkeypatch.setattr(executors, "Processes", lambda count: executors.Pool(Serial()))
+
+    def run(*tokens):
+        code = execute([str(token) for token in tokens])
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        return code, said.out, said.err
+
+    return run
+
+
+def test_cases_beyond_the_limits_of_the_model_are_named(cli, tmp_path):
+    """14 N and 1.4 kN on 0.3e6 N/m: 9 and 900 roughness heights."""
+    study = write_study(tmp_path, """
+[sweep]
+summaries = ["stick_fraction"]
+[sweep.axes]
+load.normal = [14.0, 1400.0]
+""")
+    code, _, err = cli("sweep", study, "--set", "simulation.t_end=1e-3")
+    assert code == 0
+    assert err.startswith("warning: 1 of the cases leave the limits of the model")
+    assert "case 1: In this run contact node" in err
+    table = read_table(tmp_path / "results/small-sweep/index.csv")
+    assert [bool(one) for one in table.warnings] == [False, True]
+
+
+def test_a_sweep_of_a_study_file(cli, tmp_path):
+    study = write_study(tmp_path, SWEEP)
+    folder = tmp_path / "results/small-sweep"
+    code, out, err = cli("sweep", study, "--set", "simulation.t_end=0.05")
+    assert code == 0
+    assert "24 cases, 8 failed" in out
+    assert re.search(r"amplitude_x \[m\] +\d\.\d+e-05", out)
+    assert err == ("failed: cases 2, 5, 8, 11, 14, 17, 20, 23: ZeroDivisionError: a case that "
+                   "fails\n")
+    assert f"wrote {folder}/index.csv" in out
+    assert {path.name for path in folder.glob("*.png")} == {
+        "amplitude_x.png", "stick_fraction.png", "own-py-failing.png"}
+    code, out, err = cli("sweep", study, "--set", "simulation.t_end=0.05")
+    assert code == 1
+    assert err == (f"error: {folder} holds a sweep; go on with --resume (resume=True), begin anew "
+                   f"with --overwrite (overwrite=True), or choose another folder.\n")
+    assert cli("sweep", study, "--set", "simulation.t_end=0.05", "--resume")[0] == 0
+    assert len(read_table(folder / "index.csv")) == 24
+
+
+def test_drawn_samples_show_statistics_and_sensitivities(cli, tmp_path):
+    axes = """
+[sweep]
+summaries = ["friction_power"]
+method = "latin-hypercube"
+samples = 16
+[sweep.axes]
+"ground.speed" = { distribution = "uniform", low = 1e-3, high = 2e-3 }
+"load.normal" = { distribution = "normal", mean = 14.0, std = 1.0 }
+"""
+    study = write_study(tmp_path, axes)
+    code, out, _ = cli("sweep", study, "-o", tmp_path / "a")
+    assert code == 0
+    assert re.search(r"friction_power \[W\] +mean +-?\d\S* +-?\d\S* \.\.\. -?\d\S* *\n +std", out)
+    code, out, _ = cli("sweep", study, "-o", tmp_path / "b", "--set", "sweep.method=sensitivity")
+    assert code == 0
+    assert "64 cases, 0 failed" in out
+    assert re.search(r"ground\.speed +-?\d\.\d\d", out)
+    assert (tmp_path / "b/sensitivity.png").stat().st_size > 5000
+
+
+def test_what_goes_wrong_is_one_sentence(cli, tmp_path):
+    plain = write_study(tmp_path, name="plain.toml")
+    assert cli("sweep", plain)[2] == (f"error: {plain} has no section [sweep]; add one with the "
+                                      f"parameters that change in [sweep.axes].\n")
+    study = write_study(tmp_path, SWEEP)
+    code, _, err = cli("sweep", study, "--dask", "tcp://127.0.0.1:1", "--workers", 2)
+    assert (code, err.count("\n")) == (1, 1)
+    assert "leave it out with --dask" in err
+    code, _, err = cli("sweep", study, "--set", "sweep.axes={ground.spede=[1.0]}")
+    assert code == 1
+    assert "[ground] has no key 'spede' (did you mean 'speed'?)" in err
+    all_fail = write_study(tmp_path, """
+[sweep]
+summaries = ["own.py:failing"]
+[sweep.axes]
+friction.static_coefficient = [0.8, 0.9]
+""", name="bad.toml")
+    code, out, err = cli("sweep", all_fail)
+    assert code == 1
+    assert "2 cases, 2 failed" in out
+    assert err == "failed: cases 0, 1: ZeroDivisionError: a case that fails\n"
+
+
+def test_ctrl_c_says_how_to_go_on(cli, tmp_path, monkeypatch):
+    study = write_study(tmp_path, SWEEP)
+
+    class Interrupted(Serial):
+        def submit(self, *_, **__):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(executors, "Processes", lambda count: executors.Pool(Interrupted()))
+    code, _, err = cli("sweep", study)
+    assert code == 130
+    assert err == (f"Finished cases are kept in {tmp_path}/results/small-sweep; go on with "
+                   f"--resume.\nerror: interrupted.\n")
+
+
+def test_example_of_stick_and_slip(cli, tmp_path):
+    """Below ln(N (mu_0 - mu_inf) lambda / b) / lambda it sticks and slips, above it slides."""
+    code, _, _ = cli("sweep", Path(__file__).parents[2] / "examples/sweep_stick_slip.toml",
+                     "-o", tmp_path, "--set", 'sweep.axes={"ground.speed"=[6e-3, 11e-3], '
+                     '"friction.static_coefficient"=[0.7, 0.8]}')
+    assert code == 0
+    table = read_table(tmp_path / "index.csv")
+    assert (table.values["stick_fraction"][:2] > 0.2).all()
+    assert (table.values["amplitude_x"][2:] < 2e-6).all()
+    assert (table.values["stick_fraction"][2:] == 0.0).all()
+
+
+def test_rate_and_time_left():
+    assert note(0, 0, 100, 0, 3.0) == "starting"
+    assert note(60, 2, 100, 40, 10.0) == "2 cases/s, 0:20 left, 2 failed"
+    assert note(5, 0, 100, 0, 50.0) == "10 s a case, 15:50 left"
+    assert clock(7384.2) == "2:03:04"
+
+
+def grid_table():
+    speed, load = np.meshgrid(np.linspace(4.0, 1.0, 10), np.geomspace(1.0, 100.0, 9), indexing="ij")
+    power = (speed * load).ravel()
+    power[13] = np.nan
+    return SweepTable(
+        {"ground.speed": tuple(speed.ravel().tolist()),
+         "load.normal": tuple(load.ravel().tolist())},
+        {"friction_power": power}, [f"{k}" for k in range(90)],
+        ["" if k != 13 else "fell over" for k in range(90)], shape=(10, 9))
+
+
+def test_a_map_shows_each_case_in_its_place():
+    figure = plots.sweep_figure(grid_table(), "friction_power")
+    axes = figure.axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (
+        "ground speed [m/s]", "load normal [N]")
+    assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "log")
+    drawn = axes.collections[0].get_array()
+    x, y = np.linspace(1.0, 4.0, 10), np.geomspace(1.0, 100.0, 9)
+    assert drawn.shape == (9, 10)
+    assert drawn.mask.sum() == 1
+    assert drawn.mask[13 % 9, 9 - 13 // 9]
+    assert np.abs(drawn - y[:, None] * x).max() < 1e-9
+    corners = np.asarray(axes.collections[0].get_coordinates())
+    assert corners[0, :, 0] == pytest.approx(np.linspace(1.0 - 1.0 / 6.0, 4.0 + 1.0 / 6.0, 11))
+    assert corners[:, 0, 1] == pytest.approx(10.0 ** np.linspace(-0.125, 2.125, 10))
+
+
+def test_curves_scatter_and_names_on_axes():
+    grid = grid_table()
+    few = SweepTable(
+        {"friction.law": ("a", "b") * 5, "ground.speed": tuple(np.repeat(np.arange(5.0), 2))},
+        {"amplitude_x": np.arange(10.0)}, [f"{k}" for k in range(10)], [""] * 10, shape=(5, 2))
+    figure = plots.sweep_figure(few, "amplitude_x")
+    curves = [line for line in figure.axes[0].lines if len(line.get_xdata()) == 5]
+    assert [curve.get_label() for curve in curves] == ["a", "b"]
+    assert curves[1].get_ydata().tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
+    loose = SweepTable(grid.parameters, grid.values, grid.keys, grid.reasons)
+    figure = plots.sweep_figure(loose, "friction_power")
+    assert [axes.get_xlabel() for axes in figure.axes] == [
+        "ground speed [m/s]", "load normal [N]", "cases"]
+    assert figure.axes[2].patches
+
+
+def test_plots_of_sweeps_as_files(tmp_path):
+    table = grid_table()
+    assert plot_sweep(table, "friction_power", tmp_path / "m.png").stat().st_size > 5000
+    plot_sweep(table, "friction_power", tmp_path / "c.svg", over=["load.normal"])
+    with pytest.raises(InputError, match=r"no column 'friction_powr' \(did you mean"):
+        plot_sweep(table, "friction_powr", tmp_path / "x.png")
+    with pytest.raises(InputError, match=r"'ground\.speed' is a parameter of the sweep"):
+        plot_sweep(table, "ground.speed", tmp_path / "x.png")
+    one = Estimate(0.5, 0.4, 0.6)
+    found = SobolIndices({"a": one, "b": one}, {"a": one, "b": one}, 64)
+    assert plot_sobol({"f": found, "g": found}, tmp_path / "s.png").stat().st_size > 5000
+
+
+def test_names_of_files_are_safe():
+    assert command._file_name("own.py:f") == "own-py-f"
+    assert command._file_name("amplitude_x@B") == "amplitude_x-B"
+
+
+def test_a_script_without_main_guard_is_told(tmp_path):
+    """Worker processes import the script; unguarded it would start sweeps of its own."""
+    write_study(tmp_path)
+    (tmp_path / "script.py").write_text(
+        "import fecontact\n"
+        "fecontact.sweep('small.toml', {'ground.speed': [1e-3, 2e-3]}, workers=1)\n")
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True,
+                          text=True, timeout=180.0,
+                          env={**os.environ,
+                               "PYTHONPATH": str(Path(__file__).parents[2])})
+    assert done.returncode == 1
+    assert "must call sweep below if __name__ == '__main__'" in done.stderr.splitlines()[-1]
+
+
+def test_tables_that_are_none(tmp_path):
+    with pytest.raises(InputError, match="does not exist; run the sweep first"):
+        read_table(tmp_path / "index.csv")
+    (tmp_path / "x.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(InputError, match=r"x\.csv is not the table of a sweep"):
+        read_table(tmp_path / "x.csv")
+    (tmp_path / "f/shards").mkdir(parents=True)
+    (tmp_path / f"f/shards/{24 * 'a'}.json").write_text('{"rows": [{"case":')
+    with pytest.raises(InputError, match=r"a\.json is damaged; remove it, and its cases"):
+        sweep(write_study(tmp_path), {"ground.speed": [1.0]}, Serial(), folder=tmp_path / "f",
+              resume=True)

@@ -1,0 +1,82 @@
+"""Sweeps that keep states once per period: the published regimes, the numbers of ensembles."""
+
+import numpy as np
+import pytest
+from sweep_study import Serial, files_below
+from systems import impact_oscillator
+
+from fecontact import Study, plot_strobed, read_table, strobe, sweep
+from fecontact.core.errors import InputError
+from fecontact.integrate.initial_state import RigidStart
+
+STUDY = """
+geometry = { shape = "pendulum" }
+basis = { modes = 2, contact_nodes = 1 }
+normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
+simulation = { initial = { displacement = [0.0, 1e-4, 0.0] } }
+[drive]
+stiffness_y = 99.085
+damping_y = 0.02046
+amplitude_y = 0.47e-3
+angular_frequency = 64.32
+[sweep]
+strobe = { transient_periods = 120, keep = 48, axis = "y" }
+[sweep.axes]
+drive.angular_frequency = [64.32, 30.84, 37.41, 23.63]
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    """The impact oscillator of two modes, with a modal basis of numbers."""
+    study = Study.from_toml(STUDY, tmp_path / "impact.toml")
+    vars(study)["_basis"] = impact_oscillator().basis
+    return study
+
+
+def test_published_regimes_and_the_numbers_of_ensembles(study, tmp_path):
+    table = sweep(study, executor=Serial(), folder=tmp_path / "f")
+    # one, two, higher periodic (four in the two-mode model), chaotic
+    assert table.values["periods"].tolist() == [1.0, 2.0, 4.0, 0.0]
+    different = [len(np.unique(row.round(8))) for row in table.strobed]
+    assert different[:3] == [1, 2, 4]
+    assert different[3] > 40
+    system = study.with_(**{"drive.angular_frequency": 30.84}).system()
+    start = RigidStart(displacement=(0.0, 1e-4, 0.0))
+    alone = strobe(system, transient_periods=120, keep=48, initial=start)
+    found = table.strobed[1]
+    height = alone.states[0, :, :2] @ system.basis.T[0, 1]
+    assert np.abs(height - found).max() < 1e-4 * np.ptp(found)
+    again = read_table(tmp_path / "f/index.csv")
+    assert (again.strobed == table.strobed).all()
+    picture = plot_strobed(table, "drive.angular_frequency", tmp_path / "s.png")
+    assert picture.stat().st_size > 5000
+    one = sweep(study, {"drive.angular_frequency": [30.84]}, Serial(), folder=tmp_path / "one")
+    assert one.keys[0] == table.keys[1]
+    assert (one.strobed[0] == table.strobed[1]).all()
+
+
+def test_going_on_with_a_strobed_sweep(study, tmp_path):
+    axes = {"drive.angular_frequency": [64.32, 60.0, -1.0, 0.0]}
+    table = sweep(study, axes, Serial(), folder=tmp_path / "f", batch=1,
+                  strobe={"transient_periods": 2, "keep": 12, "axis": "y"})
+    assert list(table.failed) == [2, 3]
+    assert "Nothing excites the system in time" in table.failed[3]
+    assert np.isnan(table.strobed[2:]).all()
+    files = files_below(tmp_path / "f")
+    next((tmp_path / "f/shards").iterdir()).unlink()
+    sweep(study, axes, Serial(), folder=tmp_path / "f", batch=1, resume=True,
+          strobe={"transient_periods": 2, "keep": 12, "axis": "y"})
+    assert files_below(tmp_path / "f") == files
+
+
+def test_what_cannot_be_strobed(study, tmp_path):
+    with pytest.raises(InputError, match="strobe keeps no histories"):
+        sweep(study, summaries=["stick_fraction"], executor=Serial(), folder=tmp_path / "f")
+    with pytest.raises(InputError, match="keep = 0 must be from 1 to"):
+        sweep(study, strobe={"keep": 0}, executor=Serial(), folder=tmp_path / "f")
+    few = sweep(study, {"drive.angular_frequency": [60.0]}, Serial(), folder=tmp_path / "f",
+                strobe={"transient_periods": 0, "keep": 3, "axis": "y"})
+    assert np.isnan(few.values["periods"]).all()
+    assert few.strobed[0, 0] == pytest.approx(1e-4, rel=1e-12)  # the start itself
+    assert not few.failed
