@@ -1,14 +1,23 @@
-"""A branch of solutions, and its file."""
+"""A branch of solutions."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import require_kind
+from fecontact.bifurcation.continuation.points import (
+    BranchHeader,
+    BranchPoint,
+    CrossingPoint,
+    FoldPoint,
+    HopfPoint,
+    NeimarkSackerPoint,
+    PeriodDoublingPoint,
+    on_branch,
+)
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 
@@ -24,36 +33,6 @@ class Status(Enum):
     STALLED = ("The steps became too small to go on; what was computed until then is kept. Look "
                "whether the solution changes abruptly here, or start with smaller steps.")
     INTERRUPTED = "The continuation was interrupted; what was computed until then is kept."
-
-
-@dataclass(frozen=True, eq=False)
-class BranchPoint:
-    """One solution on a branch.
-
-    Attributes
-    ----------
-    u : (N + 1,) array
-        Unknowns, the parameter last.
-    tangent : (N + 1,) array
-        Direction of the branch.
-    values : mapping
-        What the problem stores of each solution, such as states and stability.
-    kind : str or None
-        What is special about the point: 'fold', 'Hopf', ...; None for the others.
-    details : mapping
-        What is known of a special point, such as its normal form.
-    """
-
-    u: Array
-    tangent: Array
-    values: Mapping[str, Any] = field(default_factory=dict)
-    kind: str | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def parameter(self) -> float:
-        """Value of the parameter."""
-        return float(self.u[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +59,11 @@ class Branch:
     message: str = ""
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        header = BranchHeader(self.name, self.attributes)
+        object.__setattr__(self, "points",
+                           tuple(on_branch(point, header) for point in self.points))
+
     def __len__(self) -> int:
         return len(self.points)
 
@@ -96,6 +80,18 @@ class Branch:
         """The special points."""
         return tuple(point for point in self.points if point.kind is not None)
 
+    @overload
+    def of_kind(self, kind: Literal["fold"]) -> tuple[FoldPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["Hopf"]) -> tuple[HopfPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["period doubling"]) -> tuple[PeriodDoublingPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["Neimark-Sacker"]) -> tuple[NeimarkSackerPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["branch point"]) -> tuple[CrossingPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: str) -> tuple[BranchPoint, ...]: ...
     def of_kind(self, kind: str) -> tuple[BranchPoint, ...]:
         """The special points of one kind."""
         return tuple(point for point in self.points if point.kind == kind)
@@ -117,9 +113,3 @@ class Branch:
         """The branch in the other direction."""
         turned = tuple(replace(point, tangent=-point.tangent) for point in self.points[::-1])
         return replace(self, points=turned)
-
-
-def require_on_branch(owner: str, branch: object, point: object) -> None:
-    """Raise :class:`InputError` unless these are a branch, and a point of one."""
-    require_kind(owner, Branch, branch=branch)
-    require_kind(owner, BranchPoint, point=point)

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.continuation.branch import Branch, Status
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED
 from fecontact.bifurcation.continuation.hairpin import rounded
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Linearisation, Problem, Settings
 from fecontact.bifurcation.continuation.special_points import between, located_between
 from fecontact.core.errors import FecontactError, InputError, require_finite

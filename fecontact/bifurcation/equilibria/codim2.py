@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.branches import default_scales
