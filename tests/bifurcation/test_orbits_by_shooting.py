@@ -50,7 +50,7 @@ def test_doubled_orbits_agree_with_collocation(two_masses):
     doubling, = orbits.of_kind("period doubling")
     near = max((at for at in orbits.points if at.parameter < 8.08), key=lambda at: at.parameter)
     motion = near.orbit(field, 2000)
-    shot = orbit_branch(field, motion, method=Shooting(), bounds=(7.5, 8.11), settings=FEW)
+    shot = orbit_branch(field, motion, "B", method=Shooting(), bounds=(7.5, 8.11), settings=FEW)
     found, = shot.of_kind("period doubling")
     assert found.parameter == pytest.approx(doubling.parameter, rel=1e-7)
     twice = orbit_branch(field, found, settings=FEW, bounds=(8.05, 8.12))
@@ -76,7 +76,7 @@ def test_events_agree_with_collocation(two_masses):
     wanted = (near.values["period"] + beyond.values["period"]) / 2.0
     settings = Settings(step=0.02, points=10, stop_at=["period"],
                         events={"period": lambda values: values["period"] - wanted})
-    places = [orbit_branch(field, near.orbit(field, 2000), method=method, bounds=(7.0, 8.3),
+    places = [orbit_branch(field, near.orbit(field, 2000), "B", method=method, bounds=(7.0, 8.3),
                            settings=settings).of_kind("period")[0].parameter
               for method in (Shooting(), Collocation(intervals=100))]
     assert near.parameter < places[0] < beyond.parameter
@@ -151,11 +151,11 @@ def test_orbits_in_another_phase_are_met_again(two_masses):
     later = np.concatenate([problem.at_phases(u, problem.mesh[:-1] + 0.217).reshape(-1), u[-2:]])
     assert np.abs(later - u)[:-2].max() > 0.1
     moved = replace(problem, reference=problem.starts(later)[0].copy())
-    again = moved.met_again(problem, u, tangent, later, tangent)
+    again = moved.met_again(problem, u, tangent, later, tangent, np.inf)
     assert np.abs(again - later).max() < 1e-6 * np.abs(later).max()
-    assert moved.met_again(problem, u, tangent, later, -tangent) is None
+    assert moved.met_again(problem, u, tangent, later, -tangent, np.inf) is None
     other, v, _ = restored_shooting(island(), branch.points[1])
-    beside = other.met_again(problem, u, tangent, v, tangent)
+    beside = other.met_again(problem, u, tangent, v, tangent, np.inf)
     assert np.sqrt(other.weights() @ (beside - v) ** 2) == pytest.approx(
         np.sqrt(other.weights() @ (u - v) ** 2), rel=1e-3)
 
@@ -172,7 +172,7 @@ def test_driven_orbits_a_period_of_the_drive_later_are_the_same():
     later = np.append(problem.at_phases(u, problem.mesh[:-1] + 0.5).reshape(-1), u[-1])
     sizes = np.ptp(motion.states, axis=0)
     assert (np.abs(later - u)[:-1].reshape(3, 4) / sizes).max() > 1e-3
-    again = problem.met_again(problem, u, tangent, later, tangent)
+    again = problem.met_again(problem, u, tangent, later, tangent, np.inf)
     assert (np.abs(again - later)[:-1].reshape(3, 4) / sizes).max() < 1e-9
 
 
