@@ -445,6 +445,7 @@ def names():
     body = ElasticBody(mesh)
     basis = modal_basis(body, 5, contact_nodes=4)
     system = fecontact.ContactSystem(basis, fecontact.RoughSurface(0.3e6, 5.2e-6, 6.0),
+                                     friction=fecontact.ConstantFriction(0.3),
                                      ground=fecontact.Ground(speed=0.1),
                                      load=fecontact.Load(normal=10.0))
     oscillator = friction_oscillator(2)
