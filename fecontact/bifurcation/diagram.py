@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import Settings, Status
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import observe

@@ -14,8 +14,8 @@ from systems_for_bifurcations import (
 from test_continuation import CUBIC
 
 from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.fields.function_field import vector_field

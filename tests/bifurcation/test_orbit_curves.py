@@ -162,7 +162,7 @@ def test_strong_resonances():
 
 def test_kind_errors(masses):
     field, branch = masses
-    with pytest.raises(InputError, match="'a regular point'; curves start at 'fold'"):
+    with pytest.raises(InputError, match="starts no curve; curves start at 'fold'"):
         orbit_curve(field, branch.points[3], "v0")
     fold, = branch.of_kind("fold")
     with pytest.raises(InputError, match="no parameter 'speed'"):

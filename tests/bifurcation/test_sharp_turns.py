@@ -9,8 +9,8 @@ from test_continuation import Plane
 
 from fecontact import simulate
 from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.orbits.branches import Collocation, Shooting, orbit_branch

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.points import BranchPoint, CrossingPoint
 from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
+    default_scales,
     find_equilibrium,
     require_autonomous,
 )
-from fecontact.bifurcation.equilibria.problem import EquilibriumProblem
-from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.equilibria.problem import EquilibriumProblem, equilibrium_at
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import InputError, require_finite
 from fecontact.core.types import Array
@@ -95,7 +95,7 @@ def equilibrium_branch(
     if isinstance(start, BranchPoint):
         known = start.branch.parameter_name
         parameter = known if parameter is None else parameter
-        begin = _at_point(field, start)
+        begin = equilibrium_at(field, start)
         if parameter == known:
             crossed = start if isinstance(start, CrossingPoint) else None
             tangent = np.copysign(1.0, direction) * (
@@ -142,16 +142,6 @@ def _crossing(
     return replace(ends[-1], points=tuple(points))
 
 
-def _at_point(field: VectorField, point: BranchPoint) -> Equilibrium:
-    """The equilibrium at a point of a branch."""
-    values = point.parameter_values(field)
-    if point.is_orbit or len(point.u) != field.dimension + 1:
-        raise InputError(f"{point.place} is no equilibrium; take a point of a branch of "
-                         f"equilibria.")
-    require_autonomous(field, values)
-    return Equilibrium(field, values, np.ascontiguousarray(point.u[:-1]))
-
-
 def _start(field: VectorField, start: Equilibrium | ArrayLike | None) -> Equilibrium:
     if isinstance(start, Equilibrium):
         require_autonomous(field, start.values)
@@ -175,25 +165,6 @@ def _problem(
     sizes = default_scales(begin) if scales is None else sizes_of(scales, begin.state)[0]
     limits = _GROWTH * sizes if scales is None else None
     return EquilibriumProblem(field, begin.values, index, sizes, width, limits), chosen
-
-
-def default_scales(begin: Equilibrium) -> Array:
-    """Sizes (d,) of the states, for arclengths and differences.
-
-    Those of the field; for contact systems the largest displacement, and for velocities that
-    times the frequency of the least damped mode.
-    """
-    field = begin.field
-    if not isinstance(field, ContactField):
-        return field.state_scales(begin.values)
-    system = field.system(begin.values)
-    m = system.basis.modes
-    displacement = float(np.abs(begin.state[:m]).max()) or 1.0
-    modes = begin.modes
-    w = (float(np.abs(modes.eigenvalues[np.argmin(modes.damping_ratios)]))
-         if len(modes.eigenvalues) else 1.0)
-    return np.concatenate([np.full(m, displacement), np.full(m, w * displacement),
-                           system.memory_scales])
 
 
 def _attributes(field: VectorField, begin: Equilibrium) -> dict[str, Any]:

@@ -7,10 +7,17 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
-from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
-from fecontact.bifurcation.continuation.pseudo_arclength import follow, require_inside
+from fecontact.bifurcation.continuation.problem import (
+    Settings,
+    Status,
+    settings_of,
+    sizes_of,
+    width_of,
+)
+from fecontact.bifurcation.continuation.pseudo_arclength import require_inside
 from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, sharpened
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits import shooting_branches, starts

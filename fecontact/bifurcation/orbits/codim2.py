@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem, Settings, settings_of
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation

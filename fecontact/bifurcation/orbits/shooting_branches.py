@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
+from fecontact.bifurcation.continuation.problem import Settings, Status
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.mesh import interpolate

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import Settings, sizes_of, width_of
-from fecontact.bifurcation.equilibria.branches import default_scales
-from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
 from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
