@@ -28,7 +28,7 @@ from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.orbits.branches import orbits_from_hopf
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 
 AUTO = {50: 0.13, 100: 0.25, 200: 0.49}
 AUTO_POINTS = 139
@@ -76,15 +76,15 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
     if quick:
         repetitions = 1
     field = two_masses()
-    sliding = equilibrium_branch(field, "B", bounds=(0.3, 12.0))
+    sliding = equilibrium_branch(field, parameter="B", bounds=(0.3, 12.0))
     hopf = sliding.of_kind("Hopf")[0]
     print("intervals  points  CPU time  per point   AUTO per point   error of fold, doubling")
     for intervals in (50,) if quick else (50, 70, 100, 200):
         settings = Settings(step=0.002, largest_step=0.065, points=1000)
 
         def task(intervals: int = intervals, settings: Settings = settings) -> Branch:
-            return orbits_from_hopf(field, sliding, hopf, settings=settings, bounds=(0.3, 12.0),
-                                    intervals=intervals, scales=np.ones(4))
+            return orbit_branch(field, hopf, method=Collocation(intervals=intervals),
+                                settings=settings, bounds=(0.3, 12.0), scales=np.ones(4))
 
         if not quick:
             task()
@@ -97,11 +97,11 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
         print(f"{intervals:9}  {len(branch):6}  {seconds:6.3f} s  {each:6.2f} ms   {other}"
               f"   {fold:9.1e} {doubling:9.1e}")
     large = chain(20)
-    sliding = equilibrium_branch(large, "B", bounds=(0.1, 3.0))
+    sliding = equilibrium_branch(large, parameter="B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]
     settings = Settings(step=0.002, largest_step=0.02, points=3 if quick else 20)
-    seconds, branch = timed(lambda: orbits_from_hopf(
-        large, sliding, hopf, settings=settings, bounds=(0.1, 3.0), intervals=100), 1)
+    seconds, branch = timed(lambda: orbit_branch(large, hopf, method=Collocation(intervals=100),
+                                                 settings=settings, bounds=(0.1, 3.0)), 1)
     print(f"40 states, 100 intervals: {len(branch)} points, {seconds / len(branch):.3f} s a point")
 
 

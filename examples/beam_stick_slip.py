@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.bifurcation.continuation.branch import BranchPoint
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.integrate.initial_state import initial_state
 
@@ -48,7 +48,7 @@ def beam(speed: float = 0.05, nodes: int = 40, modes: int = 20) -> fc.ContactSys
 def sliding(lowest: float = 2e-3, highest: float = 0.5) -> fc.Branch:
     """Steady sliding over the speed of the belt, from fast to slow."""
     field = fc.contact_field(beam(highest), {SPEED: highest})
-    return fc.equilibrium_branch(field, SPEED, bounds=(lowest, highest), direction=-1.0,
+    return fc.equilibrium_branch(field, bounds=(lowest, highest), direction=-1.0,
                                  settings=Settings(step=5e-3, points=300))
 
 
@@ -62,19 +62,19 @@ def stuck(system: fc.ContactSystem) -> NDArray[np.float64]:
     return state
 
 
-def stick_slip(speed: float, transient: float = 2.0) -> fc.SettledMotion:
+def stick_slip(speed: float, transient: float = 2.0) -> fc.PeriodicMotion:
     """The motion on which a run that begins stuck settles."""
     system = beam(speed)
-    return fc.settled_motion(system, initial=stuck(system), transient=transient,
-                             longest_period=0.3, rtol=1e-7)
+    return fc.periodic_motion(system, initial=stuck(system), transient=transient,
+                              longest_period=0.3, rtol=1e-7)
 
 
-def orbits(motion: fc.SettledMotion, speed: float, bounds: tuple[float, float],
+def orbits(motion: fc.PeriodicMotion, speed: float, bounds: tuple[float, float],
            points: int = 100, both: bool = True) -> fc.Branch:
     """Stick-slip orbits by shooting from that of a run on, to slow and to fast belts."""
-    return fc.orbits_by_shooting(
-        fc.contact_field(beam(speed), {SPEED: speed}), SPEED, motion.times, motion.states,
-        period=motion.period, segments=1, rtol=1e-8, derivative_rtol=1e-2, bounds=bounds,
+    return fc.orbit_branch(
+        fc.contact_field(beam(speed), {SPEED: speed}), motion,
+        method=fc.Shooting(segments=1, rtol=1e-8, derivative_rtol=1e-2), bounds=bounds,
         scales=scales(motion), width=0.4, both=both, settings=settings(points))
 
 
@@ -85,11 +85,11 @@ def slipping(branch: fc.Branch, fastest: float, points: int = 200) -> fc.Branch:
     """
     field = fc.contact_field(beam(fastest), {SPEED: fastest})
     hopf, = branch.of_kind("Hopf")
-    return fc.orbits_from_hopf(field, branch, hopf, bounds=(2e-3, fastest), intervals=60,
-                               settings=Settings(step=0.01, largest_step=0.03, points=points))
+    return fc.orbit_branch(field, hopf, method=fc.Collocation(intervals=60), bounds=(2e-3, fastest),
+                           settings=Settings(step=0.01, largest_step=0.03, points=points))
 
 
-def scales(motion: fc.SettledMotion) -> NDArray[np.float64]:
+def scales(motion: fc.PeriodicMotion) -> NDArray[np.float64]:
     """What counts as one in the length of a step: all displacements alike, all velocities alike."""
     size = np.ptp(motion.states, axis=0) / 2.0
     modes = len(size) // 2
@@ -112,25 +112,25 @@ def amplitude(point: BranchPoint) -> float:
     return 500.0 * (float(values["observed_maximum"]) - float(values["observed_minimum"]))
 
 
-def run_amplitude(motion: fc.SettledMotion) -> float:
+def run_amplitude(motion: fc.PeriodicMotion) -> float:
     """The same of a run [mm]."""
     row = fc.contact_field(beam(), {}).displacement_row("B")
     return 500.0 * float(np.ptp(motion.states @ row))
 
 
-def side_by_side(branch: fc.Branch, speed: float) -> list[fc.SettledMotion]:
+def side_by_side(branch: fc.Branch, speed: float) -> list[fc.PeriodicMotion]:
     """Runs at a speed, begun on orbits before and behind the unstable part of the branch."""
     unstable = np.flatnonzero(~branch.column("stable").astype(bool))
     if len(unstable) == 0:
         return []
     parts = branch.points[: unstable[0]], branch.points[unstable[-1] + 1 :]
     starts = (min(part, key=lambda point: abs(point.parameter - speed)).u[:-2] for part in parts)
-    return [fc.settled_motion(beam(speed), initial=np.ascontiguousarray(start), transient=3.0,
-                              longest_period=0.3, rtol=1e-7) for start in starts]
+    return [fc.periodic_motion(beam(speed), initial=np.ascontiguousarray(start), transient=3.0,
+                               longest_period=0.3, rtol=1e-7) for start in starts]
 
 
 def draw(path: Path, stuck_slip: fc.Branch, free: fc.Branch, hopf: BranchPoint,
-         runs: list[tuple[float, fc.SettledMotion]]) -> None:
+         runs: list[tuple[float, fc.PeriodicMotion]]) -> None:
     """Amplitude and period over the speed of the belt: stable solid, unstable dashed, runs dots."""
     import matplotlib.pyplot as plt
 
@@ -166,7 +166,7 @@ def main(path: Path = Path("beam_stick_slip.png"), quick: bool = False) -> None:
     steady = sliding()
     hopf, = steady.of_kind("Hopf")
     print(f"Steady sliding is stable above {1e3 * hopf.parameter:.4f} mm/s; there a vibration of "
-          f"{hopf.details['frequency_hz']:.2f} Hz begins, {hopf.details['criticality']}.")
+          f"{hopf.frequency_hz:.2f} Hz begins, {hopf.criticality}.")
     first = stick_slip(0.05)
     branch = seen(orbits(first, 0.05, bounds=(0.025, 0.3), points=points, both=not quick))
     free = seen(slipping(steady, fastest=0.3, points=2 * points))

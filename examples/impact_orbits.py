@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.bifurcation.continuation.branch import BranchPoint
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import FecontactError
@@ -87,13 +87,12 @@ def orbits(
 ) -> fc.Branch:
     """The branch through the orbit on which a run at w settles, to both sides."""
     field = field_at(w)
-    motion = fc.settled_motion(
+    motion = fc.periodic_motion(
         field.system(), initial=np.zeros(4) if initial is None else initial,
         transient=None if initial is None else 2.0 * np.pi / w, longest_period=8 * 2.0 * np.pi / w)
-    return fc.orbits_by_shooting(
-        field, FREQUENCY, motion.times, motion.states, periods=motion.periods,
-        segments=motion.periods, bounds=bounds, both=True, rtol=RTOL,
-        scales=SIZE * np.ptp(motion.states, axis=0) / 2.0, width=WIDTH,
+    return fc.orbit_branch(
+        field, motion, method=fc.Shooting(segments=motion.periods, rtol=RTOL), bounds=bounds,
+        both=True, scales=SIZE * np.ptp(motion.states, axis=0) / 2.0, width=WIDTH,
         settings=Settings(step=1e-3, largest_step=0.01, points=points))
 
 
@@ -102,9 +101,8 @@ def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch 
     # Close to the single orbit the runs are not exact enough, far from it the guess is not.
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4):
         try:
-            return fc.doubled_by_shooting(
-                field_at(doubling.parameter), branch, doubling, bounds=(25.0, 80.0),
-                settings=Settings(step=step, largest_step=0.02, points=points))
+            return fc.orbit_branch(field_at(doubling.parameter), doubling, bounds=(25.0, 80.0),
+                                   settings=Settings(step=step, largest_step=0.02, points=points))
         except FecontactError as error:
             why = error
     print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {why}")

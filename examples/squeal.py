@@ -35,12 +35,12 @@ def main(folder: Path = Path(), quick: bool = False) -> tuple[fc.Branch, fc.Bran
     folder.mkdir(parents=True, exist_ok=True)
     columns, rows = (7, 5) if quick else (31, 29)
     field = fc.contact_field(system(), [FRICTION, "load.normal"])
-    branch = fc.equilibrium_branch(field, FRICTION, bounds=(0.0, 0.6))
+    branch = fc.equilibrium_branch(field, parameter=FRICTION, bounds=(0.0, 0.6))
     fc.plot_eigenvalues(branch, folder / "squeal_modes.png", x_label="friction coefficient",
                         range_hz=(300.0, 1200.0))
     hopf = branch.of_kind("Hopf")[0]
     print(f"flutter from a friction coefficient of {hopf.parameter:.4f} on, "
-          f"at {hopf.details['frequency_hz']:.1f} Hz, {hopf.details['criticality']}")
+          f"at {hopf.frequency_hz:.1f} Hz, {hopf.criticality}")
     modes = fc.find_equilibrium(field, {FRICTION: 0.55}).modes
     worst = int(np.argmin(modes.damping_ratios))
     print(f"at 0.55 a mode of {modes.frequencies_hz[worst]:.1f} Hz grows, "

@@ -38,8 +38,8 @@ from fecontact import (
 )
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.orbits.branches import orbits_beyond, orbits_from_hopf
-from fecontact.bifurcation.orbits.samples import amplitude, orbit_history
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbits.samples import amplitude
 from fecontact.output.plots.basins import plot_basins
 from fecontact.output.plots.bifurcation_diagram import plot_branches
 from fecontact.output.plots.style import COLOURS, new_figure, save_figure
@@ -77,21 +77,20 @@ def diagram_over_B() -> dict[str, Branch]:
     v_0 = 1, D = 0.1.
     """
     field, bounds = oscillator(B=0.3), (0.3, 10.0)
-    sliding = equilibrium_branch(field, "B", bounds=bounds)
+    sliding = equilibrium_branch(field, parameter="B", bounds=bounds)
     first_hopf, second_hopf = sliding.of_kind("Hopf")
     settings = Settings(step=0.005, largest_step=0.04)
-    orbits = orbits_from_hopf(field, sliding, first_hopf, settings=settings, bounds=bounds,
-                              intervals=100, scales=SMALL)
+    orbits = orbit_branch(field, first_hopf, method=Collocation(intervals=100), settings=settings,
+                          bounds=bounds, scales=SMALL)
     branches = {"steady sliding": sliding, "orbits": orbits}
     near = Settings(step=0.005, largest_step=0.03)
     for period in (2, 4, 8):
-        orbits = orbits_beyond(field, orbits, orbits.of_kind("period doubling")[0], settings=near,
-                               bounds=bounds if period == 2 else (8.0, 9.6),
-                               intervals=100 * min(period, 6))
+        orbits = orbit_branch(field, orbits.of_kind("period doubling")[0],
+                              method=Collocation(intervals=100 * min(period, 6)), settings=near,
+                              bounds=bounds if period == 2 else (8.0, 9.6))
         branches[f"period {period}"] = orbits
-    branches["second branch"] = orbits_from_hopf(
-        field, sliding, second_hopf, settings=settings, bounds=bounds, intervals=100,
-        scales=SMALL)
+    branches["second branch"] = orbit_branch(field, second_hopf, method=Collocation(intervals=100),
+                                             settings=settings, bounds=bounds, scales=SMALL)
     return branches | doubled(field, branches["second branch"], bounds, "second branch, period 2")
 
 
@@ -104,31 +103,31 @@ def doubled(
         if not any(abs(place.parameter - point.parameter) < 1e-5
                    for other in found.values() for place in other.special):
             label = name + "'" * len(found)
-            found[label] = orbits_beyond(field, orbits, point, settings=settings, bounds=bounds)
+            found[label] = orbit_branch(field, point, settings=settings, bounds=bounds)
     return found
 
 
 def diagram_over_speed() -> dict[str, Branch]:
     """Orbits over v_0 from both Hopf points, B = 20, D = 0.1."""
     field, bounds = oscillator(B=20.0, v0=8.0), (1.2, 8.0)
-    sliding = equilibrium_branch(field, "ground.speed", bounds=bounds, direction=-1.0)
+    sliding = equilibrium_branch(field, parameter="ground.speed", bounds=bounds, direction=-1.0)
     settings = Settings(step=0.005, largest_step=0.04, points=600)
     branches = {"steady sliding": sliding}
     for name, point in zip(("orbits", "second branch"), sliding.of_kind("Hopf"), strict=True):
-        branches[name] = orbits_from_hopf(field, sliding, point, settings=settings, bounds=bounds,
-                                          intervals=100, scales=LARGE)
+        branches[name] = orbit_branch(field, point, method=Collocation(intervals=100),
+                                      settings=settings, bounds=bounds, scales=LARGE)
     return branches | doubled(field, branches["orbits"], bounds, "period 2")
 
 
 def diagram_over_damping(B: float) -> dict[str, Branch]:
     """Orbits over D from both Hopf points, v_0 = 1."""
     field, bounds = oscillator(B=B, D=2.2), (0.06, 2.2)
-    sliding = equilibrium_branch(field, "D", bounds=bounds, direction=-1.0)
+    sliding = equilibrium_branch(field, parameter="D", bounds=bounds, direction=-1.0)
     names = ("orbits", "second branch")
     found = {"steady sliding": sliding}
     for name, point in zip(names, sliding.of_kind("Hopf"), strict=True):
-        found[name] = orbits_from_hopf(field, sliding, point, bounds=bounds, intervals=100,
-                                       settings=Settings(step=0.005, points=600), scales=LARGE)
+        found[name] = orbit_branch(field, point, method=Collocation(intervals=100), bounds=bounds,
+                                   settings=Settings(step=0.005, points=600), scales=LARGE)
     return found
 
 
@@ -148,7 +147,7 @@ def attractors(v0: float, diagram: dict[str, Branch]) -> list[tuple[str, np.ndar
         fits = [point for point in stable
                 if low < amplitude(row)(point) < high and point.parameter < 4.2]
         nearest = min(fits, key=lambda point: abs(point.parameter - v0))
-        starts.append(orbit_history(nearest, field.dimension)[1][0])
+        starts.append(nearest.orbit().states[0])
     starts.append(find_equilibrium(field).state)
     found = []
     for start in starts:
@@ -204,11 +203,11 @@ def table(over_B: dict[str, Branch], over_speed: dict[str, Branch]) -> list[tupl
             ("H2, Hopf", "7.09", second.parameter)]
     doublings = [orbits.of_kind("period doubling")[0]]
     doublings += [over_B[f"period {k}"].of_kind("period doubling")[0] for k in (2, 4, 8)]
-    rows += [(f"period doubling {k + 1}, {point.details['criticality']}", printed, point.parameter)
+    rows += [(f"period doubling {k + 1}, {point.criticality}", printed, point.parameter)
              for k, (point, printed) in enumerate(zip(doublings, ("8.09", "9.26", "9.36", "chaos"),
                                                       strict=True))]
     coexisting = over_B["second branch"].of_kind("period doubling")[-1]
-    rows.append((f"coexisting orbits from, {coexisting.details['criticality']} doubling", "7.25",
+    rows.append((f"coexisting orbits from, {coexisting.criticality} doubling", "7.25",
                  coexisting.parameter))
     folds = sorted(point.parameter for point in over_speed["orbits"].of_kind("fold"))
     rows += [("three attractors over v_0, from", "3.57", folds[0]),
@@ -226,9 +225,9 @@ def quick_diagram(folder: Path) -> None:
     """The first branch over B, and its special points."""
     folder.mkdir(parents=True, exist_ok=True)
     field, bounds = oscillator(B=0.3), (0.3, 10.0)
-    sliding = equilibrium_branch(field, "B", bounds=bounds)
-    orbits = orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], bounds=bounds,
-                              settings=Settings(step=0.01, largest_step=0.1), scales=SMALL)
+    sliding = equilibrium_branch(field, parameter="B", bounds=bounds)
+    orbits = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=bounds,
+                          settings=Settings(step=0.01, largest_step=0.1), scales=SMALL)
     plot_branches([sliding, orbits], folder / "two_masses_over_B.png",
                   amplitude(field.displacement_row(1)), x_label="B [m]",
                   y_label="amplitude of x3 [m]", names=["steady sliding", "orbits"])

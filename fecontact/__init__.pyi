@@ -7,23 +7,27 @@ from .bifurcation.attractors.basins import Attractor, Axis, Basins, basins
 from .bifurcation.attractors.lyapunov import LyapunovExponents, lyapunov_exponents
 from .bifurcation.attractors.poincare_scan import BruteForce, brute_force
 from .bifurcation.continuation.branch import Branch
-from .bifurcation.equilibria.branches import equilibrium_branch, switched_branch
+from .bifurcation.continuation.points import (
+    BranchPoint,
+    CrossingPoint,
+    FoldPoint,
+    HopfPoint,
+    NeimarkSackerPoint,
+    PeriodDoublingPoint,
+    UnresolvedPoint,
+)
+from .bifurcation.equilibria.branches import equilibrium_branch
 from .bifurcation.equilibria.codim2 import fold_curve, hopf_curve
 from .bifurcation.equilibria.equilibrium import find_equilibrium
 from .bifurcation.equilibria.stability_map import stability_map
 from .bifurcation.fields.contact_field import contact_field
 from .bifurcation.fields.function_field import vector_field
 from .bifurcation.fields.vector_field import VectorField
-from .bifurcation.orbits.branches import (
-    orbits_beyond,
-    orbits_by_shooting,
-    orbits_from_hopf,
-    orbits_from_motion,
-)
+from .bifurcation.orbits.branches import Collocation, Shooting, orbit_branch
 from .bifurcation.orbits.codim2 import orbit_curve
-from .bifurcation.orbits.from_run import SettledMotion, settled_motion
-from .bifurcation.orbits.period_doubling import doubled_by_shooting, hopf_orbits_by_shooting
-from .bifurcation.orbits.samples import amplitude, motion_of, observe, orbit_history, quantity_range
+from .bifurcation.orbits.from_run import periodic_motion
+from .bifurcation.orbits.motions import PeriodicMotion
+from .bifurcation.orbits.samples import amplitude, observe, quantity_range
 from .core.errors import FecontactError, InputError, ModelWarning
 from .fem.elastic_body import ElasticBody, Material
 from .fem.generate import Beam, Block, Pendulum, generate
@@ -125,7 +129,9 @@ __all__ = [
     "Block",
     "BoucWenFriction",
     "Branch",
+    "BranchPoint",
     "BruteForce",
+    "Collocation",
     "Constant",
     "ConstantFriction",
     "ContactEvents",
@@ -133,6 +139,7 @@ __all__ = [
     "ContactSystem",
     "CosineSurface",
     "Crossing",
+    "CrossingPoint",
     "Crown",
     "CubicFriction",
     "DahlFriction",
@@ -147,6 +154,7 @@ __all__ = [
     "ExponentialFriction",
     "FecontactError",
     "Flat",
+    "FoldPoint",
     "FourierSeries",
     "FrictionLaw",
     "GalvanettoFriction",
@@ -157,6 +165,7 @@ __all__ = [
     "Harmonic",
     "HarmonicSpeed",
     "Harmonics",
+    "HopfPoint",
     "HyperbolicFriction",
     "Impacts",
     "InputError",
@@ -173,11 +182,14 @@ __all__ = [
     "Mesh",
     "ModalBasis",
     "ModelWarning",
+    "NeimarkSackerPoint",
     "NormalLaw",
     "ParabolicSurface",
     "Patch",
     "Pendulum",
     "PerNode",
+    "PeriodDoublingPoint",
+    "PeriodicMotion",
     "Periodicity",
     "PointLoad",
     "PowerContact",
@@ -195,7 +207,7 @@ __all__ = [
     "Scipy",
     "Sensitivity",
     "SetValued",
-    "SettledMotion",
+    "Shooting",
     "Sine",
     "SmoothingCost",
     "SobolIndices",
@@ -211,6 +223,7 @@ __all__ = [
     "Trace",
     "Trajectory",
     "TwoSidedStop",
+    "UnresolvedPoint",
     "VectorField",
     "amplitude",
     "amplitude_spectrum",
@@ -222,7 +235,6 @@ __all__ = [
     "contact_field",
     "count_periods",
     "dask_executor",
-    "doubled_by_shooting",
     "eigenfrequencies_hz",
     "ensemble",
     "equilibrium_branch",
@@ -241,20 +253,15 @@ __all__ = [
     "generate",
     "history",
     "hopf_curve",
-    "hopf_orbits_by_shooting",
     "lyapunov_exponents",
     "memory_friction_law",
     "modal_basis",
     "mode_convergence",
-    "motion_of",
     "normal_law",
     "observe",
+    "orbit_branch",
     "orbit_curve",
-    "orbit_history",
-    "orbits_beyond",
-    "orbits_by_shooting",
-    "orbits_from_hopf",
-    "orbits_from_motion",
+    "periodic_motion",
     "periodicity",
     "phase_inset",
     "picture",
@@ -288,7 +295,6 @@ __all__ = [
     "render",
     "rows_from_dofs",
     "sensitivity",
-    "settled_motion",
     "simulate",
     "smoothing_cost",
     "sobol_indices",
@@ -299,7 +305,6 @@ __all__ = [
     "strobe",
     "strobed_states",
     "sweep",
-    "switched_branch",
     "to_xarray",
     "vector_field",
     "write_basis",

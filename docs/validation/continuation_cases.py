@@ -7,6 +7,7 @@ from single_masses import mass_in_plane
 
 from fecontact import (
     Branch,
+    Collocation,
     ConstantFriction,
     Ground,
     LinearContact,
@@ -14,10 +15,7 @@ from fecontact import (
     contact_field,
     equilibrium_branch,
     find_equilibrium,
-    orbits_beyond,
-    orbits_from_hopf,
-    orbits_from_motion,
-    switched_branch,
+    orbit_branch,
     vector_field,
 )
 from fecontact.bifurcation.continuation.problem import Settings
@@ -31,10 +29,9 @@ def section() -> str:
     rows = stuart_landau() + lorenz() + reactor() + predator() + mode_coupling()
     return f"""## Continuation
 
-Equilibria and periodic orbits followed by `equilibrium_branch`, `switched_branch`,
-`orbits_from_hopf`, `orbits_from_motion` and `orbits_beyond`. Closed forms for the Stuart-Landau
-orbit, Lorenz' Hopf point and mode coupling; the other numbers are known to the digits shown,
-those of the demos as AUTO-07p prints them.
+Equilibria and periodic orbits followed by `equilibrium_branch` and `orbit_branch`. Closed forms for
+the Stuart-Landau orbit, Lorenz' Hopf point and mode coupling; the other numbers are known to the
+digits shown, those of the demos as AUTO-07p prints them.
 
 {comparisons(rows)}
 """
@@ -49,9 +46,9 @@ def stuart_landau() -> list[Comparison]:
         out[1] = (p[0] - square) * x[1] + 2.0 * x[0]
 
     field = vector_field(landau, {"r": -0.5}, 2)
-    still = equilibrium_branch(field, "r", bounds=(-0.5, 1.0))
+    still = equilibrium_branch(field, parameter="r", bounds=(-0.5, 1.0))
     hopf, = still.of_kind("Hopf")
-    end = orbits_from_hopf(field, still, hopf, bounds=(-0.5, 1.0)).points[-1]
+    end = orbit_branch(field, hopf, bounds=(-0.5, 1.0)).points[-1]
     period, smallest = end.values["period"], np.abs(end.values["multipliers"]).min()
     return [Comparison("Stuart-Landau: r of the Hopf point", 0.0, hopf.parameter),
             Comparison("Stuart-Landau, r = 1: radius", 1.0, end.values["maximum"][0]),
@@ -70,15 +67,15 @@ def lorenz() -> list[Comparison]:
     field = vector_field(flow, {"rho": 280.0}, 3)
     root = np.sqrt(8.0 / 3.0 * 19.0)
     still = find_equilibrium(field, {"rho": 20.0}, start=[root, root, 19.0])
-    hopf, = equilibrium_branch(field, "rho", still, bounds=(20.0, 30.0)).of_kind("Hopf")
+    hopf, = equilibrium_branch(field, still, "rho", bounds=(20.0, 30.0)).of_kind("Hopf")
     rows = [Comparison("Lorenz: rho of the Hopf point", 470.0 / 19.0, hopf.parameter),
-            Comparison("Lorenz: period there", 0.65283, hopf.details["period"])]
+            Comparison("Lorenz: period there", 0.65283, hopf.period)]
     times = np.linspace(39.0, 40.0, 4000)
     states = solve_ivp(lambda t, x: field.rates(np.zeros(1), x[None], field.values)[0],
                        (0.0, 40.0), [1.0, 2.0, 250.0], method="LSODA", t_eval=times, rtol=1e-8,
                        atol=1e-10).y.T
-    branch = orbits_from_motion(field, "rho", times, states, bounds=(225.0, 330.0),
-                                direction=-1.0, intervals=60)
+    branch = orbit_branch(field, (times, states), "rho", method=Collocation(intervals=60),
+                          bounds=(225.0, 330.0), direction=-1.0)
     rows.append(Comparison("Lorenz, rho = 280: period of the asymmetric orbit", 0.434522,
                            branch.points[0].values["period"]))
     for number, (name, rho, period) in enumerate(CASCADE):
@@ -86,8 +83,8 @@ def lorenz() -> list[Comparison]:
         rows += [Comparison(f"Lorenz, {name}: rho of its doubling", rho, doubling.parameter),
                  Comparison(f"Lorenz, {name}: period there", period, doubling.values["period"])]
         if number < 2:
-            branch = orbits_beyond(field, branch, doubling, bounds=(215.0, 230.0),
-                                   settings=Settings(step=0.01, stop_at=("period doubling",)))
+            branch = orbit_branch(field, doubling, bounds=(215.0, 230.0),
+                                  settings=Settings(step=0.01, stop_at=("period doubling",)))
     return rows
 
 
@@ -104,7 +101,7 @@ def reactor() -> list[Comparison]:
                              (17.0, "Hopf", (0.120866, 0.217081)),
                              (17.0, "fold", (0.121901, 0.117015))):
         field = vector_field(reaction, {"p1": 0.0, "p2": p2}, 2)
-        branch = equilibrium_branch(field, "p1", bounds=(0.0, 0.5))
+        branch = equilibrium_branch(field, parameter="p1", bounds=(0.0, 0.5))
         rows += [Comparison(f"AUTO's ab, p2 = {p2:g}: p1 of {kind} point {k + 1}", value,
                             point.parameter)
                  for k, (value, point) in enumerate(zip(wanted, branch.of_kind(kind),
@@ -121,12 +118,12 @@ def predator() -> list[Comparison]:
         out[1] = -x[1] + 3.0 * x[0] * x[1]
 
     field = vector_field(species, {"p1": 0.0}, 2)
-    empty = equilibrium_branch(field, "p1", bounds=(0.0, 1.0))
+    empty = equilibrium_branch(field, parameter="p1", bounds=(0.0, 1.0))
     first, = empty.of_kind("branch point")
-    prey = switched_branch(field, "p1", first, bounds=(0.01, 1.0))
+    prey = equilibrium_branch(field, first, bounds=(0.01, 1.0))
     fold, = prey.of_kind("fold")
     second = largest(prey, "branch point")
-    hopf, = switched_branch(field, "p1", second, bounds=(0.01, 1.0)).of_kind("Hopf")
+    hopf, = equilibrium_branch(field, second, bounds=(0.01, 1.0)).of_kind("Hopf")
     return [Comparison("AUTO's pp2: branch point of u = v = 0", 0.6, first.parameter),
             Comparison("AUTO's pp2: branch point of v = 0", 0.821904, second.parameter),
             Comparison("AUTO's pp2: fold of v = 0", 0.832929, fold.parameter),
@@ -148,8 +145,9 @@ def mode_coupling() -> list[Comparison]:
         normal=LinearContact(4.0 / 3.0), ground=Ground(speed=-100.0), load=Load(1.0),
         friction=ConstantFriction(0.1, smoothing_slope=1e9))
     name = "friction.friction_coefficient"
-    hopf, = equilibrium_branch(contact_field(system, [name]), name, bounds=(0.0, 1.0)).special
+    hopf, = equilibrium_branch(contact_field(system, [name]), parameter=name,
+                               bounds=(0.0, 1.0)).special
     return [Comparison("mode coupling (Hoffmann), dashpots 0.1: friction coefficient of flutter",
                        0.75 * (1.0 + 2.0 * c * c), hopf.parameter),
             Comparison("mode coupling (Hoffmann), dashpots 0.1: angular frequency there",
-                       np.sqrt(2.0), hopf.details["angular_frequency"])]
+                       np.sqrt(2.0), hopf.angular_frequency)]

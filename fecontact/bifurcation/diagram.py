@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
-from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch, switched_branch
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import Settings, Status
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
-from fecontact.bifurcation.orbits.samples import motion_of, observe, shot
+from fecontact.bifurcation.orbits.samples import observe
 from fecontact.core.errors import FecontactError
-from fecontact.core.types import Array
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.diagram_options import BranchSettings
+    from fecontact.bifurcation.orbits.branches import Collocation, Shooting
     from fecontact.system.contact_system import ContactSystem
 
 
@@ -117,7 +118,8 @@ def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
         point = branch.points[place]
         values[field.index(branch.name)] = point.parameter
         if "period" in point.values:
-            times, states = motion_of(field, branch, point)
+            motion = point.orbit(field)
+            times, states = motion.times, motion.states
         else:
             times, states = np.zeros(1), np.atleast_2d(point.values["state"])
         found = limits_exceeded(field.system(values), times, states)
@@ -148,7 +150,7 @@ def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) ->
     low, high = wanted.bounds
     if wanted.kind != "orbits":
         yield _Task(_EQUILIBRIA, 0, lambda settings: equilibrium_branch(
-            field, wanted.name, settings=_fine(settings),
+            field, parameter=wanted.name, settings=_fine(settings),
             direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
     if wanted.kind != "equilibria":
         yield _Task("orbits of the run", 0, partial(_orbits, field, wanted, initial))
@@ -168,59 +170,46 @@ def _tasks_beyond(
         for number, point in enumerate(points):
             title = _title(task.title, kind, f" {number + 1}" if len(points) > 1 else "")
             yield _Task(title, task.generation + 1,
-                        partial(_beyond, field, branch, point, wanted))
+                        partial(_beyond, field, point, wanted))
 
 
 def _orbits(
     field: ContactField, wanted: "BranchSettings", initial: Any, settings: Settings
 ) -> Branch:
     """The orbit on which a run settles, over the parameter."""
-    from fecontact.bifurcation.orbits.branches import orbits_by_shooting, orbits_from_motion
-    from fecontact.bifurcation.orbits.from_run import settled_motion
+    from fecontact.bifurcation.orbits.branches import orbit_branch
+    from fecontact.bifurcation.orbits.from_run import periodic_motion
 
     low, high = wanted.bounds
-    motion = settled_motion(field.system(), initial=initial, transient=wanted.transient,
-                            longest_period=wanted.longest_period)
-    common: dict[str, Any] = {
-        "period": motion.period, "periods": motion.periods, "settings": settings,
+    motion = periodic_motion(field.system(), initial=initial, transient=wanted.transient,
+                             longest_period=wanted.longest_period)
+    return orbit_branch(
+        field, motion, wanted.name, method=_method(wanted), settings=settings,
         # So that a step is one of the parameter rather than of the orbit, which may grow.
-        "scales": _SIZE * _amplitudes(motion.states),
-        "direction": 1.0 if wanted.first < high else -1.0, "both": low < wanted.first < high}
+        scales=_SIZE * motion.amplitudes,
+        direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high)
+
+
+def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
+    """How orbits are found."""
+    from fecontact.bifurcation.orbits.branches import Collocation, Shooting
+
     if wanted.method == "shooting":
-        return orbits_by_shooting(field, wanted.name, motion.times, motion.states,
-                                  segments=wanted.segments, **common)
-    return orbits_from_motion(field, wanted.name, motion.times, motion.states,
-                              intervals=wanted.intervals, **common)
-
-
-def _amplitudes(states: Array) -> Array:
-    """Half the range (d,) of each state, those of small ones not below 1e-3 of the largest."""
-    found = np.ptp(states, axis=0) / 2.0
-    return np.asarray(np.maximum(found, 1e-3 * found.max()))
+        return Shooting(segments=wanted.segments)
+    return Collocation(intervals=wanted.intervals)
 
 
 def _beyond(
-    field: ContactField, branch: Branch, point: BranchPoint, wanted: "BranchSettings",
-    settings: Settings,
+    field: ContactField, point: BranchPoint, wanted: "BranchSettings", settings: Settings
 ) -> Branch:
     """The branch that begins at a special point."""
-    from fecontact.bifurcation.orbits.branches import orbits_beyond, orbits_from_hopf
-    from fecontact.bifurcation.orbits.period_doubling import (
-        doubled_by_shooting,
-        hopf_orbits_by_shooting,
-    )
+    from fecontact.bifurcation.orbits.branches import orbit_branch
 
-    if point.kind == "Hopf" and wanted.method == "shooting":
-        return hopf_orbits_by_shooting(field, branch, point, settings=settings,
-                                       segments=wanted.segments)
     if point.kind == "Hopf":
-        return orbits_from_hopf(field, branch, point, settings=settings,
-                                intervals=wanted.intervals)
-    if "period" not in point.values:
-        return switched_branch(field, branch.name, point, settings=settings)
-    if shot(branch):
-        return doubled_by_shooting(field, branch, point, settings)
-    return orbits_beyond(field, branch, point, settings=settings)
+        return orbit_branch(field, point, method=_method(wanted), settings=settings)
+    if point.is_orbit:
+        return orbit_branch(field, point, settings=settings)
+    return equilibrium_branch(field, point, settings=settings)
 
 
 def _title(name: str, kind: str, number: str) -> str:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fecontact import Study, read_branch, read_branches, settled_motion
+from fecontact import Study, periodic_motion, read_branch, read_branches
 from fecontact.bifurcation.continuation.branch import Status
 from fecontact.cli import execute
 
@@ -75,5 +75,5 @@ def test_the_friction_oscillators_loop_is_one_branch(tmp_path, monkeypatch):
     assert (orbits.column("unstable")[:at] == 1).all()
     assert orbits.column("stable")[at + 1:].all()
     assert orbits.parameter[-1] == pytest.approx(2e-3, rel=1e-9)
-    run = settled_motion(Study.read(study).system(), transient=10.0, longest_period=2.0)
+    run = periodic_motion(Study.read(study).system(), transient=10.0, longest_period=2.0)
     assert orbits.points[-1].values["period"] == pytest.approx(run.period, rel=1e-6)

@@ -9,7 +9,6 @@ from fecontact import InputError, read_branch, simulate
 from fecontact.bifurcation import diagram as module
 from fecontact.bifurcation.diagram import follow_branches
 from fecontact.bifurcation.diagram_options import BranchSettings
-from fecontact.bifurcation.orbits.samples import motion_of
 from fecontact.cli import execute
 from fecontact.output.files.branches import read_branches, write_branches
 from fecontact.study.study import Study
@@ -105,7 +104,7 @@ def test_the_unstable_orbit_parts_sliding_from_stick_slip(study):
     result = follow_branches(described.system(), described.branch)
     branch = result.found["orbits"]
     end = branch.points[-1]
-    states = motion_of(result.contact_field, branch, end)[1]
+    states = end.orbit(result.contact_field).states
     system = described.system().with_(**{"ground.speed": end.parameter})
     rest = result.found["steady sliding"].points[0].values["state"]
     sizes = []

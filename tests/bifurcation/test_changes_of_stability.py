@@ -14,12 +14,13 @@ from systems import (
 from test_continuation import CUBIC
 
 from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import orbits_from_hopf, orbits_from_motion
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.output.plots.stability import plot_eigenvalues
 
 CHANGES = {"fold": {-1, 1}, "branch point": {-1, 0, 1}, "period doubling": {-1, 1},
@@ -68,8 +69,9 @@ def reactor(t, x, p, out):
 ])
 def test_equilibria(field, name, bounds, start, longest):
     index = field.index(name)
-    branch = equilibrium_branch(field, name, start, settings=Settings(
-        bounds=bounds, step=min(0.05, longest), largest_step=longest),
+    branch = equilibrium_branch(
+        field, start, name,
+        settings=Settings(bounds=bounds, step=min(0.05, longest), largest_step=longest),
         direction=1.0 if field.values[index] < bounds[1] else -1.0)
     assert branch.status is Status.BOUND
     assert branch.special
@@ -82,7 +84,8 @@ def test_equilibria(field, name, bounds, start, longest):
 
 def test_two_masses_from_a_slow_belt():
     """From 0.05 m/s on two pairs cross close to each other, then back; from the plain Jacobian."""
-    branch = equilibrium_branch(two_mass_field(20.0, 0.05), "ground.speed", bounds=(0.05, 8.0))
+    branch = equilibrium_branch(two_mass_field(20.0, 0.05), parameter="ground.speed",
+                                bounds=(0.05, 8.0))
 
     def growth(rank):
         return lambda v: np.unique(np.linalg.eigvals(two_mass_jacobian(20.0, v)).real)[rank]
@@ -99,7 +102,7 @@ def test_two_masses_from_a_slow_belt():
 
 def test_crossings_that_no_test_tells_apart_are_marked():
     field = vector_field(twice, {"p": -0.3}, 4)
-    branch = equilibrium_branch(field, "p", bounds=(-0.3, 0.4))
+    branch = equilibrium_branch(field, parameter="p", bounds=(-0.3, 0.4))
     assert_explained(branch, unresolved=1)
     mark, = branch.special
     assert (mark.details["unstable_before"], mark.details["unstable_after"]) == (0, 4)
@@ -109,7 +112,8 @@ def test_crossings_that_no_test_tells_apart_are_marked():
 def test_undamped_flutter_is_marked():
     """Two modes without damping merge at mu = 3/4; rounding decides what is seen there."""
     name = "friction.friction_coefficient"
-    branch = equilibrium_branch(contact_field(mode_coupling(), [name]), name, bounds=(0.0, 1.0))
+    branch = equilibrium_branch(contact_field(mode_coupling(), [name]), parameter=name,
+                                bounds=(0.0, 1.0))
     mark, = branch.special
     assert mark.parameter == pytest.approx(0.75, abs=1e-4)
     assert mark.kind in ("Hopf", "unresolved")
@@ -132,8 +136,8 @@ def test_orbits_whose_multipliers_cross_together():
     t = np.linspace(0.0, np.pi, 400)
     circle = np.zeros((400, 6))
     circle[:, 0], circle[:, 1] = np.cos(2.0 * t), np.sin(2.0 * t)
-    branch = orbits_from_motion(field, "p", t, circle, period=np.pi, bounds=(-0.3, 0.3),
-                                intervals=10, scales=np.ones(6))
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "p",
+                          method=Collocation(intervals=10), bounds=(-0.3, 0.3), scales=np.ones(6))
     assert_explained(branch, unresolved=1)
     mark, = branch.special
     assert abs(mark.parameter) <= mark.details["parameter_error"] < 1e-6
@@ -147,11 +151,11 @@ def test_orbits_whose_multipliers_cross_together():
 def test_orbits_of_two_masses(values, name, bounds, direction):
     """From few intervals on, at folds too, where two multipliers are one."""
     field = two_masses_field(**values)
-    sliding = equilibrium_branch(field, name, np.zeros(4), bounds=bounds, direction=direction)
+    sliding = equilibrium_branch(field, np.zeros(4), name, bounds=bounds, direction=direction)
     assert_explained(sliding)
     for hopf in sliding.of_kind("Hopf"):
-        branch = orbits_from_hopf(field, sliding, hopf, bounds=bounds, intervals=30,
-                                  settings=Settings(step=0.005, points=120))
+        branch = orbit_branch(field, hopf, method=Collocation(intervals=30), bounds=bounds,
+                              settings=Settings(step=0.005, points=120))
         assert branch.special
         assert_explained(branch)
 
@@ -173,8 +177,9 @@ def test_a_start_on_a_bound_that_heads_outwards_is_all(start, direction):
 
 def test_equilibria_that_start_on_a_bound(tmp_path):
     field = two_mass_field(20.0, 0.05)
-    out = equilibrium_branch(field, "ground.speed", bounds=(0.05, 8.0), direction=-1.0)
+    out = equilibrium_branch(field, parameter="ground.speed", bounds=(0.05, 8.0), direction=-1.0)
     assert (len(out), out.status) == (1, Status.BOUND)
     assert plot_eigenvalues(out, tmp_path / "one.png").exists()
-    there = equilibrium_branch(field, "ground.speed", bounds=(0.05, 8.0), direction=-1.0, both=True)
+    there = equilibrium_branch(field, parameter="ground.speed", bounds=(0.05, 8.0), direction=-1.0,
+                               both=True)
     assert there.parameter[[0, -1]] == pytest.approx([8.0, 0.05], rel=1e-12)

@@ -11,11 +11,8 @@ from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.codim2 import hopf_curve
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
 from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import (
-    orbits_beyond,
-    orbits_from_hopf,
-    orbits_from_motion,
-)
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.cli.commands.branch import special_table
 
 
@@ -39,8 +36,9 @@ def test_an_island_of_orbits_is_gone_round_once(largest):
     field = vector_field(island, {"p": 0.1}, 2)
     square = 1.0 + np.sqrt(0.24)
     t, x = circle(np.sqrt(square), 2.0 * np.pi / np.sqrt(4.0 - 0.25 * square))
-    branch = orbits_from_motion(field, "p", t, x, period=t[-1], bounds=(-1.0, 1.0),
-                                intervals=20, settings=Settings(largest_step=largest))
+    branch = orbit_branch(field, PeriodicMotion(t, x, period=t[-1]), "p",
+                          method=Collocation(intervals=20), bounds=(-1.0, 1.0),
+                          settings=Settings(largest_step=largest))
     assert branch.status is Status.CLOSED
     assert [point.kind for point in branch.special] == ["fold", "fold"]
     assert [point.parameter for point in branch.special] == pytest.approx([0.5, -0.5], abs=1e-8)
@@ -69,12 +67,13 @@ def band(t, x, p, out):
 def test_a_loop_of_doubled_orbits_ends_where_it_is_single():
     field = vector_field(band, {"q": -0.4}, 3)
     t, x = circle(1.0, np.pi)
-    single = orbits_from_motion(field, "q", t, np.column_stack([x, 0.0 * t]), period=np.pi,
-                                bounds=(-0.5, 0.5), intervals=20, scales=np.ones(3))
+    single = orbit_branch(field, PeriodicMotion(t, np.column_stack([x, 0.0 * t]), period=np.pi),
+                          "q", method=Collocation(intervals=20), bounds=(-0.5, 0.5),
+                          scales=np.ones(3))
     first, last = single.of_kind("period doubling")
     assert [first.parameter, last.parameter] == pytest.approx(np.array([-1.0, 1.0])
                                                               * np.sqrt(0.05), abs=1e-8)
-    loop = orbits_beyond(field, single, first, bounds=(-0.5, 0.5))
+    loop = orbit_branch(field, first, bounds=(-0.5, 0.5))
     assert loop.status is Status.CLOSED
     assert [point.kind for point in loop.special] == ["period halving"]
     assert loop.points[-1].kind == "period halving"
@@ -98,9 +97,9 @@ def test_no_fold_beside_a_fork(largest):
     run = solve_ivp(lambda t, x: field.rates(np.zeros(1), x[None], field.values)[0], (0.0, 60.0),
                     [1.0, 0.0, 0.7], rtol=1e-9, atol=1e-11, dense_output=True)
     t = np.linspace(50.0, 60.0, 3000)
-    branch = orbits_from_motion(
-        field, "p", t, run.sol(t).T, period=np.pi, bounds=(-0.5, 0.6), intervals=20,
-        direction=-1.0, scales=np.ones(3), settings=Settings(largest_step=largest))
+    branch = orbit_branch(field, PeriodicMotion(t, run.sol(t).T, period=np.pi), "p",
+                          method=Collocation(intervals=20), bounds=(-0.5, 0.6), direction=-1.0,
+                          scales=np.ones(3), settings=Settings(largest_step=largest))
     assert [point.kind for point in branch.special] == ["branch point"]
     assert branch.special[0].parameter == pytest.approx(0.0, abs=1e-5)
 
@@ -116,10 +115,10 @@ def test_no_folds_on_a_canard():
     Where its multipliers grow beyond what numbers hold, the branch may say that it has lost them.
     """
     field = vector_field(canard, {"a": 1.2}, 2)
-    rest = equilibrium_branch(field, "a", [1.2, 1.2**3 / 3.0 - 1.2], bounds=(0.8, 1.3),
+    rest = equilibrium_branch(field, [1.2, 1.2**3 / 3.0 - 1.2], "a", bounds=(0.8, 1.3),
                               direction=-1.0)
-    orbits = orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=(0.8, 1.3),
-                              intervals=100, settings=Settings(points=200))
+    orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=100),
+                          bounds=(0.8, 1.3), settings=Settings(points=200))
     # Asymptotically 1 - eps / 8 - 3 eps^2 / 32, eps = 0.01 (Zvonkin and Shubin 1984).
     assert orbits.parameter[-1] == pytest.approx(1.0 - 0.01 / 8.0 - 3e-4 / 32.0, abs=2e-6)
     assert {point.kind for point in orbits.special} <= {"unresolved"}
@@ -145,30 +144,29 @@ def assert_none_unmarked(orbits, folder):
     ((0.98, 1.02), 0.05, 80), ((0.0, 1.3), 0.2, 40), ((0.9, 1.1), 0.2, 40)])
 def test_folds_of_a_mesh_too_coarse_for_a_canard_are_marked(bounds, largest, points, tmp_path):
     field = vector_field(canard, {"a": 1.2}, 2)
-    rest = equilibrium_branch(field, "a", [1.2, 1.2**3 / 3.0 - 1.2], bounds=(0.8, 1.3),
+    rest = equilibrium_branch(field, [1.2, 1.2**3 / 3.0 - 1.2], "a", bounds=(0.8, 1.3),
                               direction=-1.0)
-    orbits = orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=bounds, intervals=50,
-                              settings=Settings(points=points, largest_step=largest))
+    orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=50),
+                          bounds=bounds, settings=Settings(points=points, largest_step=largest))
     assert_none_unmarked(orbits, tmp_path)
 
 
 @pytest.mark.parametrize("intervals", [15, 20, 30])
 def test_special_points_of_a_mesh_too_coarse_for_a_pendulum_are_marked(intervals, tmp_path):
     field = vector_field(pendulum, {"a": 0.1}, 2)
-    rest = equilibrium_branch(field, "a", bounds=(-0.5, 0.5), direction=-1.0)
-    orbits = orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=(-0.5, 0.5),
-                              intervals=intervals,
-                              settings=Settings(points=90, largest_step=0.1))
+    rest = equilibrium_branch(field, parameter="a", bounds=(-0.5, 0.5), direction=-1.0)
+    orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=intervals),
+                          bounds=(-0.5, 0.5), settings=Settings(points=90, largest_step=0.1))
     assert_none_unmarked(orbits, tmp_path)
 
 
 def test_a_conservative_family_has_no_special_points():
     field = vector_field(pendulum, {"a": 0.1}, 2)
-    rest = equilibrium_branch(field, "a", bounds=(-0.5, 0.5), direction=-1.0)
+    rest = equilibrium_branch(field, parameter="a", bounds=(-0.5, 0.5), direction=-1.0)
     centre, = rest.of_kind("Hopf")
     assert centre.details["criticality"] == "undecided"
-    orbits = orbits_from_hopf(field, rest, centre, bounds=(-0.5, 0.5), intervals=50,
-                              settings=Settings(points=100))
+    orbits = orbit_branch(field, centre, method=Collocation(intervals=50), bounds=(-0.5, 0.5),
+                          settings=Settings(points=100))
     assert np.abs(orbits.parameter).max() < 1e-8
     assert orbits.points[-1].values["maximum"][0] > 10.0
     assert not orbits.special
@@ -182,7 +180,7 @@ def lotka(t, x, p, out):
 def test_terms_that_cancel_decide_nothing():
     """Lotka's equations have closed orbits only: l1 is zero, its terms are of the order of one."""
     field = vector_field(lotka, {"a": -0.1}, 2)
-    point, = equilibrium_branch(field, "a", [1.0, 1.0], bounds=(-0.3, 0.3)).of_kind("Hopf")
+    point, = equilibrium_branch(field, [1.0, 1.0], "a", bounds=(-0.3, 0.3)).of_kind("Hopf")
     assert abs(point.details["first_lyapunov"]) < 1e-12
     assert point.details["criticality"] == "undecided"
 
@@ -195,7 +193,7 @@ def takens(t, x, p, out):
 @pytest.mark.parametrize("k", [39, 59])
 def test_two_states_have_no_zero_hopf_point(k):
     field = vector_field(takens, {"b": -1.0 - 0.013 * k, "c": 1.5}, 2)
-    rest = equilibrium_branch(field, "c", [-np.sqrt(1.0 + 0.013 * k), 0.0], bounds=(0.2, 1.9),
+    rest = equilibrium_branch(field, [-np.sqrt(1.0 + 0.013 * k), 0.0], "c", bounds=(0.2, 1.9),
                               direction=-1.0)
     curve = hopf_curve(field, ("c", "b"), rest.of_kind("Hopf")[0],
                        bounds={"c": (-2.0, 2.0), "b": (-3.0, 1.0)},
@@ -207,13 +205,13 @@ def test_orbits_of_a_strong_hopf_point():
     """l1 is 934: the orbits keep the eigenvector's shape at amplitudes of some 1e-4 only."""
     field = two_mass_field(20.0, 0.06)
     near = Settings(step=0.005, largest_step=0.01)
-    rest = equilibrium_branch(field, "ground.speed", find_equilibrium(field),
-                              bounds=(0.05, 0.12), settings=near)
+    rest = equilibrium_branch(field, find_equilibrium(field), "ground.speed", bounds=(0.05, 0.12),
+                              settings=near)
     point = rest.of_kind("Hopf")[0]
     eigenvalues = np.linalg.eigvals(two_mass_jacobian(20.0, point.parameter))
     assert np.abs(eigenvalues.real).min() < 1e-8
-    orbits = orbits_from_hopf(field, rest, point, bounds=(0.05, 8.0), intervals=100,
-                              settings=Settings(points=20))
+    orbits = orbit_branch(field, point, method=Collocation(intervals=100), bounds=(0.05, 8.0),
+                          settings=Settings(points=20))
     assert orbits.points[0].parameter == pytest.approx(point.parameter, rel=1e-3)
     assert orbits.points[0].values["period"] == pytest.approx(
         2.0 * np.pi / np.abs(eigenvalues[np.abs(eigenvalues.real).argmin()].imag), rel=3e-3)
@@ -225,9 +223,9 @@ def test_the_same_call_gives_the_same_branch():
     field = two_mass_field(20.0, 1.0)
 
     def branches():
-        rest = equilibrium_branch(field, "ground.speed", bounds=(0.3, 8.0))
-        return rest, orbits_from_hopf(field, rest, rest.of_kind("Hopf")[0], bounds=(0.3, 8.0),
-                                      settings=Settings(points=60))
+        rest = equilibrium_branch(field, parameter="ground.speed", bounds=(0.3, 8.0))
+        return rest, orbit_branch(field, rest.of_kind("Hopf")[0], bounds=(0.3, 8.0),
+                                  settings=Settings(points=60))
 
     first, again = branches(), branches()
     x = np.zeros((1, 4))

@@ -10,8 +10,8 @@ from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.linalg import condensation as elimination
-from fecontact.bifurcation.orbits.branches import orbits_from_motion
-from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.mesh import (
     equidistributed,
     extremes,
@@ -19,6 +19,7 @@ from fecontact.bifurcation.orbits.mesh import (
     node_times,
     rule,
 )
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.starts import corrected, from_samples
 from fecontact.core.errors import AnalysisError, InputError
 
@@ -53,7 +54,7 @@ def landau():
 def orbit_on(field, mesh, degree, r=0.5):
     t = 2.0 * np.pi * node_times(mesh, degree)
     guess = 0.8 * np.stack([np.cos(t), np.sin(t)], axis=1)
-    problem = Collocation(field, field.values, 0, mesh, degree, guess, np.ones(4))
+    problem = CollocationProblem(field, field.values, 0, mesh, degree, guess, np.ones(4))
     u = np.concatenate([guess.reshape(-1), [3.0, r]])
     row = np.zeros(len(u))
     row[-1] = 1.0
@@ -93,7 +94,8 @@ def test_parameter_that_moves_the_period_of_the_forcing():
                          period=lambda p: 2.0 * np.pi / p["w"])
     rng = np.random.default_rng(4)
     nodes = rng.normal(size=(12, 2))
-    problem = Collocation(field, field.values, 0, np.linspace(0.0, 1.0, 5), 3, nodes, np.ones(4))
+    problem = CollocationProblem(field, field.values, 0, np.linspace(0.0, 1.0, 5), 3, nodes,
+                                 np.ones(4))
     u = np.append(nodes.reshape(-1), 0.8)
     row, rhs = rng.normal(size=len(u)), rng.normal(size=len(u))
     expected = np.linalg.solve(np.vstack([dense_system(problem, u), row]), rhs)
@@ -133,8 +135,8 @@ def test_resonance_curve():
     X = 1.0 / np.hypot(1.0 - 0.25, 2.0 * D * 0.5)
     phase = 0.5 * t - np.arctan2(2.0 * D * 0.5, 1.0 - 0.25)
     states = np.stack([X * np.cos(phase), -0.5 * X * np.sin(phase)], axis=1)
-    branch = orbits_from_motion(field, "w", t, states, bounds=(0.5, 1.5), intervals=24,
-                                settings=Settings(largest_step=0.1))
+    branch = orbit_branch(field, (t, states), "w", method=Collocation(intervals=24),
+                          bounds=(0.5, 1.5), settings=Settings(largest_step=0.1))
     w = branch.parameter
     assert w[-1] == pytest.approx(1.5, abs=1e-12)
     assert branch.column("period") == pytest.approx(2.0 * np.pi / w, rel=1e-12)
@@ -248,23 +250,24 @@ def test_kind_errors(landau):
     t = np.linspace(0.0, 10.0, 500)
     circle = 0.7 * np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
     with pytest.raises(InputError, match="cover 10 s, but the period is 20 s"):
-        orbits_from_motion(landau, "r", t, circle, period=20.0)
+        orbit_branch(landau, PeriodicMotion(t, circle, period=20.0), "r")
     with pytest.raises(InputError, match=r"times \(k,\) and states \(k, 2\)"):
-        orbits_from_motion(landau, "r", t, circle[:, :1])
+        orbit_branch(landau, (t, circle[:, :1]), "r")
     with pytest.raises(InputError, match="do not come back"):
-        orbits_from_motion(landau, "r", t, np.stack([t, t**2], axis=1))
+        orbit_branch(landau, (t, np.stack([t, t**2], axis=1)), "r")
     with pytest.raises(InputError, match="intervals = 1 must be"):
-        orbits_from_motion(landau, "r", t, circle, intervals=1)
+        orbit_branch(landau, (t, circle), "r", method=Collocation(intervals=1))
     with pytest.raises(InputError, match="degree = 9 must be"):
-        orbits_from_motion(landau, "r", t, circle, degree=9)
+        orbit_branch(landau, (t, circle), "r", method=Collocation(degree=9))
     with pytest.raises(InputError, match=r"scales = .* must hold 2 numbers"):
-        orbits_from_motion(landau, "r", t, circle, scales=[1.0])
+        orbit_branch(landau, (t, circle), "r", scales=[1.0])
     with pytest.raises(AnalysisError, match=r"at r = -0\.5, from the period .*larger amplitude"):
-        orbits_from_motion(landau, "r", t, circle, values=[-0.5, 2.0])
+        orbit_branch(landau, PeriodicMotion(t, circle, parameter_values=[-0.5, 2.0]), "r")
     drifting = vector_field(drift, {"r": 0.5}, 2)
     with pytest.raises(AnalysisError, match=r"at r = 0\.5, from the period 5 s: the "
                                             r"iteration ends without any motion"):
-        orbits_from_motion(drifting, "r", t, circle, period=5.0, intervals=20)
+        orbit_branch(drifting, PeriodicMotion(t, circle, period=5.0), "r",
+                     method=Collocation(intervals=20))
 
 
 def test_no_convergence_is_told_with_what_to_try():
@@ -273,4 +276,4 @@ def test_no_convergence_is_told_with_what_to_try():
     times, states = settled(field, 60.0, [1.0, 0.2], 12.0)
     with pytest.raises(AnalysisError, match=r"at slope = 100000, from the period 11\.\d+ s: "
                                             r"Newton's method does not converge .* 3 intervals"):
-        orbits_from_motion(field, "slope", times, states, intervals=3, degree=2)
+        orbit_branch(field, (times, states), "slope", method=Collocation(intervals=3, degree=2))

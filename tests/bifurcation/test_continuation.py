@@ -5,12 +5,8 @@ import pytest
 
 from fecontact import write_branch
 from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.pseudo_arclength import (
-    Problem,
-    Settings,
-    continuation,
-    follow,
-)
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.pseudo_arclength import Problem, Settings, continuation
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.output.files.branches import read_branch
 

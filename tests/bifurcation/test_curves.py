@@ -35,7 +35,7 @@ def bautin(t, x, p, out):
 
 def test_bogdanov_takens():
     field = vector_field(takens, {"b": -1.0, "c": -1.0}, 2)
-    branch = equilibrium_branch(field, "b", [-0.6, 0.0], bounds=(-2.0, 2.0))
+    branch = equilibrium_branch(field, [-0.6, 0.0], "b", bounds=(-2.0, 2.0))
     hopf = hopf_curve(field, ("b", "c"), branch.of_kind("Hopf")[0], bounds=BOX)
     assert hopf.status is Status.STOPPED
     end, = hopf.of_kind("Bogdanov-Takens")
@@ -56,7 +56,7 @@ def test_bogdanov_takens():
 
 def test_cusp():
     field = vector_field(cusp, {"b": -1.0, "c": 1.0}, 1)
-    branch = equilibrium_branch(field, "b", [-1.5], bounds=(-2.0, 2.0))
+    branch = equilibrium_branch(field, [-1.5], "b", bounds=(-2.0, 2.0))
     curve = fold_curve(field, ("b", "c"), branch.of_kind("fold")[0], bounds=BOX)
     assert 27.0 * curve.column("b") ** 2 == pytest.approx(4.0 * curve.column("c") ** 3, abs=1e-10)
     point, = curve.special
@@ -68,7 +68,7 @@ def test_cusp():
 
 def test_bautin():
     field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
-    start, = equilibrium_branch(field, "b", bounds=(-2.0, 2.0)).of_kind("Hopf")
+    start, = equilibrium_branch(field, parameter="b", bounds=(-2.0, 2.0)).of_kind("Hopf")
     curve = hopf_curve(field, ("b", "c"), start, bounds=BOX)
     point, = curve.special
     assert point.kind == "Bautin"
@@ -92,7 +92,7 @@ def double_hopf(t, x, p, out):
 
 def test_zero_hopf_and_double_hopf():
     field = vector_field(zero_hopf, {"a": 0.25, "b": 0.3}, 3)
-    branch = equilibrium_branch(field, "a", [0.5, 0.0, 0.0], bounds=(-1.0, 1.0), direction=-1.0)
+    branch = equilibrium_branch(field, [0.5, 0.0, 0.0], "a", bounds=(-1.0, 1.0), direction=-1.0)
     box = {"a": (-1.0, 1.0), "b": (-1.0, 1.0)}
     folds = fold_curve(field, ("a", "b"), branch.of_kind("fold")[0], bounds=box)
     point, = folds.special
@@ -103,7 +103,7 @@ def test_zero_hopf_and_double_hopf():
     assert curve.column("a") == pytest.approx(curve.column("b") ** 2, abs=1e-12)
     assert "zero-Hopf" in [point.kind for point in curve.special]
     field = vector_field(double_hopf, {"a": -1.0, "b": -0.5}, 4)
-    start, = equilibrium_branch(field, "a", bounds=(-1.0, 1.0)).of_kind("Hopf")
+    start, = equilibrium_branch(field, parameter="a", bounds=(-1.0, 1.0)).of_kind("Hopf")
     curve = hopf_curve(field, ("a", "b"), start, bounds=box)
     point, = curve.of_kind("double Hopf")
     assert point.values["b"] == pytest.approx(0.0, abs=1e-10)
@@ -120,7 +120,7 @@ def characteristic_border(B, v0):
 def test_border_of_steady_sliding_in_force_and_speed():
     """Both curves satisfy Hurwitz' condition; B and mu' enter as their product."""
     field = two_mass_field(0.5)
-    branch = equilibrium_branch(field, "B", bounds=(0.0, 12.0))
+    branch = equilibrium_branch(field, parameter="B", bounds=(0.0, 12.0))
     box = {"B": (0.0, 30.0), "ground.speed": (0.5, 3.0)}
     bautin_points = []
     for start in branch.of_kind("Hopf"):
@@ -133,7 +133,7 @@ def test_border_of_steady_sliding_in_force_and_speed():
         border = [characteristic_border(*pair) for pair in zip(B, speed, strict=True)]
         assert np.abs(border).max() < 1e-8
         assert curve.column("frequency_hz") == pytest.approx(
-            np.full(len(B), start.details["frequency_hz"]), rel=1e-9)
+            np.full(len(B), start.frequency_hz), rel=1e-9)
         bautin_points += curve.of_kind("Bautin")
     assert bautin_points == []
 
@@ -141,7 +141,7 @@ def test_border_of_steady_sliding_in_force_and_speed():
 def test_lorenz_border():
     """Hopf points rho = sigma (sigma + b + 3) / (sigma - b - 1)."""
     field = lorenz_field()
-    start = equilibrium_branch(field, "rho", [1.0, 1.0, 1.0], bounds=(1.5, 30.0)).of_kind("Hopf")[0]
+    start = equilibrium_branch(field, [1.0, 1.0, 1.0], "rho", bounds=(1.5, 30.0)).of_kind("Hopf")[0]
     curve = hopf_curve(field, ("rho", "sigma"), start,
                        bounds={"rho": (1.0, 60.0), "sigma": (4.0, 40.0)})
     sigma, b = curve.column("sigma"), 8.0 / 3.0

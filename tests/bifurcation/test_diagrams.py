@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from systems import mode_coupling, two_mass_field
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.stability_map import stability_map
 from fecontact.bifurcation.fields.contact_field import contact_field
@@ -123,7 +124,7 @@ def test_letters_are_left_out_where_there_is_no_room():
 
 def test_flutter_shows_frequencies_that_meet(tmp_path):
     field = contact_field(mode_coupling(0.1), ["friction.friction_coefficient"])
-    branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(0.0, 1.0))
+    branch = equilibrium_branch(field, parameter="friction.friction_coefficient", bounds=(0.0, 1.0))
     upper, lower = eigenvalues_figure(branch, "friction").axes
     modes = [line for line in upper.lines if len(line.get_xdata()) == len(branch)]
     mu = branch.parameter

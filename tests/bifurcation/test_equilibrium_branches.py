@@ -1,5 +1,7 @@
 """Branches of equilibria: published values of AUTO's demos, closed forms, section 4.4."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -24,7 +26,7 @@ from fecontact import (
 )
 from fecontact.bifurcation.continuation.branch import Status
 from fecontact.bifurcation.continuation.pseudo_arclength import Settings
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch, switched_branch
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.core.errors import AnalysisError, InputError
@@ -45,7 +47,7 @@ def predator(t, x, p, out):
 
 def reactor_branch(p2):
     field = vector_field(reactor, {"p1": 0.0, "p2": p2, "p3": 3.0}, 2)
-    return equilibrium_branch(field, "p1", bounds=(0.0, 0.5))
+    return equilibrium_branch(field, parameter="p1", bounds=(0.0, 0.5))
 
 
 def parameters(branch, kind):
@@ -74,40 +76,41 @@ def test_reactor():
 def test_predator_and_prey():
     field = vector_field(predator, {"p1": 0.0, "p2": 3.0, "p3": 5.0, "p4": 3.0}, 2)
     settings = Settings(bounds=(0.01, 1.0))
-    trivial = equilibrium_branch(field, "p1", settings=Settings(bounds=(0.0, 1.0)))
+    trivial = equilibrium_branch(field, parameter="p1", settings=Settings(bounds=(0.0, 1.0)))
     assert parameters(trivial, "branch point") == pytest.approx([0.6], rel=1e-12)
     assert [point.kind for point in trivial.special] == ["branch point"]
-    prey = switched_branch(field, "p1", trivial.special[0], settings=settings)
+    prey = equilibrium_branch(field, trivial.special[0], settings=settings)
     assert prey.column("state")[:, 1] == pytest.approx(np.zeros(len(prey)), abs=1e-12)
     assert sorted(parameters(prey, "branch point")) == pytest.approx([0.6, 0.821904], abs=6e-7)
     fold, = prey.of_kind("fold")
     assert fold.parameter == pytest.approx(0.832929, abs=6e-7)
     assert fold.u[0] == pytest.approx(0.411162, abs=6e-7)
     crossing = max(prey.of_kind("branch point"), key=lambda point: point.parameter)
-    both = switched_branch(field, "p1", crossing, settings=settings)
+    both = equilibrium_branch(field, crossing, settings=settings)
     hopf, = both.of_kind("Hopf")
     assert hopf.parameter == pytest.approx(0.671594, abs=6e-7)
     assert hopf.u[:2] == pytest.approx([1.0 / 3.0, 0.365762], abs=6e-7)
-    with pytest.raises(InputError, match=r"0\.671594 \(Hopf\) has no second branch"):
-        switched_branch(field, "p1", hopf)
+    alone = replace(crossing, details={})
+    with pytest.raises(InputError, match=r"p1 = 0\.821904 \(branch point\) has no other_tangent"):
+        equilibrium_branch(field, alone)
 
 
 def test_lorenz():
     """Pitchfork at 1; Hopf at 470/19, subcritical, with w^2 = b (sigma + rho)."""
     field = lorenz_field()
-    zero = equilibrium_branch(field, "rho", [0.0, 0.0, 0.0], bounds=(0.5, 30.0), direction=-1.0,
+    zero = equilibrium_branch(field, [0.0, 0.0, 0.0], "rho", bounds=(0.5, 30.0), direction=-1.0,
                               both=True)
     fork, = zero.of_kind("branch point")
     assert fork.parameter == pytest.approx(1.0, rel=1e-10)
-    other = switched_branch(field, "rho", fork, bounds=(0.0, 30.0))
+    other = equilibrium_branch(field, fork, bounds=(0.0, 30.0))
     assert len(other.of_kind("Hopf")) == 2
     assert np.sign([point.u[0] for point in other.of_kind("Hopf")]).sum() == 0.0
     for hopf in other.of_kind("Hopf"):
         assert hopf.parameter == pytest.approx(470.0 / 19.0, rel=1e-11)
         w = np.sqrt(8.0 / 3.0 * (10.0 + 470.0 / 19.0))
-        assert hopf.details["angular_frequency"] == pytest.approx(w, rel=1e-11)
-        assert hopf.details["period"] == pytest.approx(0.65283, abs=6e-6)
-        assert hopf.details["criticality"] == "subcritical"
+        assert hopf.angular_frequency == pytest.approx(w, rel=1e-11)
+        assert hopf.period == pytest.approx(0.65283, abs=6e-6)
+        assert hopf.criticality == "subcritical"
     x = other.column("state")
     assert x[:, 0] ** 2 == pytest.approx(8.0 / 3.0 * (other.parameter - 1.0), abs=1e-6)
 
@@ -119,11 +122,11 @@ def test_first_lyapunov_coefficient():
         out[1] = p[0] + p[1] * x[0] + x[0] * x[0] - x[0] * x[1]
 
     field = vector_field(quadratic, {"b": -0.5, "c": -1.0}, 2)
-    hopf, = equilibrium_branch(field, "b", [-0.4, 0.0], bounds=(-1.0, 0.1)).of_kind("Hopf")
+    hopf, = equilibrium_branch(field, [-0.4, 0.0], "b", bounds=(-1.0, 0.1)).of_kind("Hopf")
     assert hopf.parameter == pytest.approx(0.0, abs=1e-12)
-    assert hopf.details["first_lyapunov"] == pytest.approx(2.0 * -0.125, rel=1e-8)
-    assert hopf.details["criticality"] == "supercritical"
-    assert hopf.details["first_lyapunov_error"] < 1e-8
+    assert hopf.first_lyapunov == pytest.approx(2.0 * -0.125, rel=1e-8)
+    assert hopf.criticality == "supercritical"
+    assert hopf.first_lyapunov_error < 1e-8
 
     def landau(t, x, p, out):
         r = x[0] * x[0] + x[1] * x[1]
@@ -133,11 +136,11 @@ def test_first_lyapunov_coefficient():
     # z' = (r + 2i) z + c |z|^2 z; along the unit eigenvector |z|^2 = 2 |zeta|^2, so l1 = 2 c / w.
     for c, kind in ((-1.0, "supercritical"), (0.7, "subcritical")):
         field = vector_field(landau, {"r": -0.5, "c": c}, 2)
-        hopf, = equilibrium_branch(field, "r", bounds=(-1.0, 1.0)).of_kind("Hopf")
+        hopf, = equilibrium_branch(field, parameter="r", bounds=(-1.0, 1.0)).of_kind("Hopf")
         assert hopf.parameter == pytest.approx(0.0, abs=1e-13)
-        assert hopf.details["first_lyapunov"] == pytest.approx(2.0 * c / 2.0, rel=1e-9)
-        assert hopf.details["criticality"] == kind
-        assert hopf.details["crossing_speed"] == pytest.approx(1.0, rel=1e-9)
+        assert hopf.first_lyapunov == pytest.approx(2.0 * c / 2.0, rel=1e-9)
+        assert hopf.criticality == kind
+        assert hopf.crossing_speed == pytest.approx(1.0, rel=1e-9)
 
 
 def exact_hopf(v0, low, high):
@@ -151,7 +154,7 @@ def exact_hopf(v0, low, high):
 
 def test_two_masses_over_the_normal_force():
     """H1 at 1.1834 (the print's 1.12 seems wrong), H2 at 7.09, nothing stationary."""
-    branch = equilibrium_branch(two_mass_field(0.5), "B", bounds=(0.0, 12.0))
+    branch = equilibrium_branch(two_mass_field(0.5), parameter="B", bounds=(0.0, 12.0))
     assert [point.kind for point in branch.special] == ["Hopf", "Hopf"]
     first, second = branch.special
     assert first.parameter == pytest.approx(exact_hopf(1.0, 1.0, 1.4), rel=1e-11)
@@ -159,7 +162,7 @@ def test_two_masses_over_the_normal_force():
     assert first.parameter == pytest.approx(1.1834, abs=5e-5)
     assert second.parameter == pytest.approx(7.09, abs=5e-3)
     # Equilibrium and orbit coexist below H1, so the unstable orbit is born there.
-    assert first.details["criticality"] == "subcritical"
+    assert first.criticality == "subcritical"
     for point in branch.special:
         h = 1e-5
         growth = [np.min(np.abs(np.linalg.eigvals(two_mass_jacobian(B, 1.0))
@@ -173,8 +176,8 @@ def test_two_masses_over_the_normal_force():
 
 def test_two_masses_over_the_belt_speed():
     """B mu'(v_0) has the same values as at H2 and H1 of the other diagram."""
-    branch = equilibrium_branch(two_mass_field(20.0, 4.5), "ground.speed", bounds=(1.0, 4.5),
-                                direction=-1.0)
+    branch = equilibrium_branch(two_mass_field(20.0, 4.5), parameter="ground.speed",
+                                bounds=(1.0, 4.5), direction=-1.0)
     assert [point.kind for point in branch.special] == ["Hopf", "Hopf"]
     slopes = [20.0 * friction_slope(point.parameter) for point in branch.special]
     expected = [B * friction_slope(1.0) for B in (exact_hopf(1.0, 1.0, 1.4),
@@ -186,17 +189,18 @@ def test_two_masses_over_the_belt_speed():
 def test_belt(slope, speed):
     """The oscillator of section 4; unsmoothed, V = ln[N (mu_0 - mu_inf) lambda / b] / lambda."""
     field = contact_field(belt(slope), ["ground.speed"])
-    branch = equilibrium_branch(field, "ground.speed", bounds=(2e-3, 12e-3), direction=-1.0)
+    branch = equilibrium_branch(field, parameter="ground.speed", bounds=(2e-3, 12e-3),
+                                direction=-1.0)
     hopf, = branch.special
     assert hopf.parameter == pytest.approx(speed, rel=6e-8 if slope < 1e9 else 1e-9)
-    assert hopf.details["angular_frequency"] == pytest.approx(np.sqrt(5610.0 / 5.632), rel=1e-9)
-    assert hopf.details["criticality"] == "subcritical"
+    assert hopf.angular_frequency == pytest.approx(np.sqrt(5610.0 / 5.632), rel=1e-9)
+    assert hopf.criticality == "subcritical"
     if slope > 1e9:
         # q'' + w^2 q = e q'^3 grows as A' = 3/8 e w^2 A^3, e = -F mu''' / (6 m^2); the unit
         # eigenvector (1, i w) / sqrt(1 + w^2) makes A = 2 |z| / sqrt(1 + w^2), l1 = c1 / w.
         w = np.sqrt(5610.0 / 5.632)
         e = 14.0 * 0.25 * 1000.0**3 * np.exp(-1000.0 * speed) / (6.0 * 5.632**2)
-        assert hopf.details["first_lyapunov"] == pytest.approx(1.5 * e * w / (1.0 + w * w),
+        assert hopf.first_lyapunov == pytest.approx(1.5 * e * w / (1.0 + w * w),
                                                                rel=1e-6)
 
 
@@ -204,11 +208,11 @@ def test_mode_coupling_with_damping():
     """With damping c I the pair crosses at mu = 3/4 (1 + 2 c^2), w = sqrt 2."""
     c = 0.1
     field = contact_field(mode_coupling(c), ["friction.friction_coefficient"])
-    branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(0.0, 1.0))
+    branch = equilibrium_branch(field, parameter="friction.friction_coefficient", bounds=(0.0, 1.0))
     hopf, = branch.special
     assert hopf.kind == "Hopf"
     assert hopf.parameter == pytest.approx(0.75 * (1.0 + 2.0 * c * c), rel=1e-7)
-    assert hopf.details["angular_frequency"] == pytest.approx(np.sqrt(2.0), rel=1e-7)
+    assert hopf.angular_frequency == pytest.approx(np.sqrt(2.0), rel=1e-7)
     # The equations are linear but for the smoothed sign, far from the origin.
     assert branch.column("unstable")[[0, -1]].tolist() == [0, 2]
 
@@ -216,7 +220,7 @@ def test_mode_coupling_with_damping():
 def test_undamped_modes_are_neither_unstable_nor_crossing():
     """Pairs on the imaginary axis are round-off away from it; only their meeting counts."""
     field = contact_field(mode_coupling(), ["friction.friction_coefficient"])
-    branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(0.0, 1.0))
+    branch = equilibrium_branch(field, parameter="friction.friction_coefficient", bounds=(0.0, 1.0))
     assert [round(point.parameter, 3) for point in branch.special] in ([], [0.75])
     counts, mu = branch.column("unstable"), branch.parameter
     assert (counts[mu < 0.749] == 0).all()
@@ -232,7 +236,7 @@ def test_neutral_saddles_are_not_reported():
         out[3] = (0.1 * p[0] - 0.3) * x[3] + x[2]
 
     field = vector_field(saddle, {"a": -0.5}, 4)
-    assert equilibrium_branch(field, "a", bounds=(-0.9, 0.9)).special == ()
+    assert equilibrium_branch(field, parameter="a", bounds=(-0.9, 0.9)).special == ()
 
 
 def test_pairs_on_the_axis_do_not_cross_it():
@@ -245,8 +249,8 @@ def test_pairs_on_the_axis_do_not_cross_it():
                 out[3 + i] -= p[0] * (0.2 + 0.1 * (i + 1) * (j + 1)) * x[j]
 
     field = vector_field(chain, {"a": 0.1}, 6)
-    branch = equilibrium_branch(field, "a", bounds=(0.0, 2.0), settings=Settings(
-        step=0.005, largest_step=0.005))
+    branch = equilibrium_branch(field, parameter="a", bounds=(0.0, 2.0),
+                                settings=Settings( step=0.005, largest_step=0.005))
     assert len(branch) > 150
     assert branch.special == ()
     assert branch.column("stable").all()
@@ -257,7 +261,7 @@ def test_pitchfork_passed_on_the_bent_branch_is_no_fold():
         out[0] = p[0] * x[0] - x[0] * x[0] * x[0]
 
     field = vector_field(pitchfork, {"a": 0.49}, 1)
-    branch = equilibrium_branch(field, "a", [-0.7], bounds=(-0.5, 0.5), direction=-1.0)
+    branch = equilibrium_branch(field, [-0.7], "a", bounds=(-0.5, 0.5), direction=-1.0)
     assert branch.points[-1].u == pytest.approx([np.sqrt(0.5), 0.5], rel=1e-9)
     assert [point.kind for point in branch.special] == ["branch point"]
     assert branch.special[0].u == pytest.approx([0.0, 0.0], abs=1e-7)
@@ -268,7 +272,7 @@ def test_restart_at_any_point():
     field = vector_field(reactor, {"p1": 0.0, "p2": 17.0, "p3": 3.0}, 2)
     point = branch.points[len(branch) // 2]
     start = find_equilibrium(field, {"p1": point.parameter}, start=point.u[:-1])
-    again = equilibrium_branch(field, "p1", start, bounds=(0.0, 0.5), both=True)
+    again = equilibrium_branch(field, start, "p1", bounds=(0.0, 0.5), both=True)
     assert sorted(parameters(again, "Hopf")) == pytest.approx(sorted(parameters(branch, "Hopf")),
                                                               rel=1e-10)
     assert sorted(parameters(again, "fold")) == pytest.approx(sorted(parameters(branch, "fold")),
@@ -284,7 +288,7 @@ def test_body_that_is_lifted_off_has_no_equilibrium():
     system = ContactSystem(basis, normal=LinearContact(4.0), ground=Ground(speed=1.0),
                            friction=ConstantFriction(0.3, 1e3), load=Load(1.0))
     field = contact_field(system, ["load.normal"])
-    branch = equilibrium_branch(field, "load.normal", bounds=(-1.0, 1.0), direction=-1.0)
+    branch = equilibrium_branch(field, parameter="load.normal", bounds=(-1.0, 1.0), direction=-1.0)
     assert branch.parameter[-1] == pytest.approx(0.0, abs=1e-6)
     assert branch.parameter.min() > -1e-6
     # Normal to the ground the contact spring of 4 carries the load, or nothing does.
@@ -297,13 +301,13 @@ def test_body_that_is_lifted_off_has_no_equilibrium():
 def test_parameter_leaves_its_range():
     """A coefficient cannot be negative: the branch ends there and says why."""
     field = contact_field(mode_coupling(0.1), ["friction.friction_coefficient"])
-    branch = equilibrium_branch(field, "friction.friction_coefficient", bounds=(-1.0, 1.0),
-                                direction=-1.0)
+    branch = equilibrium_branch(field, parameter="friction.friction_coefficient",
+                                bounds=(-1.0, 1.0), direction=-1.0)
     assert branch.status is Status.STALLED
     assert branch.parameter[-1] == pytest.approx(0.0, abs=1e-5)
     assert "friction_coefficient = " in branch.message
     with pytest.raises(InputError, match="no parameter 'mu'"):
-        equilibrium_branch(field, "mu")
+        equilibrium_branch(field, parameter="mu")
 
 
 def test_friction_with_memory():
@@ -312,7 +316,7 @@ def test_friction_with_memory():
     static, kinetic, v_s, sigma = 0.8, 0.55, 2e-3, 1e5
     law = LuGreFriction(static, kinetic, v_s, 1.0, sigma)
     field = contact_field(belt(speed=5e-3).with_(friction=law), ["ground.speed"])
-    branch = equilibrium_branch(field, "ground.speed", bounds=(1e-3, 40e-3))
+    branch = equilibrium_branch(field, parameter="ground.speed", bounds=(1e-3, 40e-3))
     hopf, = branch.special
     m, b, c, F = 5.632, 0.768, 5610.0, 14.0
 

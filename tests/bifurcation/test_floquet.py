@@ -5,7 +5,7 @@ import pytest
 
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
-from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet
 from fecontact.bifurcation.orbits.mesh import node_times
 
@@ -94,7 +94,7 @@ def test_linear_periodic_system_from_1e_30_to_1e10():
     for intervals in (40, 80):
         mesh = np.linspace(0.0, 1.0, intervals + 1)
         zero = np.zeros((4 * intervals, 4))
-        problem = Collocation(field, field.values, 0, mesh, 4, zero, np.ones(6))
+        problem = CollocationProblem(field, field.values, 0, mesh, 4, zero, np.ones(6))
         found = problem.linearise(np.append(zero.reshape(-1), np.log(10.0))).floquet
         assert found.trivial is None
         ratio = np.sort(np.abs(found.multipliers))[::-1] / [1e10, 1e3, 1e-8, 1e-30]
@@ -117,7 +117,7 @@ def test_stuart_landau():
     mesh = np.linspace(0.0, 1.0, 41)
     t = 2.0 * np.pi * node_times(mesh, 4)
     orbit = np.sqrt(r) * np.stack([np.cos(t), np.sin(t)], axis=1)
-    problem = Collocation(field, field.values, 0, mesh, 4, orbit, np.ones(4))
+    problem = CollocationProblem(field, field.values, 0, mesh, 4, orbit, np.ones(4))
     found = problem.linearise(np.concatenate([orbit.reshape(-1), [2.0 * np.pi / w, r]])).floquet
     assert found.trivial_error < 3e-10
     assert found.others == pytest.approx([np.exp(-4.0 * np.pi * r / w)], rel=1e-9)

@@ -14,7 +14,7 @@ import pytest
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
 from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import orbits_from_hopf
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.core.errors import AnalysisError, InputError
 
 size_of = numba.njit(lambda x: abs(x))
@@ -204,11 +204,11 @@ def test_normal_form_and_multipliers_with_powers():
     """
     field = vector_field(oscillator, {"mu": -0.3, "b": 0.7}, 2)
     assert field.differentiation == "differences"
-    rest = equilibrium_branch(field, "mu", bounds=(-0.3, 0.5))
+    rest = equilibrium_branch(field, parameter="mu", bounds=(-0.3, 0.5))
     point, = rest.of_kind("Hopf")
     assert point.parameter == pytest.approx(0.0, abs=1e-10)
     assert point.details["first_lyapunov"] == pytest.approx(-0.75, rel=1e-6)
-    orbits = orbits_from_hopf(field, rest, point, bounds=(-0.3, 0.5), intervals=30)
+    orbits = orbit_branch(field, point, method=Collocation(intervals=30), bounds=(-0.3, 0.5))
     last = orbits.points[-1]
     assert last.parameter == pytest.approx(0.5, abs=1e-9)
     mesh = np.asarray(last.values["mesh"])

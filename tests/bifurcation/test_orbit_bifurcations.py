@@ -9,12 +9,9 @@ from fecontact.bifurcation.continuation.branch import Status
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import (
-    orbits_beyond,
-    orbits_from_hopf,
-    orbits_from_motion,
-    restored,
-)
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.restored import restored
 from fecontact.core.errors import InputError
 from fecontact.output.files.branches import read_branch
 
@@ -28,8 +25,8 @@ def lorenz():
 def asymmetric(lorenz):
     """The asymmetric family, from rho = 280 down to 225."""
     times, states = settled(lorenz, 40.0, [1.0, 2.0, 250.0], 0.45)
-    return orbits_from_motion(lorenz, "rho", times, states, bounds=(225.0, 330.0), direction=-1.0,
-                              intervals=60, settings=Settings(largest_step=0.03))
+    return orbit_branch(lorenz, (times, states), "rho", method=Collocation(intervals=60),
+                        bounds=(225.0, 330.0), direction=-1.0, settings=Settings(largest_step=0.03))
 
 
 def test_lorenz_cascade(lorenz, asymmetric):
@@ -43,16 +40,17 @@ def test_lorenz_cascade(lorenz, asymmetric):
         assert point.details["criticality"] == "supercritical"
         assert point.values["trivial_error"] < 1e-10
         if rho > 217.0:
-            branch = orbits_beyond(lorenz, branch, point, bounds=(215.0, 230.0), settings=Settings(
-                step=0.01, stop_at=("period doubling",)))
+            branch = orbit_branch(lorenz, point, bounds=(215.0, 230.0),
+                                  settings=Settings( step=0.01, stop_at=("period doubling",)))
             assert branch.status is Status.STOPPED
 
 
 def test_lorenz_symmetric_orbit_loses_its_symmetry(lorenz, asymmetric):
     values = lorenz.values_with(rho=330.0)
     times, states = settled(lorenz, 40.0, [1.0, 2.0, 250.0], 0.45, values)
-    symmetric = orbits_from_motion(lorenz, "rho", times, states, values=values, intervals=60,
-                                   bounds=(300.0, 340.0), direction=-1.0)
+    symmetric = orbit_branch(lorenz, PeriodicMotion(times, states, parameter_values=values), "rho",
+                             method=Collocation(intervals=60), bounds=(300.0, 340.0),
+                             direction=-1.0)
     point, = symmetric.of_kind("branch point")
     assert point.parameter == pytest.approx(312.97, abs=6e-3)
     regular = np.array([at.kind is None for at in symmetric.points])
@@ -60,7 +58,7 @@ def test_lorenz_symmetric_orbit_loses_its_symmetry(lorenz, asymmetric):
     assert high[:, :2] == pytest.approx(-low[:, :2], rel=1e-6)
     # Either half of the crossing branch is the asymmetric family.
     for direction in (1.0, -1.0):
-        half = orbits_beyond(lorenz, symmetric, point, bounds=(225.0, 330.0), direction=direction)
+        half = orbit_branch(lorenz, point, bounds=(225.0, 330.0), direction=direction)
         doubling, = half.of_kind("period doubling")
         known, = asymmetric.of_kind("period doubling")
         assert doubling.parameter == pytest.approx(known.parameter, abs=1e-6)
@@ -73,13 +71,13 @@ def masses():
 
 @pytest.fixture(scope="module")
 def sliding(masses):
-    return equilibrium_branch(masses, "B", np.zeros(4), bounds=(0.3, 9.6))
+    return equilibrium_branch(masses, np.zeros(4), "B", bounds=(0.3, 9.6))
 
 
 @pytest.fixture(scope="module")
 def first(masses, sliding):
-    return orbits_from_hopf(masses, sliding, sliding.of_kind("Hopf")[0], intervals=100,
-                            settings=Settings(step=0.005), bounds=(0.3, 9.6))
+    return orbit_branch(masses, sliding.of_kind("Hopf")[0], method=Collocation(intervals=100),
+                        settings=Settings(step=0.005), bounds=(0.3, 9.6))
 
 
 def test_two_masses_first_branch(first):
@@ -106,7 +104,7 @@ def test_two_masses_multipliers_obey_liouville(masses, first):
     stable = [at for at in first.points if at.values["unstable"] == 0]
     for B in (1.1, 1.4):
         point = min(stable, key=lambda at: abs(at.parameter - B))
-        problem, u, _ = restored(masses, first, point)
+        problem, u, _ = restored(masses, point)
         linearised = problem.linearise(u)
         divergence = np.trace(linearised.derivatives[1], axis1=1, axis2=2)
         weights = (problem.widths[:, None] * problem.rule.weights).reshape(-1)
@@ -122,15 +120,16 @@ def test_two_masses_further_doublings(masses, first):
         point = branch.of_kind("period doubling")[0]
         assert point.details["criticality"] == "supercritical"
         intervals = min(2 * intervals, 200)
-        branch = orbits_beyond(masses, branch, point, bounds=(8.0, 9.6), intervals=intervals,
-                               settings=Settings(step=0.005, stop_at=("period doubling",)))
+        branch = orbit_branch(masses, point, method=Collocation(intervals=intervals),
+                              bounds=(8.0, 9.6),
+                              settings=Settings(step=0.005, stop_at=("period doubling",)))
         assert branch.special[-1].parameter == pytest.approx(B, abs=6e-3)
 
 
 def test_two_masses_coexisting_branch(masses, sliding):
     hopf = sliding.of_kind("Hopf")[1]
     assert hopf.parameter == pytest.approx(7.09, abs=5e-3)
-    branch = orbits_from_hopf(masses, sliding, hopf, intervals=80, bounds=(0.3, 9.6))
+    branch = orbit_branch(masses, hopf, method=Collocation(intervals=80), bounds=(0.3, 9.6))
     doublings = branch.of_kind("period doubling")
     assert doublings[-1].parameter == pytest.approx(7.25, abs=5e-3)
     assert doublings[-1].details["criticality"] == "subcritical"
@@ -139,8 +138,8 @@ def test_two_masses_coexisting_branch(masses, sliding):
 
 
 def test_points_stay_where_they_are_when_the_mesh_doubles(masses, sliding, first):
-    finer = orbits_from_hopf(masses, sliding, sliding.of_kind("Hopf")[0], intervals=200,
-                             settings=Settings(step=0.005), bounds=(0.3, 9.6))
+    finer = orbit_branch(masses, sliding.of_kind("Hopf")[0], method=Collocation(intervals=200),
+                         settings=Settings(step=0.005), bounds=(0.3, 9.6))
     for kind in ("fold", "period doubling"):
         assert finer.of_kind(kind)[0].parameter == pytest.approx(
             first.of_kind(kind)[0].parameter, abs=3e-9)
@@ -150,8 +149,8 @@ def test_branches_go_on_from_their_files(masses, first, tmp_path):
     loaded = read_branch(write_branch(tmp_path / "orbits.h5", first))
     assert [at.kind for at in loaded.points] == [at.kind for at in first.points]
     assert (loaded.column("multipliers") == first.column("multipliers")).all()
-    doubled = [orbits_beyond(masses, branch, branch.of_kind("period doubling")[0],
-                             settings=Settings(points=2), bounds=(8.0, 9.6)).points[-1]
+    doubled = [orbit_branch(masses, branch.of_kind("period doubling")[0],
+                            settings=Settings(points=2), bounds=(8.0, 9.6)).points[-1]
                for branch in (first, loaded)]
     assert (doubled[0].u == doubled[1].u).all()
 
@@ -191,8 +190,8 @@ def circle_branch(function, c):
     field = vector_field(function, {"lam": -0.2, "c": c}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
-    return orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.3, 0.3),
-                              intervals=20, scales=np.ones(3))
+    return orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
+                        method=Collocation(intervals=20), bounds=(-0.3, 0.3), scales=np.ones(3))
 
 
 # With eigenfunctions of mean square one; the speed's response to a adds to it: 0.4 a with
@@ -221,9 +220,9 @@ def test_normal_form_of_a_torus(c):
 
 def test_kind_errors(masses, sliding, first):
     fold = first.of_kind("fold")[0]
-    with pytest.raises(InputError, match=r"at B = 0\.890687 is 'fold', but orbits are born"):
-        orbits_from_hopf(masses, sliding, fold)
-    with pytest.raises(InputError, match=r"at B = 0\.890687, 'fold', no other orbits begin"):
-        orbits_beyond(masses, first, fold)
-    with pytest.raises(InputError, match="not one of periodic orbits"):
-        orbits_beyond(masses, sliding, sliding.points[0])
+    with pytest.raises(InputError, match=r"B = 1 \(a regular point\) has no orbits to follow"):
+        orbit_branch(masses, sliding.points[0])
+    with pytest.raises(InputError, match=r"at B = 0\.890687 \(fold\) is no equilibrium"):
+        equilibrium_branch(masses, fold)
+    with pytest.raises(InputError, match="field has no parameter"):
+        orbit_branch(lorenz_field(), fold)

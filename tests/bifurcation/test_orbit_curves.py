@@ -7,16 +7,17 @@ from collocation_fields import two_masses_field
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import orbits_from_hopf, orbits_from_motion
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import InputError
 
 
 def first_branch(**changes):
     field = two_masses_field(**changes)
-    sliding = equilibrium_branch(field, "B", np.zeros(4), bounds=(0.2, 12.0))
-    return field, orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], intervals=80,
-                                   bounds=(0.2, 12.0))
+    sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.2, 12.0))
+    return field, orbit_branch(field, sliding.of_kind("Hopf")[0], method=Collocation(intervals=80),
+                               bounds=(0.2, 12.0))
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def masses():
 def test_curve_agrees_with_branches(masses, kind, second, tolerance):
     field, branch = masses
     start, = branch.of_kind(kind)
-    curve = orbit_curve(field, branch, start, second, bounds=(0.2, 20.0),
+    curve = orbit_curve(field, start, second, bounds=(0.2, 20.0),
                         settings=Settings(step=0.005, largest_step=0.03, points=12))
     assert len(curve) == 12
     assert curve.parameter[0] == pytest.approx(start.parameter, rel=tolerance)
@@ -56,10 +57,10 @@ def test_curve_of_tori():
     field = vector_field(torus, {"lam": -0.2, "a": 0.3}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
-    branch = orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.5, 0.5),
-                                intervals=16, scales=np.ones(3))
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
+                          method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     point, = branch.of_kind("Neimark-Sacker")
-    curve = orbit_curve(field, branch, point, "a", direction=-1.0, bounds=(-0.1, 0.5),
+    curve = orbit_curve(field, point, "a", direction=-1.0, bounds=(-0.1, 0.5),
                         settings=Settings(points=30), width=1.0)
     assert curve.parameter == pytest.approx(curve.column("a") ** 2, abs=1e-9)
     # It goes through the turning point a = 0, and on.
@@ -91,12 +92,13 @@ def test_cusp_of_cycles():
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
     s = np.roots([1.0, 0.0, -0.3, -0.2]).real.max()
-    branch = orbits_from_motion(field, "p", t, (1.0 + s) * circle, period=np.pi, direction=-1.0,
-                                bounds=(-0.3, 0.3), intervals=16, scales=np.ones(2))
+    branch = orbit_branch(field, PeriodicMotion(t, (1.0 + s) * circle, period=np.pi), "p",
+                          method=Collocation(intervals=16), direction=-1.0, bounds=(-0.3, 0.3),
+                          scales=np.ones(2))
     folds = branch.of_kind("fold")
     assert sorted(at.parameter for at in folds) == pytest.approx(
         [-2.0 * 0.1**1.5, 2.0 * 0.1**1.5], rel=1e-8)
-    curve = orbit_curve(field, branch, folds[0], "q", both=True, bounds=(-0.2, 0.2), width=1.0,
+    curve = orbit_curve(field, folds[0], "q", both=True, bounds=(-0.2, 0.2), width=1.0,
                         settings=Settings(largest_step=0.03, points=60))
     p, q = curve.parameter, curve.column("q")
     assert p**2 == pytest.approx(4.0 * (q / 3.0) ** 3, abs=1e-9)
@@ -124,11 +126,11 @@ def doubling(t, x, p, out):
 def test_generalised_period_doubling():
     """The multiplier is -exp(pi (lam - 0.3 k)), the cubic coefficient k."""
     field, t, circle = circle_field(doubling, lam=-0.4, k=-0.5)
-    branch = orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.5, 0.5),
-                                intervals=16, scales=np.ones(3))
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
+                          method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     point, = branch.of_kind("period doubling")
     assert point.parameter == pytest.approx(-0.15, abs=1e-9)
-    curve = orbit_curve(field, branch, point, "k", bounds=(-0.3, 0.15), width=1.0)
+    curve = orbit_curve(field, point, "k", bounds=(-0.3, 0.15), width=1.0)
     assert curve.parameter == pytest.approx(0.3 * curve.column("k"), abs=1e-9)
     found, = curve.special
     assert found.kind == "generalised period doubling"
@@ -149,10 +151,10 @@ def twisted(t, x, p, out):
 def test_strong_resonances():
     """The multipliers of the circle are exp(pi (lam - nu +- i nu))."""
     field, t, circle = circle_field(twisted, lam=0.7, nu=0.8)
-    branch = orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(0.3, 0.9),
-                                intervals=16, scales=np.ones(3))
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
+                          method=Collocation(intervals=16), bounds=(0.3, 0.9), scales=np.ones(3))
     point, = branch.of_kind("Neimark-Sacker")
-    curve = orbit_curve(field, branch, point, "nu", direction=-1.0, bounds=(0.3, 0.9), width=1.0)
+    curve = orbit_curve(field, point, "nu", direction=-1.0, bounds=(0.3, 0.9), width=1.0)
     assert [(at.kind, at.values["nu"]) for at in curve.special] == [
         ("resonance 1:3", pytest.approx(2.0 / 3.0, abs=1e-8)),
         ("resonance 1:4", pytest.approx(0.5, abs=1e-8))]
@@ -160,10 +162,10 @@ def test_strong_resonances():
 
 def test_kind_errors(masses):
     field, branch = masses
-    with pytest.raises(InputError, match="'a regular point'; curves start at 'fold'"):
-        orbit_curve(field, branch, branch.points[3], "v0")
+    with pytest.raises(InputError, match="starts no curve; curves start at 'fold'"):
+        orbit_curve(field, branch.points[3], "v0")
     fold, = branch.of_kind("fold")
     with pytest.raises(InputError, match="no parameter 'speed'"):
-        orbit_curve(field, branch, fold, "speed")
+        orbit_curve(field, fold, "speed")
     with pytest.raises(InputError, match="second = 'B' is the parameter of the branch"):
-        orbit_curve(field, branch, fold, "B")
+        orbit_curve(field, fold, "B")

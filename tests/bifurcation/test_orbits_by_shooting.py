@@ -1,7 +1,6 @@
 """What begins on branches by shooting, driven systems, and settled motions as starts."""
 
 from dataclasses import replace
-from functools import partial
 
 import impact_orbits
 import numpy as np
@@ -20,18 +19,13 @@ from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.orbits.branches import (
-    orbits_beyond,
-    orbits_by_shooting,
-    orbits_from_hopf,
-    orbits_from_motion,
+    Collocation,
+    Shooting,
+    orbit_branch,
 )
-from fecontact.bifurcation.orbits.from_run import settled_motion
-from fecontact.bifurcation.orbits.period_doubling import (
-    doubled_by_shooting,
-    hopf_orbits_by_shooting,
-    restored_shooting,
-)
-from fecontact.bifurcation.orbits.samples import motion_of, observe, orbit_history
+from fecontact.bifurcation.orbits.from_run import periodic_motion
+from fecontact.bifurcation.orbits.restored import restored_shooting
+from fecontact.bifurcation.orbits.samples import observe
 from fecontact.core.errors import AnalysisError, InputError
 
 FEW = Settings(step=5e-3, largest_step=0.05, points=60)
@@ -40,9 +34,9 @@ FEW = Settings(step=5e-3, largest_step=0.05, points=60)
 @pytest.fixture(scope="module")
 def two_masses():
     field = two_mass_field()
-    sliding = equilibrium_branch(field, "B", bounds=(0.3, 8.3))
-    orbits = orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], intervals=100,
-                              bounds=(0.3, 8.3))
+    sliding = equilibrium_branch(field, parameter="B", bounds=(0.3, 8.3))
+    orbits = orbit_branch(field, sliding.of_kind("Hopf")[0], method=Collocation(intervals=100),
+                          bounds=(0.3, 8.3))
     return field, sliding, orbits
 
 
@@ -50,14 +44,12 @@ def test_doubled_orbits_agree_with_collocation(two_masses):
     field, _, orbits = two_masses
     doubling, = orbits.of_kind("period doubling")
     near = max((at for at in orbits.points if at.parameter < 8.08), key=lambda at: at.parameter)
-    times, states = orbit_history(near, 4, 2000)
-    values = field.values_with(B=near.parameter)
-    shot = orbits_by_shooting(field, "B", times, states, values=values, bounds=(7.5, 8.11),
-                              period=near.values["period"], settings=FEW)
+    motion = near.orbit(field, 2000)
+    shot = orbit_branch(field, motion, "B", method=Shooting(), bounds=(7.5, 8.11), settings=FEW)
     found, = shot.of_kind("period doubling")
     assert found.parameter == pytest.approx(doubling.parameter, rel=1e-7)
-    twice = doubled_by_shooting(field, shot, found, settings=FEW, bounds=(8.05, 8.12))
-    wanted = orbits_beyond(field, orbits, doubling, settings=FEW, bounds=(8.05, 8.12))
+    twice = orbit_branch(field, found, settings=FEW, bounds=(8.05, 8.12))
+    wanted = orbit_branch(field, doubling, settings=FEW, bounds=(8.05, 8.12))
     for branch in (twice, wanted):
         assert branch.points[-1].parameter == pytest.approx(8.12, rel=1e-12)
     one, other = twice.points[-1].values, wanted.points[-1].values
@@ -79,11 +71,9 @@ def test_events_agree_with_collocation(two_masses):
     wanted = (near.values["period"] + beyond.values["period"]) / 2.0
     settings = Settings(step=0.02, points=10, stop_at=["period"],
                         events={"period": lambda values: values["period"] - wanted})
-    motion = orbit_history(near, 4, 2000)
-    options = {"values": field.values_with(B=near.parameter), "bounds": (7.0, 8.3),
-               "period": near.values["period"], "settings": settings}
-    places = [follow(field, "B", *motion, **options).of_kind("period")[0].parameter
-              for follow in (orbits_by_shooting, partial(orbits_from_motion, intervals=100))]
+    places = [orbit_branch(field, near.orbit(field, 2000), "B", method=method, bounds=(7.0, 8.3),
+                           settings=settings).of_kind("period")[0].parameter
+              for method in (Shooting(), Collocation(intervals=100))]
     assert near.parameter < places[0] < beyond.parameter
     assert places[0] == pytest.approx(places[1], rel=1e-8)
 
@@ -92,11 +82,10 @@ def test_orbits_of_a_hopf_point_agree_with_collocation(two_masses):
     field, sliding, _ = two_masses
     hopf = sliding.of_kind("Hopf")[0]
     # The branch leaves to smaller B.
-    shot = hopf_orbits_by_shooting(field, sliding, hopf, settings=FEW, bounds=(1.1, 8.3),
-                                   segments=3)
+    shot = orbit_branch(field, hopf, method=Shooting(segments=3), settings=FEW, bounds=(1.1, 8.3))
     assert shot.points[-1].parameter == pytest.approx(1.1, rel=1e-12)
     assert not shot.points[-1].values["stable"]
-    beside = orbits_from_hopf(field, sliding, hopf, settings=FEW, bounds=(1.1, 8.3))
+    beside = orbit_branch(field, hopf, settings=FEW, bounds=(1.1, 8.3))
     assert shot.points[-1].values["period"] == pytest.approx(
         beside.points[-1].values["period"], rel=1e-7)
 
@@ -123,13 +112,14 @@ def island():
         system, FOLD + 0.1 * (1.0 - p * p)))})
 
 
-def on_island(two_masses, **options):
+def on_island(two_masses, settings, segments=4):
     _, _, orbits = two_masses
     near = min((at for at in orbits.points if at.values["stable"]),
                key=lambda at: abs(at.parameter - 0.95))
-    return orbits_by_shooting(
-        island(), "p", *orbit_history(near, 4, 2000), period=near.values["period"],
-        values=[np.sqrt(1.0 - (near.parameter - FOLD) / 0.1)], bounds=(-1.5, 1.5), **options)
+    motion = replace(near.orbit(samples=2000),
+                     parameter_values=[np.sqrt(1.0 - (near.parameter - FOLD) / 0.1)])
+    return orbit_branch(island(), motion, method=Shooting(segments), bounds=(-1.5, 1.5),
+                        settings=settings)
 
 
 @pytest.mark.parametrize("segments", [1, 4])
@@ -151,74 +141,79 @@ def test_orbits_in_another_phase_are_met_again(two_masses):
     """A quarter of a period later, off the ends of the segments, it is the same orbit; beside it
     it is not."""
     branch = on_island(two_masses, settings=Settings(points=2))
-    problem, u = restored_shooting(island(), branch, branch.points[0])
+    problem, u, _ = restored_shooting(island(), branch.points[0])
     tangent = branch.points[0].tangent
     later = np.concatenate([problem.at_phases(u, problem.mesh[:-1] + 0.217).reshape(-1), u[-2:]])
     assert np.abs(later - u)[:-2].max() > 0.1
     moved = replace(problem, reference=problem.starts(later)[0].copy())
-    again = moved.met_again(problem, u, tangent, later, tangent)
+    again = moved.met_again(problem, u, tangent, later, tangent, np.inf)
     assert np.abs(again - later).max() < 1e-6 * np.abs(later).max()
-    assert moved.met_again(problem, u, tangent, later, -tangent) is None
-    other, v = restored_shooting(island(), branch, branch.points[1])
-    beside = other.met_again(problem, u, tangent, v, tangent)
+    assert moved.met_again(problem, u, tangent, later, -tangent, np.inf) is None
+    other, v, _ = restored_shooting(island(), branch.points[1])
+    beside = other.met_again(problem, u, tangent, v, tangent, np.inf)
     assert np.sqrt(other.weights() @ (beside - v) ** 2) == pytest.approx(
         np.sqrt(other.weights() @ (u - v) ** 2), rel=1e-3)
 
 
 def test_driven_orbits_a_period_of_the_drive_later_are_the_same():
-    motion = settled_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
+    motion = periodic_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
                             longest_period=8 * 2.0 * np.pi / 30.9)
     assert motion.periods == 2
     field = impact_orbits.field_at(30.9)
-    name = next(iter(field.parameters))
-    branch = orbits_by_shooting(field, name, motion.times, motion.states, periods=2, segments=3,
-                                bounds=(30.0, 32.0), settings=Settings(points=1))
-    problem, u = restored_shooting(field, branch, branch.points[0])
+    branch = orbit_branch(field, motion, method=Shooting(segments=3), bounds=(30.0, 32.0),
+                          settings=Settings(points=1))
+    problem, u, _ = restored_shooting(field, branch.points[0])
     tangent = branch.points[0].tangent
     later = np.append(problem.at_phases(u, problem.mesh[:-1] + 0.5).reshape(-1), u[-1])
     sizes = np.ptp(motion.states, axis=0)
     assert (np.abs(later - u)[:-1].reshape(3, 4) / sizes).max() > 1e-3
-    again = problem.met_again(problem, u, tangent, later, tangent)
+    again = problem.met_again(problem, u, tangent, later, tangent, np.inf)
     assert (np.abs(again - later)[:-1].reshape(3, 4) / sizes).max() < 1e-9
 
 
-def test_settled_motions():
-    motion = settled_motion(belt(speed=1e-3), initial=np.zeros(2), transient=6.0,
+def test_periodic_motions():
+    motion = periodic_motion(belt(speed=1e-3), initial=np.zeros(2), transient=6.0,
                             longest_period=2.0)
     # Known from an independent calculation.
     assert motion.period == pytest.approx(1.264348, abs=2e-5)
-    driven = settled_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
+    driven = periodic_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
                             longest_period=8 * 2.0 * np.pi / 30.9)
     assert driven.periods == 2
     assert driven.period == pytest.approx(4.0 * np.pi / 30.9, rel=1e-12)
     assert np.abs(driven.states[-1] - driven.states[0]).max() < 1e-3 * np.ptp(driven.states)
     with pytest.raises(AnalysisError, match=r"(does not repeat|has not settled) within 4 periods"):
-        settled_motion(impact_orbits.oscillator(23.63), initial=np.zeros(4), transient=10.0,
+        periodic_motion(impact_orbits.oscillator(23.63), initial=np.zeros(4), transient=10.0,
                        longest_period=4 * 2.0 * np.pi / 23.63)
     with pytest.raises(InputError, match="give transient"):
-        settled_motion(belt(speed=1e-3))
+        periodic_motion(belt(speed=1e-3))
 
 
 def test_motions_of_both_kinds_are_those_of_runs(two_masses):
     field, _, orbits = two_masses
     point = next(at for at in orbits.points if at.values["stable"] and at.kind is None)
-    times, states = motion_of(field, orbits, point, 50)
-    values = field.values_with(B=point.parameter)
-    run = simulate(field.system(values), times[-1], initial=states[0], outputs=times, rtol=1e-9)
-    assert np.abs(run.states - states).max() < 1e-4 * np.abs(states).max()
+    motion = point.orbit(field, 50)
+    run = simulate(field.system(motion.parameter_values), motion.period, initial=motion.states[0],
+                   outputs=motion.times, rtol=1e-9)
+    assert np.abs(run.states - motion.states).max() < 1e-4 * np.abs(motion.states).max()
 
 
 def test_kind_errors(two_masses):
     field, sliding, orbits = two_masses
     doubling, = orbits.of_kind("period doubling")
-    with pytest.raises(InputError, match="not one of periodic orbits by shooting"):
-        doubled_by_shooting(field, orbits, doubling)
-    with pytest.raises(InputError, match="is no period doubling"):
-        doubled_by_shooting(field, orbits, orbits.points[3])
-    with pytest.raises(InputError, match="is no Hopf point"):
-        hopf_orbits_by_shooting(field, sliding, sliding.points[0])
+    with pytest.raises(InputError, match="collocation of degree 4, and so are the orbits beyond"):
+        orbit_branch(field, doubling, method=Shooting())
+    with pytest.raises(InputError, match="both = True goes with motions and regular points"):
+        orbit_branch(field, doubling, both=True)
+    with pytest.raises(InputError, match="follow the equilibrium over that one first"):
+        orbit_branch(field, sliding.of_kind("Hopf")[0], "ground.speed")
+    with pytest.raises(InputError, match="has no orbits to follow"):
+        orbit_branch(field, sliding.points[0], method=Shooting())
     with pytest.raises(InputError, match="is no periodic orbit"):
-        motion_of(field, sliding, sliding.points[0])
-    with pytest.raises(InputError, match="not one of periodic orbits"):
-        restored_shooting(lorenz_field(), sliding, sliding.points[0])
+        sliding.points[0].orbit(field)
+    with pytest.raises(InputError, match="is no periodic orbit by shooting"):
+        restored_shooting(lorenz_field(), sliding.points[0])
+    with pytest.raises(InputError, match="start must be two arrays"):
+        orbit_branch(field, (1.0, 2.0, 3.0), "B")
+    with pytest.raises(InputError, match="segments = 0 must be"):
+        Shooting(segments=0)
     assert contact_field(belt(), {}).dimension == 2

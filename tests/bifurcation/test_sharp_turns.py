@@ -9,11 +9,12 @@ from test_continuation import Plane
 
 from fecontact import simulate
 from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.follow import follow
 from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.orbits.branches import orbits_by_shooting, orbits_from_hopf
+from fecontact.bifurcation.orbits.branches import Collocation, Shooting, orbit_branch
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import InputError
 from fecontact.integrate.sensitivity import sensitivity
 
@@ -91,10 +92,10 @@ def folds():
         run = simulate(system, 10.0, initial=MASS**0.5 * np.array([8.4 / 5610.0, start]),
                        outputs=10001, rtol=1e-9)
         field = contact_field(system, {"ground.speed": None})
-        branch = orbits_by_shooting(
-            field, "ground.speed", run.time[-500:], run.states[-500:], width=0.25,
-            bounds=(start - 5e-3, 0.25), scales=1.5 * MASS**0.5 * np.array([0.007, 0.23]),
-            settings=Settings(step=2e-3))
+        branch = orbit_branch(field, (run.time[-500:], run.states[-500:]), "ground.speed",
+                              method=Shooting(), width=0.25, bounds=(start - 5e-3, 0.25),
+                              scales=1.5 * MASS**0.5 * np.array([0.007, 0.23]),
+                              settings=Settings(step=2e-3))
         found[slope] = branch, fold_speed(slope, speeds, slips)
     return found
 
@@ -153,17 +154,19 @@ def test_starts_outside_the_bounds():
     t = np.linspace(0.0, 0.2, 100)
     states = np.stack([np.sin(31.4 * t), 31.4 * np.cos(31.4 * t)], axis=1)
     with pytest.raises(InputError, match=r"starts? lies at 0.012, outside the bounds .*, 1 to 2"):
-        orbits_by_shooting(contact_field(belt(), {"ground.speed": None}), "ground.speed", t, states,
-                           period=0.2, bounds=(1.0, 2.0))
+        orbit_branch(contact_field(belt(), {"ground.speed": None}),
+                     PeriodicMotion(t, states, period=0.2), "ground.speed", method=Shooting(),
+                     bounds=(1.0, 2.0))
 
 
 def test_collocation_goes_round_where_friction_is_less_steep():
     """Slope 1e4 s/m: from the Hopf point to the fold and back, with nothing else on the way."""
     field = contact_field(belt(1e4, 0.12), {"ground.speed": None})
-    sliding = equilibrium_branch(field, "ground.speed", bounds=(2e-3, 0.12), direction=-1.0)
+    sliding = equilibrium_branch(field, parameter="ground.speed", bounds=(2e-3, 0.12),
+                                 direction=-1.0)
     hopf, = sliding.special
-    branch = orbits_from_hopf(field, sliding, hopf, bounds=(2e-3, 0.12), intervals=100,
-                              settings=Settings(step=5e-3, points=400))
+    branch = orbit_branch(field, hopf, method=Collocation(intervals=100), bounds=(2e-3, 0.12),
+                          settings=Settings(step=5e-3, points=400))
     assert branch.status is Status.BOUND
     assert branch.parameter[-1] == pytest.approx(2e-3)
     fold, = branch.special

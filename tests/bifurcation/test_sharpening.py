@@ -13,7 +13,8 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import orbits_from_hopf, orbits_from_motion
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.normal_forms import verdict
 from fecontact.cli.commands.branch import branches_csv, special_table
 from fecontact.output.files.branches import read_branch
@@ -23,8 +24,9 @@ def circle_branch(function, c, intervals):
     field = vector_field(function, {"lam": -0.2, "c": c}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
-    return orbits_from_motion(field, "lam", t, circle, period=np.pi, bounds=(-0.3, 0.3),
-                              intervals=intervals, scales=np.ones(3))
+    return orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
+                        method=Collocation(intervals=intervals), bounds=(-0.3, 0.3),
+                        scales=np.ones(3))
 
 
 @pytest.mark.parametrize("intervals", [2, 3, 5])
@@ -55,9 +57,9 @@ def slow_doubling():
     times, states = settled(field, 400.0, [1.0, 0.0, 8.0, 0.0], 15.0)
 
     def found(intervals):
-        branch = orbits_from_motion(
-            field, "D", times, states, bounds=(0.03, 0.05), width=2.0, direction=-1.0,
-            intervals=intervals, scales=np.full(4, 8.0),
+        branch = orbit_branch(
+            field, (times, states), "D", method=Collocation(intervals=intervals),
+            bounds=(0.03, 0.05), width=2.0, direction=-1.0, scales=np.full(4, 8.0),
             settings=Settings(step=0.002, largest_step=0.01, points=40,
                               stop_at=["period doubling"]))
         return branch.special[0]
@@ -86,10 +88,10 @@ def test_criticality_is_that_of_finer_meshes_or_undecided(slow_doubling, interva
 def second():
     """The second branch over v_0 at B = 20, from its Hopf point over the fold and two doublings."""
     field = two_masses_field(B=20.0, v0=8.0)
-    sliding = equilibrium_branch(field, "v0", np.zeros(4), bounds=(0.05, 8.0), direction=-1.0)
-    return orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[1], bounds=(0.05, 8.0),
-                            intervals=50, scales=np.full(4, 8.0),
-                            settings=Settings(step=0.005, largest_step=0.04, points=80))
+    sliding = equilibrium_branch(field, np.zeros(4), "v0", bounds=(0.05, 8.0), direction=-1.0)
+    return orbit_branch(field, sliding.of_kind("Hopf")[1], method=Collocation(intervals=50),
+                        bounds=(0.05, 8.0), scales=np.full(4, 8.0),
+                        settings=Settings(step=0.005, largest_step=0.04, points=80))
 
 
 def test_points_on_sharp_turns_are_found_again(second):
@@ -110,9 +112,9 @@ def test_points_on_sharp_turns_are_found_again(second):
 def test_points_that_are_not_found_again_say_so(tmp_path, monkeypatch):
     monkeypatch.setattr(sharpening, "_searched", lambda *_: None)
     field = two_masses_field(B=0.3)
-    sliding = equilibrium_branch(field, "B", np.zeros(4), bounds=(0.3, 9.6))
-    branch = orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], bounds=(0.3, 9.6),
-                              settings=Settings(step=0.005))
+    sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.3, 9.6))
+    branch = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=(0.3, 9.6),
+                          settings=Settings(step=0.005))
     for point, exact in zip(branch.special, (0.890686833, 8.0921923845), strict=True):
         assert not point.details["located"]
         assert abs(point.parameter - exact) < point.details["parameter_error"]
@@ -137,9 +139,9 @@ def test_points_that_are_not_found_again_say_so(tmp_path, monkeypatch):
 def test_doublings_of_a_mesh_too_coarse_are_marked():
     """On ten intervals there are three between B = 7.8 and 8.3; the one there is lies at 8.0922."""
     field = two_masses_field(B=0.3)
-    sliding = equilibrium_branch(field, "B", np.zeros(4), bounds=(0.3, 9.6))
-    branch = orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], bounds=(0.3, 9.6),
-                              intervals=10, settings=Settings(step=0.005))
+    sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.3, 9.6))
+    branch = orbit_branch(field, sliding.of_kind("Hopf")[0], method=Collocation(intervals=10),
+                          bounds=(0.3, 9.6), settings=Settings(step=0.005))
     fold, *others = branch.special
     assert fold.kind == "fold"
     assert abs(fold.parameter - 0.890686833041) <= 1.2 * fold.details["parameter_error"] < 1e-4
@@ -161,12 +163,12 @@ def swirl(t, x, p, out):
 
 def test_events_on_orbits_are_as_sharp_as_on_equilibria():
     field = vector_field(swirl, {"r": -0.1}, 2)
-    rest = equilibrium_branch(field, "r", bounds=(-0.1, 1.0))
+    rest = equilibrium_branch(field, parameter="r", bounds=(-0.1, 1.0))
     events = {"period of 4.5 s": lambda values: values["period"] - 4.5,
               "radius of 0.7": lambda values: values["maximum"][0] - 0.7,
               "multiplier of 0.1": lambda values: np.log(np.abs(values["multipliers"]).min() / 0.1)}
-    branch = orbits_from_hopf(field, rest, rest.special[0], bounds=(-0.1, 1.0), intervals=60,
-                              settings=Settings(events=events))
+    branch = orbit_branch(field, rest.special[0], method=Collocation(intervals=60),
+                          bounds=(-0.1, 1.0), settings=Settings(events=events))
 
     def place(kind):
         return branch.of_kind(kind)[0].parameter

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from systems import belt, lorenz_field, two_mass_field
 
-from fecontact import simulate
+from fecontact import simulate, window
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.orbits.branches import orbits_by_shooting, orbits_from_hopf, restored
+from fecontact.bifurcation.orbits.branches import Collocation, Shooting, orbit_branch
 from fecontact.bifurcation.orbits.mesh import interpolate
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.restored import restored
 from fecontact.bifurcation.orbits.samples import quantity_range
 from fecontact.bifurcation.orbits.shooting import shooting_from
 from fecontact.core.errors import AnalysisError, InputError
@@ -19,16 +21,16 @@ from fecontact.core.errors import AnalysisError, InputError
 @pytest.fixture(scope="module")
 def two_masses():
     field = two_mass_field()
-    sliding = equilibrium_branch(field, "B", bounds=(0.3, 9.0))
-    return field, orbits_from_hopf(field, sliding, sliding.of_kind("Hopf")[0], intervals=150,
-                                   bounds=(0.3, 9.0))
+    sliding = equilibrium_branch(field, parameter="B", bounds=(0.3, 9.0))
+    return field, orbit_branch(field, sliding.of_kind("Hopf")[0], method=Collocation(intervals=150),
+                               bounds=(0.3, 9.0))
 
 
 @pytest.mark.parametrize("kind", ["fold", "period doubling"])
 def test_special_points_agree_with_collocation(two_masses, kind):
     field, branch = two_masses
     point, = branch.of_kind(kind)
-    problem, u, tangent = restored(field, branch, point)
+    problem, u, tangent = restored(field, point)
     shot, v = shooting_from(problem, u, 3, 1e-11)
     along = np.append(interpolate(problem.mesh, problem.nodes(tangent), shot.mesh[:-1]).reshape(-1),
                       tangent[problem.size:])
@@ -44,7 +46,7 @@ def test_multipliers_agree_with_collocation(two_masses):
     field, branch = two_masses
     point = min((at for at in branch.points if at.values["stable"]),
                 key=lambda at: abs(at.parameter - 1.5))
-    problem, u, _ = restored(field, branch, point)
+    problem, u, _ = restored(field, point)
     for segments in (1, 5):
         shot, v = shooting_from(problem, u, segments, 1e-10)
         linearised = shot.linearise(v)
@@ -57,8 +59,8 @@ def test_belt_with_steep_friction():
     system = belt(speed=1e-3)
     field = contact_field(system, {"ground.speed": None})
     run = simulate(system, 12.0, initial=np.array([0.0, 0.0]), outputs=24001, rtol=1e-8)
-    branch = orbits_by_shooting(field, "ground.speed", run.time[-6000:], run.states[-6000:],
-                                bounds=(1e-3, 4e-3), segments=2)
+    branch = orbit_branch(field, window(run, 9.0), "ground.speed",
+                          method=Shooting(segments=2), bounds=(1e-3, 4e-3))
     first = branch.points[0]
     row = field.displacement_row(0)
     assert first.values["period"] == pytest.approx(1.264348, abs=2e-6)
@@ -77,8 +79,9 @@ def test_driven_belt_closes_after_four_periods():
     period = 2.0 * np.pi / 13.8
     run = simulate(system, 40.0 * period, initial=np.zeros(2), rtol=1e-8,
                    outputs=np.linspace(0.0, 40.0 * period, 8001))
-    branch = orbits_by_shooting(field, "drive.amplitude_x", run.time, run.states, periods=4,
-                                bounds=(0.5e-3, 0.52e-3), settings=Settings(points=4))
+    branch = orbit_branch(field, PeriodicMotion(run.time, run.states, periods=4),
+                          "drive.amplitude_x", method=Shooting(), bounds=(0.5e-3, 0.52e-3),
+                          settings=Settings(points=4))
     first = branch.points[0]
     assert first.values["period"] == pytest.approx(4.0 * period, rel=1e-12)
     assert first.values["stable"]
@@ -88,21 +91,23 @@ def test_driven_belt_closes_after_four_periods():
     assert distance[36] < 1e-8
     assert (distance[37:40] > 1e-4).all()
     with pytest.raises(AnalysisError, match=r"No periodic orbit was found at drive\.amplitude_x"):
-        orbits_by_shooting(field, "drive.amplitude_x", run.time, run.states, periods=1)
+        orbit_branch(field, PeriodicMotion(run.time, run.states, periods=1), "drive.amplitude_x",
+                     method=Shooting())
 
 
 def test_kind_errors(two_masses):
     field, branch = two_masses
-    problem, u, _ = restored(field, branch, branch.points[5])
+    problem, u, _ = restored(field, branch.points[5])
     with pytest.raises(InputError, match="segments = 0 must be"):
         shooting_from(problem, u, 0)
     t = np.linspace(0.0, 20.0, 400)
     states = np.stack([np.cos(t), -np.sin(t), np.sin(t), np.cos(t)], axis=1) * 50.0
     with pytest.raises(AnalysisError, match=r"at B = 1 near the motion: Newton.*4 segments"):
-        orbits_by_shooting(field, "B", t, states, period=1.0)
+        orbit_branch(field, PeriodicMotion(t, states, period=1.0), "B", method=Shooting())
     lorenz = lorenz_field()
     with pytest.raises(InputError, match="contact_field, or stay with collocation"):
-        orbits_by_shooting(lorenz, "rho", t, states[:, :3], period=2.0 * np.pi)
+        orbit_branch(lorenz, PeriodicMotion(t, states[:, :3], period=2.0 * np.pi), "rho",
+                     method=Shooting())
     shot = orbits_by_shooting_point(field, problem, u)
     with pytest.raises(InputError, match="found by shooting"):
         quantity_range(shot, field.displacement_row(0))

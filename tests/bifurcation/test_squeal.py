@@ -12,7 +12,7 @@ def test_border_of_flutter(tmp_path, capsys):
     branch, border = squeal.main(tmp_path)
     hopf, = branch.of_kind("Hopf")
     assert hopf.parameter == pytest.approx(0.3108, abs=1e-4)
-    assert hopf.details["frequency_hz"] == pytest.approx(646.0, abs=0.1)
+    assert hopf.frequency_hz == pytest.approx(646.0, abs=0.1)
     for name in ("squeal_modes.png", "squeal_map.png"):
         assert (tmp_path / name).stat().st_size > 10_000
     assert "flutter from a friction coefficient of" in capsys.readouterr().out

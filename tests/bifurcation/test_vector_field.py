@@ -327,7 +327,7 @@ def test_forcing_periods():
 def test_a_contact_system_is_no_field_yet():
     system = two_mass_system()
     for task in (lambda: find_equilibrium(system),
-                 lambda: equilibrium_branch(system, "ground.speed"),
+                 lambda: equilibrium_branch(system, parameter="ground.speed"),
                  lambda: stability_map(system, {"ground.speed": [1.0], "normal.force": [1.0]})):
         with pytest.raises(InputError, match="needed, not a ContactSystem; make one"):
             task()

@@ -72,4 +72,4 @@ def test_branches_do_not_switch_a_drive_on():
     system = friction_oscillator(2).with_(**{"drive.amplitude_x": 0.0, "ground.speed": 0.02})
     field = contact_field(system, ["drive.amplitude_x"])
     with pytest.raises(AnalysisError, match=r"drive.amplitude_x = 0"):
-        equilibrium_branch(field, "drive.amplitude_x", bounds=(0.0, 1.0))
+        equilibrium_branch(field, parameter="drive.amplitude_x", bounds=(0.0, 1.0))

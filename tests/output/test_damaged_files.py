@@ -17,7 +17,8 @@ from fecontact import (
     write_basis,
     write_branches,
 )
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.core.errors import InputError
 from fecontact.core.stored import DamagedError, npz_arrays
 from fecontact.integrate.events import Events

@@ -7,7 +7,8 @@ from systems import impact_oscillator
 from fecontact import Axis, InputError, basins, brute_force
 from fecontact.bifurcation.attractors.basins import Attractor, Basins
 from fecontact.bifurcation.attractors.poincare_scan import BruteForce
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.output.plots.basins import basins_figure, plot_basins
 from fecontact.output.plots.bifurcation_diagram import branches_figure, plot_branches
 from fecontact.output.plots.diagram_insets import Inset

@@ -1,59 +1,33 @@
-"""A branch of solutions, and its file."""
+"""A branch of solutions."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from enum import Enum
-from typing import Any
+from itertools import pairwise
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
+from fecontact.bifurcation.continuation.points import (
+    BranchHeader,
+    BranchPoint,
+    CrossingPoint,
+    FoldPoint,
+    HopfPoint,
+    NeimarkSackerPoint,
+    PeriodDoublingPoint,
+    on_branch,
+)
+from fecontact.bifurcation.continuation.problem import Problem, Settings, Status
+from fecontact.bifurcation.continuation.pseudo_arclength import continuation
+from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
 from fecontact.core.types import Array
 
+# Relative distance from a value of the parameter that counts as there.
+_MET = 1e-9
 
-class Status(Enum):
-    """How a branch ended; the value is the sentence for people."""
-
-    POINTS = "The branch has as many points as were asked for."
-    BOUND = "The branch reached a bound of its parameter."
-    STOPPED = "The branch reached a point at which it was to stop."
-    CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
-              "again.")
-    STALLED = ("The steps became too small to go on; what was computed until then is kept. Look "
-               "whether the solution changes abruptly here, or start with smaller steps.")
-    INTERRUPTED = "The continuation was interrupted; what was computed until then is kept."
-
-
-@dataclass(frozen=True, eq=False)
-class BranchPoint:
-    """One solution on a branch.
-
-    Attributes
-    ----------
-    u : (N + 1,) array
-        Unknowns, the parameter last.
-    tangent : (N + 1,) array
-        Direction of the branch.
-    values : mapping
-        What the problem stores of each solution, such as states and stability.
-    kind : str or None
-        What is special about the point: 'fold', 'Hopf', ...; None for the others.
-    details : mapping
-        What is known of a special point, such as its normal form.
-    """
-
-    u: Array
-    tangent: Array
-    values: Mapping[str, Any] = field(default_factory=dict)
-    kind: str | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def parameter(self) -> float:
-        """Value of the parameter."""
-        return float(self.u[-1])
+__all__ = ["Branch", "Status"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +54,11 @@ class Branch:
     message: str = ""
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        header = BranchHeader(self.name, self.attributes)
+        object.__setattr__(self, "points",
+                           tuple(on_branch(point, header) for point in self.points))
+
     def __len__(self) -> int:
         return len(self.points)
 
@@ -96,6 +75,18 @@ class Branch:
         """The special points."""
         return tuple(point for point in self.points if point.kind is not None)
 
+    @overload
+    def of_kind(self, kind: Literal["fold"]) -> tuple[FoldPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["Hopf"]) -> tuple[HopfPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["period doubling"]) -> tuple[PeriodDoublingPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["Neimark-Sacker"]) -> tuple[NeimarkSackerPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: Literal["branch point"]) -> tuple[CrossingPoint, ...]: ...
+    @overload
+    def of_kind(self, kind: str) -> tuple[BranchPoint, ...]: ...
     def of_kind(self, kind: str) -> tuple[BranchPoint, ...]:
         """The special points of one kind."""
         return tuple(point for point in self.points if point.kind == kind)
@@ -113,13 +104,73 @@ class Branch:
             raise InputError(f"The branch stores no value {name!r}; it has: {choices(known)}.")
         return np.array([point.values[name] for point in self.points])
 
+    def at(self, field: VectorField, value: float, which: int = 0) -> BranchPoint:
+        """The solution at a value of the parameter, solved from the point of the branch beside it.
+
+        Parameters
+        ----------
+        field : VectorField
+            That of the branch.
+        value : float
+            The value.
+        which : int
+            Which of the solutions with this value, counted along the branch from 0; -1 is the last.
+
+        Raises
+        ------
+        InputError
+            If the branch does not pass the value so often, or is none of equilibria or orbits over
+            one parameter.
+        AnalysisError
+            If no solution is found there.
+        """
+        require_field(field)
+        require_finite("Branch.at", value=value)
+        passed = self._passed(float(value))
+        if not (isinstance(which, int | np.integer) and -len(passed) <= which < len(passed)):
+            span = (f"from {self.parameter.min():.6g} to {self.parameter.max():.6g}" if self.points
+                    else "without any point")
+            raise InputError(f"The branch, {self.name} {span}, has {len(passed)} solutions at "
+                             f"{value:.6g}, none with the number which = {which!r}.")
+        place, sign = passed[which]
+        start = self.points[place]
+        if start.parameter == value:
+            return start
+        problem, u, tangent = self._restored(field, start)
+        bounds = (-np.inf, float(value)) if start.parameter < value else (float(value), np.inf)
+        *_, found = continuation(problem, u, Settings(bounds=bounds, locate=False),
+                                 tangent=sign * tangent)
+        if abs(found.parameter - value) > _MET * max(abs(value), abs(value - start.parameter)):
+            raise AnalysisError(f"The solution at {self.name} = {value:.6g} was not found from "
+                                f"that at {start.parameter:.6g}; follow the branch in shorter "
+                                f"steps there.")
+        return on_branch(found, BranchHeader(self.name, self.attributes))
+
+    def _passed(self, value: float) -> list[tuple[int, float]]:
+        """Points from which a value of the parameter is near, and whether it lies before (-1) or
+        behind them (1) along the branch.
+        """
+        found = []
+        for index, (here, there) in enumerate(pairwise([*self.points, None])):
+            assert here is not None
+            if here.parameter == value:
+                found.append((index, 1.0))
+            elif there is not None and (here.parameter - value) * (there.parameter - value) < 0.0:
+                # The direction at a branch point is not defined.
+                found.append((index + 1, -1.0) if here.kind and not there.kind else (index, 1.0))
+        return found
+
+    def _restored(self, field: VectorField, point: BranchPoint) -> tuple[Problem, Array, Array]:
+        """Problem, unknowns and tangent of a point."""
+        from fecontact.bifurcation.equilibria.problem import restored_equilibrium
+        from fecontact.bifurcation.orbits.restored import restored, restored_shooting
+
+        if not point.is_orbit:
+            width = float(np.ptp(self.parameter)) or abs(point.parameter) or 1.0
+            return restored_equilibrium(field, point, width)
+        return restored_shooting(field, point) if point.by_shooting else restored(field, point)
+
     def reversed(self) -> "Branch":
         """The branch in the other direction."""
         turned = tuple(replace(point, tangent=-point.tangent) for point in self.points[::-1])
         return replace(self, points=turned)
-
-
-def require_on_branch(owner: str, branch: object, point: object) -> None:
-    """Raise :class:`InputError` unless these are a branch, and a point of one."""
-    require_kind(owner, Branch, branch=branch)
-    require_kind(owner, BranchPoint, point=point)

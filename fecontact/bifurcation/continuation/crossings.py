@@ -8,8 +8,8 @@ the change has passed over some.
 from collections.abc import Container, Iterable
 from dataclasses import replace
 
-from fecontact.bifurcation.continuation.branch import BranchPoint
 from fecontact.bifurcation.continuation.newton import Solution
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem
 
 # Kind of a point at which the number changes though no test function has a zero.

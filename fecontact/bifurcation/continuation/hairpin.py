@@ -8,8 +8,8 @@ turns, s = <n, u> grows through the whole turn, and u is a smooth function of it
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import BranchPoint
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem, Settings
 from fecontact.bifurcation.continuation.special_points import located_between
 from fecontact.core.errors import FecontactError

@@ -1,7 +1,8 @@
-"""What is continued, and how."""
+"""What is continued, how, and how it ended."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -12,6 +13,19 @@ from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
 
 _PARALLEL = 0.9  # cosine between directions that count as the same
+
+
+class Status(Enum):
+    """How a branch ended; the value is the sentence for people."""
+
+    POINTS = "The branch has as many points as were asked for."
+    BOUND = "The branch reached a bound of its parameter."
+    STOPPED = "The branch reached a point at which it was to stop."
+    CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
+              "again.")
+    STALLED = ("The steps became too small to go on; what was computed until then is kept. Look "
+               "whether the solution changes abruptly here, or start with smaller steps.")
+    INTERRUPTED = "The continuation was interrupted; what was computed until then is kept."
 
 
 class Linearisation(Protocol):

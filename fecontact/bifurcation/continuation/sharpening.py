@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import BranchPoint
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED
 from fecontact.bifurcation.continuation.newton import corrected, finished, norm
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.pseudo_arclength import Settings, continuation
-from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import FLAT
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.normal_forms import verdict
@@ -26,7 +26,7 @@ from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 
 # Problem, unknowns and tangent of an orbit.
-Place = tuple[Collocation, Array, Array]
+Place = tuple[CollocationProblem, Array, Array]
 
 SHARPENED = ("fold", "period doubling", "Neimark-Sacker", "branch point")
 _JUDGED = ("period doubling", "Neimark-Sacker")
@@ -55,7 +55,7 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     ----------
     point : BranchPoint
         What the branch located roughly.
-    own, neighbour : (Collocation, array, array)
+    own, neighbour : (CollocationProblem, array, array)
         Problem, unknowns and tangent of the point and of a regular one before it. At branch points
         the tangent is not defined; that of the neighbour serves for all kinds.
 
@@ -93,7 +93,7 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     return replace(found or point, kind=kind, details=details)
 
 
-def _unit(problem: Collocation, u: Array, tangent: Array) -> Place:
+def _unit(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
     """The place with a tangent of length one; the scales may have grown along the branch."""
     problem = replace(problem, renewal=0, precision=_SHARPLY)
     return problem, u, tangent / norm(problem, tangent)
@@ -178,7 +178,7 @@ def _on_finer_meshes(
             "parameter_error": abs(found.parameter - parameter)}
 
 
-def _with_twice_the_intervals(problem: Collocation, u: Array, tangent: Array) -> Place:
+def _with_twice_the_intervals(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
     mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, 2 * problem.intervals)
     return _unit(*problem.on_mesh(mesh, u, tangent))
 

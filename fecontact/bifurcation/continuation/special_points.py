@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import BranchPoint
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED, counted, with_count
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem, Settings
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array

@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.points import BranchPoint, CrossingPoint
 from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
+    default_scales,
     find_equilibrium,
     require_autonomous,
 )
-from fecontact.bifurcation.equilibria.problem import EquilibriumProblem
-from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.equilibria.problem import EquilibriumProblem, equilibrium_at
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, require_finite
 from fecontact.core.types import Array
 
 _GROWTH = 1e4
@@ -27,13 +27,13 @@ _GROWTH = 1e4
 
 def equilibrium_branch(
     field: VectorField,
-    parameter: str,
-    start: Equilibrium | ArrayLike | None = None,
+    start: Equilibrium | BranchPoint | ArrayLike | None = None,
+    parameter: str | None = None,
     *,
     settings: Settings | None = None,
     bounds: tuple[float, float] | None = None,
     direction: float = 1.0,
-    both: bool = False,
+    both: bool | None = None,
     scales: ArrayLike | None = None,
     width: float | None = None,
 ) -> Branch:
@@ -47,7 +47,7 @@ def equilibrium_branch(
       part with the parameter), first_lyapunov and criticality
       ('supercritical', 'subcritical' or 'undecided', see
       :func:`fecontact.bifurcation.equilibria.normal_forms.hopf`),
-    - 'branch point': null_vector, and other_tangent for :func:`switched_branch`,
+    - 'branch point': null_vector, and other_tangent, the direction of the other branch,
     - 'unresolved': where 'unstable' changes from unstable_before to unstable_after, though none of
       the others was found.
 
@@ -55,18 +55,22 @@ def equilibrium_branch(
     ----------
     field : VectorField
         Its rates must not depend on time.
-    parameter : str
-        The one that is varied.
-    start : Equilibrium or (d,) sequence, optional
-        Where to begin; see :func:`fecontact.bifurcation.equilibria.equilibrium.find_equilibrium`.
+    start : Equilibrium, BranchPoint or (d,) sequence, optional
+        Where to begin: an equilibrium or a guess, see
+        :func:`fecontact.bifurcation.equilibria.equilibrium.find_equilibrium`; a 'branch point' of
+        a branch of equilibria, through which the other branch is followed; or another point of
+        such a branch, also of one read from a file, from which it goes on.
+    parameter : str, optional
+        The one that is varied; by default that of the point, or the only one of the field.
     settings : Settings, optional
         How the branch is followed.
     bounds : (float, float), optional
         Range of the parameter, as in the settings.
     direction : float
-        Sign of the first change of the parameter.
-    both : bool
-        Go to both sides.
+        Sign of the first change of the parameter; from a point 1 goes on along the branch, and -1
+        back.
+    both : bool, optional
+        Whether to go to both sides; by default from a branch point alone.
     scales : sequence, optional
         Sizes (d,) of the states in the diagram, for arclengths; by default those of the field or
         the largest state at the start, growing with the
@@ -78,65 +82,54 @@ def equilibrium_branch(
     Raises
     ------
     InputError
-        If the parameter is unknown.
+        If the parameter is unknown, or the point is none of a branch of equilibria.
     AnalysisError
         If no equilibrium is found at the start, or the rates depend on time there or at a bound.
     """
     require_field(field)
+    require_finite("equilibrium_branch", direction=direction)
+    if isinstance(start, str):
+        raise InputError(f"equilibrium_branch: start = {start!r} must be an equilibrium or a point "
+                         f"of a branch; give the parameter by its name, parameter={start!r}.")
+    tangent, crossed = None, None
+    if isinstance(start, BranchPoint):
+        known = start.branch.parameter_name
+        parameter = known if parameter is None else parameter
+        begin = equilibrium_at(field, start)
+        if parameter == known:
+            crossed = start if isinstance(start, CrossingPoint) else None
+            tangent = np.copysign(1.0, direction) * (
+                start.tangent if crossed is None else crossed.other_tangent)
+    else:
+        begin = _start(field, start)
+    parameter = field.parameter_or_only(parameter)
     index = field.index(parameter)
-    begin = _start(field, start)
     problem, chosen = _problem(field, begin, index, settings, bounds, scales, width)
     u = np.append(begin.state, begin.values[index])
-    return follow(problem, u, chosen, name=parameter, direction=direction, both=both,
-                  attributes=_attributes(field, begin))
+    attributes = _attributes(field, begin)
+    if crossed is not None and tangent is not None:
+        return _crossing(problem, crossed, tangent, chosen, parameter, both is not False,
+                         attributes)
+    return follow(problem, u, chosen, name=parameter, tangent=tangent, direction=direction,
+                  both=bool(both), attributes=attributes)
 
 
-def switched_branch(
-    field: VectorField,
-    parameter: str,
-    point: BranchPoint,
-    start: Equilibrium | None = None,
-    *,
-    settings: Settings | None = None,
-    bounds: tuple[float, float] | None = None,
-    both: bool = True,
-    scales: ArrayLike | None = None,
-    width: float | None = None,
-    values: ArrayLike | None = None,
+def _crossing(
+    problem: EquilibriumProblem, point: BranchPoint, tangent: Array, settings: Settings,
+    parameter: str, both: bool, attributes: dict[str, Any],
 ) -> Branch:
-    """The other branch through a branch point of :func:`equilibrium_branch`.
-
-    ``values`` (k,) are the parameter values of the branch, the field's base values by default;
-    the other arguments as there.
-
-    Raises
-    ------
-    InputError
-        If the point is no branch point, or no second branch crosses there.
-    """
-    require_field(field)
-    require_kind("switched_branch", BranchPoint, point=point)
-    index = field.index(parameter)
-    if "other_tangent" not in point.details:
-        raise InputError(f"The point at {parameter} = {point.parameter:.6g} "
-                         f"({point.kind or 'a regular point'}) has no second branch; give a "
-                         f"special point of the kind 'branch point' with other_tangent.")
-    given = field.values if values is None else np.array(values, dtype=float)
-    given[index] = point.parameter
-    begin = start or Equilibrium(field, given, np.ascontiguousarray(point.u[:-1]))
-    problem, chosen = _problem(field, begin, index, settings, bounds, scales, width)
-    tangent = np.asarray(point.details["other_tangent"], dtype=float)
+    """The other branch through a branch point."""
     weights = problem.weights()
     tangent = tangent / np.sqrt(weights * tangent @ tangent)
     points: list[BranchPoint] = []
     ends = []
     for side in (-1.0, 1.0) if both else (1.0,):
         # The first step leaves the branch point, where the two directions cannot be told apart.
-        first = point.u + side * chosen.step * tangent
-        if not chosen.bounds[0] <= first[-1] <= chosen.bounds[1]:
+        first = point.u + side * settings.step * tangent
+        if not settings.bounds[0] <= first[-1] <= settings.bounds[1]:
             continue
-        branch = follow(problem, first, chosen, name=parameter, tangent=side * tangent,
-                        attributes=_attributes(field, begin))
+        branch = follow(problem, first, settings, name=parameter, tangent=side * tangent,
+                        attributes=attributes)
         ends.append(branch)
         if side < 0.0:
             points = [replace(each, tangent=-each.tangent) for each in branch.points[::-1]]
@@ -172,25 +165,6 @@ def _problem(
     sizes = default_scales(begin) if scales is None else sizes_of(scales, begin.state)[0]
     limits = _GROWTH * sizes if scales is None else None
     return EquilibriumProblem(field, begin.values, index, sizes, width, limits), chosen
-
-
-def default_scales(begin: Equilibrium) -> Array:
-    """Sizes (d,) of the states, for arclengths and differences.
-
-    Those of the field; for contact systems the largest displacement, and for velocities that
-    times the frequency of the least damped mode.
-    """
-    field = begin.field
-    if not isinstance(field, ContactField):
-        return field.state_scales(begin.values)
-    system = field.system(begin.values)
-    m = system.basis.modes
-    displacement = float(np.abs(begin.state[:m]).max()) or 1.0
-    modes = begin.modes
-    w = (float(np.abs(modes.eigenvalues[np.argmin(modes.damping_ratios)]))
-         if len(modes.eigenvalues) else 1.0)
-    return np.concatenate([np.full(m, displacement), np.full(m, w * displacement),
-                           system.memory_scales])
 
 
 def _attributes(field: VectorField, begin: Equilibrium) -> dict[str, Any]:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
-from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
-from fecontact.bifurcation.equilibria.branches import default_scales
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import Settings, Status
 from fecontact.bifurcation.equilibria.codim2_problems import (
     FoldCurve,
     HopfCurve,
@@ -18,7 +18,7 @@ from fecontact.bifurcation.equilibria.codim2_problems import (
     hopf_borders,
     scaled,
 )
-from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.equilibria.normal_forms import critical_pair, null_vectors
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import require_kind

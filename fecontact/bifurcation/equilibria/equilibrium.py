@@ -259,3 +259,22 @@ def require_autonomous(field: VectorField, values: Array) -> None:
                             f"equilibrium; take the drive's amplitude and the ground's waviness "
                             f"away (drive.amplitude_x = 0, ground.amplitude = 0), or look for "
                             f"periodic orbits.")
+
+
+def default_scales(begin: Equilibrium) -> Array:
+    """Sizes (d,) of the states, for arclengths and differences.
+
+    Those of the field; for contact systems the largest displacement, and for velocities that
+    times the frequency of the least damped mode.
+    """
+    field = begin.field
+    if not isinstance(field, ContactField):
+        return field.state_scales(begin.values)
+    system = field.system(begin.values)
+    m = system.basis.modes
+    displacement = float(np.abs(begin.state[:m]).max()) or 1.0
+    modes = begin.modes
+    w = (float(np.abs(modes.eigenvalues[np.argmin(modes.damping_ratios)]))
+         if len(modes.eigenvalues) else 1.0)
+    return np.concatenate([np.full(m, displacement), np.full(m, w * displacement),
+                           system.memory_scales])

@@ -7,8 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.equilibrium import (
+    Equilibrium,
+    default_scales,
+    require_autonomous,
     solution,
     sorted_eigenvalues,
     unstable_count,
@@ -22,7 +26,7 @@ from fecontact.bifurcation.equilibria.normal_forms import (
 )
 from fecontact.bifurcation.fields.multilinear_forms import bend
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.core.errors import AnalysisError
+from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
 
 # Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.
@@ -192,3 +196,31 @@ def crossing_is_complex(eigenvalues: ComplexArray) -> bool:
     first, second = np.triu_indices(len(real), 1)
     of_reals = np.abs(real[first] + real[second]).min(initial=np.inf)
     return bool(2.0 * np.abs(pairs.real).min() < of_reals)
+
+
+def equilibrium_at(field: VectorField, point: BranchPoint) -> Equilibrium:
+    """The equilibrium at a point of a branch.
+
+    Raises
+    ------
+    InputError
+        If the point is none of a branch of equilibria, or of one of another field.
+    AnalysisError
+        If the rates depend on time there.
+    """
+    values = point.parameter_values(field)
+    if point.is_orbit or len(point.u) != field.dimension + 1:
+        raise InputError(f"{point.place} is no equilibrium; take a point of a branch of "
+                         f"equilibria.")
+    require_autonomous(field, values)
+    return Equilibrium(field, values, np.ascontiguousarray(point.u[:-1]))
+
+
+def restored_equilibrium(
+    field: VectorField, point: BranchPoint, width: float
+) -> tuple[EquilibriumProblem, Array, Array]:
+    """Problem, unknowns and tangent of a point of a branch, in a diagram of some width."""
+    begin = equilibrium_at(field, point)
+    index = field.index(point.branch.parameter_name)
+    problem = EquilibriumProblem(field, begin.values, index, default_scales(begin), width)
+    return problem, point.u, point.tangent

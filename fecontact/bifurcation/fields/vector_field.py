@@ -73,6 +73,22 @@ class VectorField(ABC):
                              f"its parameters are: {choices(names)}.")
         return names.index(name)
 
+    def parameter_or_only(self, name: str | None) -> str:
+        """The name, checked; without one the only parameter that there is.
+
+        Raises
+        ------
+        InputError
+            If there is none of this name, or no name and not just one parameter.
+        """
+        names = tuple(self.parameters)
+        if name is None:
+            if len(names) != 1:
+                raise InputError(f"parameter is missing; name the one that is varied: "
+                                 f"{choices(names)}.")
+            return names[0]
+        return names[self.index(name)]
+
     def values_with(self, **changes: float) -> Array:
         """Parameter values (k,): the base values with some changed by name."""
         values = self.values

@@ -1,223 +1,356 @@
-"""Branches of periodic orbits: following them, and going over to others at special points."""
+"""Branches of periodic orbits: what they start from, and by which method they are followed."""
 
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status, require_on_branch
-from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
-from fecontact.bifurcation.continuation.pseudo_arclength import follow, require_inside
-from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, sharpened
-from fecontact.bifurcation.equilibria.branches import default_scales
-from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
-from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
-from fecontact.bifurcation.orbits import starts
-from fecontact.bifurcation.orbits.collocation import Collocation
-from fecontact.bifurcation.orbits.same_orbit import HALVING
-from fecontact.bifurcation.orbits.shooting import shooting_from
-from fecontact.bifurcation.orbits.starts import from_samples
-from fecontact.core.checks import as_floats
-from fecontact.core.errors import (
-    AnalysisError,
-    FecontactError,
-    InputError,
-    require_finite,
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
+from fecontact.bifurcation.continuation.problem import (
+    Settings,
+    Status,
+    settings_of,
+    sizes_of,
+    width_of,
 )
+from fecontact.bifurcation.continuation.pseudo_arclength import require_inside
+from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, sharpened
+from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.bifurcation.orbits import shooting_branches, starts
+from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.restored import rescaled, restored
+from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.bifurcation.orbits.shooting import require_segments
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import FecontactError, InputError, require_finite, require_positive
 from fecontact.core.types import Array
+from fecontact.integrate.trajectory import Trajectory
 
 # Parts of the first step that are tried one after the other to leave a special point.
 _FIRST = (1.0, 0.2, 0.04)
+# Kinds of special points of orbits at which others begin.
+_LEAVING = ("period doubling", "branch point")
+
+T = TypeVar("T")
 
 
-def orbits_from_hopf(
-    field: VectorField, branch: Branch, point: BranchPoint, *, settings: Settings | None = None,
-    bounds: tuple[float, float] | None = None, intervals: int = 50, degree: int = 4,
-    scales: ArrayLike | None = None, width: float | None = None,
+@dataclass(frozen=True)
+class Collocation:
+    """Orbits by orthogonal collocation at Gauss points: of any field, on an adaptive mesh.
+
+    Parameters
+    ----------
+    intervals : int
+        Intervals of the mesh, at least 2.
+    degree : int
+        Degree of the polynomial on each, 2 to 7.
+
+    Raises
+    ------
+    InputError
+        If these cannot be used.
+    """
+
+    intervals: int = 50
+    degree: int = 4
+
+    def __post_init__(self) -> None:
+        require_mesh(self.intervals, self.degree)
+
+
+@dataclass(frozen=True)
+class Shooting:
+    """Orbits by multiple shooting with the compiled integrator: of contact systems alone.
+
+    For steep friction, impacts and many states, where collocation needs many intervals. Minimum
+    and maximum of the states are those of samples, and period doublings have no normal form.
+
+    Parameters
+    ----------
+    segments : int
+        Pieces of the period, each run for itself: more of them for unstable orbits.
+    rtol : float
+        Relative tolerance of the runs.
+    derivative_rtol : float, optional
+        That of their derivatives, as for :func:`fecontact.sensitivity`. With many fast modes that
+        the motion hardly excites, 1e-2 saves most of the time, and changes their small multipliers
+        alone; with impacts it spoils all of them.
+
+    Raises
+    ------
+    InputError
+        If these cannot be used.
+    """
+
+    segments: int = 4
+    rtol: float = 1e-9
+    derivative_rtol: float | None = None
+
+    def __post_init__(self) -> None:
+        require_segments(self.segments)
+        require_positive("Shooting", rtol=self.rtol)
+        if self.derivative_rtol is not None:
+            require_positive("Shooting", derivative_rtol=self.derivative_rtol)
+
+
+def orbit_branch(
+    field: VectorField,
+    start: BranchPoint | PeriodicMotion | Trajectory | tuple[ArrayLike, ArrayLike],
+    parameter: str | None = None, *, method: Collocation | Shooting | None = None,
+    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
+    scales: ArrayLike | None = None, width: float | None = None, direction: float = 1.0,
+    both: bool = False,
 ) -> Branch:
-    """The branch of orbits that is born at a Hopf point.
+    """Follow periodic orbits over a parameter.
 
     Parameters
     ----------
     field : VectorField
-        The system, with the parameters by which it was followed before.
-    branch, point : Branch, BranchPoint
-        A branch of equilibria, and a special point of the kind 'Hopf' on it.
+        The system; of the branch from which a point is.
+    start : BranchPoint, PeriodicMotion, Trajectory or (times, states)
+        Where to begin:
+
+        - a 'Hopf' point of equilibria: the orbits that are born there,
+        - a 'period doubling' of orbits: those of twice the period,
+        - a 'branch point' of orbits: those that cross there,
+        - another point of a branch of orbits, also of one read from a file: goes on from there,
+        - a motion that has settled over one period at least, such as
+          :func:`fecontact.periodic_motion` finds; its end counts.
+    parameter : str, optional
+        The one that is varied; by default that of the point, or the only one of the field.
+    method : Collocation or Shooting, optional
+        How orbits are found; by default as on the branch of the point, else by collocation. Beyond
+        a period doubling there are by default twice the intervals or segments.
     settings : Settings, optional
         How the branch is followed.
     bounds : (float, float), optional
         Range of the parameter, as in the settings.
-    intervals, degree : int
-        Collocation at ``degree`` Gauss points on each of so many intervals.
     scales : (d,) sequence, optional
-        Amplitudes of the states that count as one in the length of a step. Without them they are
-        those of the field, and grow with the orbits.
+        Amplitudes of the states that count as one in the length of a step. By default they are
+        those of the branch of orbits from which the point is; else those of the motion, or at a
+        Hopf point of the field, growing with the orbits of collocation.
     width : float, optional
-        Width of the diagram in the parameter; by default that of the bounds.
+        Width of the diagram in the parameter; by default that of the branch of orbits, or of the
+        bounds.
+    direction : float
+        Sign of the first change of the parameter from a motion. From a point of a branch of orbits
+        1 goes on along the branch and -1 back; at a branch point they are the two halves.
+    both : bool
+        Go to both sides, from a motion or a regular point.
 
     Returns
     -------
     Branch
         Stored of each orbit: 'period' [s], 'multipliers' (d,), 'unstable' (number of those
-        outside the unit circle), 'trivial_error' (distance from one of the multiplier that is
-        one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
+        outside the unit circle), 'stable', 'trivial_error' (distance from one of the multiplier
+        that is one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
 
         - 'fold': with parameter_error, by which its parameter changes on a finer mesh,
         - 'period doubling' and 'Neimark-Sacker': with coefficient, coefficient_error,
-          criticality ('supercritical', 'subcritical' or 'undecided') and parameter_error, see
-          :mod:`fecontact.bifurcation.orbits.normal_forms` and
-          :func:`fecontact.bifurcation.continuation.sharpening.sharpened`,
+          criticality ('supercritical', 'subcritical' or 'undecided') and parameter_error,
         - 'branch point': where two branches of orbits cross, with parameter_error as well,
+        - 'period halving': where doubled orbits become single again; there the branch ends,
         - 'unresolved': where 'unstable' changes though nothing of the kind was found; or what
           instead_of says on this mesh alone, though finer ones do not have it.
 
     Raises
     ------
     InputError
-        If the point is no Hopf point, or there are no orbits near it.
+        If no orbits begin at the start, the bounds exclude it, or its samples do not cover a
+        period.
+    AnalysisError
+        If no orbit is found near a motion.
     """
     require_field(field)
-    require_on_branch("orbits_from_hopf", branch, point)
-    if point.kind != "Hopf":
-        raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is "
-                         f"{point.kind or 'a regular point'!r}, but orbits are born at points of "
-                         f"the kind 'Hopf'.")
-    free = field.index(branch.name)
-    values = np.array(branch.attributes["parameter_values"], dtype=float)
-    values[free] = point.parameter
-    state = np.ascontiguousarray(point.u[:-1])
+    require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, tuple), start=start)
+    require_kind("orbit_branch", (Collocation, Shooting, type(None)), method=method)
+    require_finite("orbit_branch", direction=direction)
     chosen = settings_of(settings, bounds)
-    sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    widths = np.append(sizes, width_of(width, chosen, point.parameter))
-    for amplitude in starts.AMPLITUDES:
-        start = starts.from_hopf(
-            field, values, free, state, float(point.details["angular_frequency"]),
-            point.details["eigenvector"], intervals, degree, widths, amplitude)
+    if not isinstance(start, BranchPoint):
+        return _from_motion(field, _as_motion(start), field.parameter_or_only(parameter),
+                            method or Collocation(), chosen, scales, width, direction, both)
+    if isinstance(start, HopfPoint):
+        _require_one_side(start, both)
+        _require_parameter(start, parameter)
+        return _from_hopf(field, start, method or Collocation(), chosen, scales, width)
+    if not start.is_orbit:
+        raise InputError(f"{start.place} has no orbits to follow: take a point of the kind 'Hopf', "
+                         f"or one of a branch of orbits.")
+    known = start.branch.parameter_name
+    name = known if parameter is None else field.parameter_or_only(parameter)
+    if name == known and start.kind in _LEAVING:
+        _require_one_side(start, both)
+        return _beyond(field, start, method, chosen, scales, width, direction)
+    if name == known and _keeps(start, method):
+        return _goes_on(field, start, method, chosen, scales, width, direction, both)
+    if name == known:
+        direction = direction * float(np.copysign(1.0, start.tangent[-1]))
+    return _from_motion(field, start.orbit(field), name, method or _method_of(start), chosen,
+                        scales, width, direction, both)
+
+
+def _as_motion(start: PeriodicMotion | Trajectory | tuple[Any, ...]) -> PeriodicMotion:
+    if isinstance(start, PeriodicMotion):
+        return start
+    if isinstance(start, Trajectory):
+        return PeriodicMotion(start.time, start.states)
+    if len(start) != 2:
+        raise InputError(f"orbit_branch: start must be two arrays, times and states of a motion, "
+                         f"not {len(start)}.")
+    return PeriodicMotion(*start)
+
+
+def _require_one_side(point: BranchPoint, both: bool) -> None:
+    if both:
+        raise InputError(f"{point.place} is where orbits begin, which leave it to one side; both = "
+                         f"True goes with motions and regular points.")
+
+
+def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
+    if parameter is not None and parameter != point.branch.parameter_name:
+        raise InputError(f"{point.place} starts a branch over {point.branch.parameter_name!r}, not "
+                         f"{parameter!r}; follow the equilibrium over that one first.")
+
+
+def _method_of(point: BranchPoint) -> Collocation | Shooting:
+    """The method by which an orbit was found."""
+    known = point.branch.attributes
+    if point.by_shooting:
+        return Shooting(int(known["segments"]), float(known.get("rtol", 1e-9)),
+                        known.get("derivative_rtol"))
+    return Collocation(len(point.values["mesh"]) - 1, int(known["degree"]))
+
+
+def _keeps(point: BranchPoint, method: Collocation | Shooting | None) -> bool:
+    """Whether the unknowns of a point serve the method, but for the intervals of their mesh."""
+    found = _method_of(point)
+    if isinstance(found, Collocation):
+        return method is None or (isinstance(method, Collocation)
+                                  and method.degree == found.degree)
+    return method is None or (isinstance(method, Shooting) and method.segments == found.segments)
+
+
+def _first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch:
+    """The branch from the first start from which there is one."""
+    failed: FecontactError = InputError("There is nothing to start from.")
+    for attempt in attempts:
         try:
-            return _followed(start, chosen, limits)
+            return go(attempt)
         except FecontactError as error:
             failed = error
     raise failed
 
 
-def orbits_from_motion(
-    field: VectorField, parameter: str, times: ArrayLike, states: ArrayLike, *,
-    values: ArrayLike | None = None, period: float | None = None, periods: int = 1,
-    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
-    intervals: int = 50, degree: int = 4, scales: ArrayLike | None = None,
-    width: float | None = None, direction: float = 1.0, both: bool = False,
+def _from_hopf(
+    field: VectorField, point: HopfPoint, method: Collocation | Shooting, settings: Settings,
+    scales: ArrayLike | None, width: float | None,
 ) -> Branch:
-    """The branch through the orbit to which a motion has settled.
+    if isinstance(method, Shooting):
+        return _first_that_goes(
+            starts.at_hopf(field, point, 50, 4, settings, scales, width),
+            lambda found: shooting_branches.born(found[0], method.segments, method.rtol,
+                                                 method.derivative_rtol, settings))
+    return _first_that_goes(
+        starts.at_hopf(field, point, method.intervals, method.degree, settings, scales, width),
+        lambda found: _followed(found[0], settings, found[1]))
 
-    Parameters
-    ----------
-    parameter : str
-        The one that is varied.
-    times, states : (k,) and (k, d) array
-        The motion, over at least one period; its end counts.
-    values : (k,) sequence, optional
-        Parameters of the motion, the base values of the field by default.
-    period : float, optional
-        Its period [s]; without it the last return to where the motion ends.
-    periods : int
-        Periods of the forcing in one of the orbit, for forced systems.
-    direction, both
-        Sign of the first change of the parameter; whether to go to both sides.
 
-    field, settings, bounds, intervals, degree, scales, width
-        See :func:`orbits_from_hopf`, and there for the result; the scales are the amplitudes of
-        the motion by default.
-
-    Raises
-    ------
-    InputError
-        If the samples do not cover a period.
-    AnalysisError
-        If Newton's method finds no orbit near them.
-    """
-    require_field(field)
+def _from_motion(
+    field: VectorField, motion: PeriodicMotion, parameter: str, method: Collocation | Shooting,
+    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
+    both: bool,
+) -> Branch:
     free = field.index(parameter)
-    given = field.values if values is None else np.array(values, dtype=float)
-    chosen = settings_of(settings, bounds)
-    amplitudes = np.ptp(np.asarray(states, dtype=float), axis=0) / 2.0
-    sizes, limits = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
+    given = field.values if motion.parameter_values is None else motion.parameter_values.copy()
+    if given.shape != field.values.shape:
+        raise InputError(f"parameter_values of the motion must be {len(field.values)} numbers, one "
+                         f"for each parameter of the field, not of shape {given.shape}.")
+    require_inside(float(given[free]), settings)
+    sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
+    widths = np.append(sizes, width_of(width, settings, given[free]))
+    if isinstance(method, Shooting):
+        return shooting_branches.from_motion(
+            field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
+            settings, widths, direction, both)
     problem, u = starts.corrected(*starts.from_samples(
-        field, given, free, times, states, period, intervals, degree, periods,
-        np.append(sizes, width_of(width, chosen, given[free]))))
-    return _followed((problem, u, None), chosen, limits, direction=direction, both=both)
+        field, given, free, motion.times, motion.states, motion.period, method.intervals,
+        method.degree, motion.periods, widths))
+    return _followed((problem, u, None), settings, limits, direction=direction, both=both)
 
 
-def orbits_beyond(
-    field: VectorField, branch: Branch, point: BranchPoint, *, settings: Settings | None = None,
-    bounds: tuple[float, float] | None = None, intervals: int | None = None,
-    direction: float = 1.0,
+def _beyond(
+    field: VectorField, point: BranchPoint, method: Collocation | Shooting | None,
+    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
 ) -> Branch:
-    """The other branch at a special point of a branch of orbits.
-
-    At a 'period doubling' it is that of the orbits of twice the period (with twice the intervals,
-    unless ``intervals`` says otherwise), at a 'branch point' the one that crosses. ``direction``
-    chooses the half of a branch that crosses. The others are those of :func:`orbits_from_hopf`.
-
-    Raises
-    ------
-    InputError
-        If no other orbits begin at a point of this kind.
-    """
-    require_field(field)
-    require_on_branch("orbits_beyond", branch, point)
-    require_finite("orbits_beyond", direction=direction)
-    problem, u, tangent = restored(field, branch, point)
-    chosen = settings_of(settings, bounds)
-    if point.kind == "period doubling":
-        problem, u, tangent = starts.doubled(problem, u, intervals)
-    elif point.kind == "branch point":
-        problem, u, tangent = starts.crossing(problem, u, tangent)
-    else:
-        raise InputError(f"At the point at {branch.name} = {point.parameter:.6g}, "
-                         f"{point.kind or 'a regular point'!r}, no other orbits begin; choose one "
-                         f"of the kind 'period doubling' or 'branch point'.")
+    """The other orbits at a special point of a branch of orbits."""
+    if point.by_shooting:
+        if isinstance(method, Collocation):
+            raise InputError(f"{point.place} was found by shooting, and so are the orbits beyond "
+                             f"it; leave the method out.")
+        return shooting_branches.doubled(
+            field, point, None if method is None else (method.segments, method.rtol,
+                                                       method.derivative_rtol),
+            settings, scales, width, direction)
+    if not _keeps(point, method):
+        raise InputError(f"{point.place} was found by collocation of degree "
+                         f"{point.branch.attributes['degree']}, and so are the orbits beyond it; "
+                         f"leave the method out, or give other intervals.")
+    problem, u, tangent = restored(field, point)
+    problem = rescaled(problem, scales, width)
+    found = (starts.doubled(problem, u) if point.kind == "period doubling"
+             else starts.crossing(problem, u, tangent))
+    problem, u, tangent = starts.on_intervals(
+        found, method.intervals if isinstance(method, Collocation) else None)
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
+
     # The first step leaves the point, where the branches cannot be told apart; the new one may be
     # strongly bent there.
-    for part in _FIRST:
-        step = max(part * chosen.step, chosen.smallest_step)
-        try:
-            return _followed((problem, u + step * tangent, tangent), replace(chosen, step=step),
-                             None)
-        except InputError as error:
-            failed = error
-    raise failed
+    def go(part: float) -> Branch:
+        step = max(part * settings.step, settings.smallest_step)
+        return _followed((problem, u + step * tangent, tangent), replace(settings, step=step),
+                         None)
+
+    return _first_that_goes(iter(_FIRST), go)
 
 
-def restored(
-    field: VectorField, branch: Branch, point: BranchPoint
-) -> tuple[Collocation, Array, Array]:
-    """Problem, unknowns and tangent of a point of a branch of orbits, to go on from."""
-    known = branch.attributes
-    if "degree" not in known or "mesh" not in point.values:
-        raise InputError("The branch is not one of periodic orbits.")
-    mesh, values = np.asarray(point.values["mesh"]), np.array(known["parameter_values"],
-                                                                  dtype=float)
-    values[field.index(branch.name)] = point.parameter
-    degree, d = int(known["degree"]), field.dimension
-    nodes = point.u[: (len(mesh) - 1) * degree * d].reshape(-1, d).copy()
-    problem = Collocation(field, values, field.index(branch.name), mesh, degree, nodes,
-                          np.asarray(known["scales"]), int(known["periods"]))
-    return problem, point.u, point.tangent
+def _goes_on(
+    field: VectorField, point: BranchPoint, method: Collocation | Shooting | None,
+    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
+    both: bool,
+) -> Branch:
+    """The branch of orbits on from one of its points."""
+    sign = float(np.copysign(1.0, direction))
+    if point.by_shooting:
+        return shooting_branches.goes_on(
+            field, point, method.rtol if isinstance(method, Shooting) else None, settings, scales,
+            width, sign, both)
+    limits = None if scales is not None else point.branch.attributes.get("limits")
+    found = restored(field, point)
+    problem = replace(rescaled(found[0], scales, width), limits=limits)
+    problem, u, tangent = starts.on_intervals(
+        (problem, *found[1:]), method.intervals if isinstance(method, Collocation) else None)
+    problem, u, tangent = problem.adapted(u, sign * tangent)
+    return _followed((problem, u, tangent), settings, limits, both=both)
 
 
 def _followed(
-    start: tuple[Collocation, Array, Array | None], settings: Settings, limits: Array | None,
-    **options: Any,
+    start: tuple[CollocationProblem, Array, Array | None], settings: Settings,
+    limits: Array | None, **options: Any,
 ) -> Branch:
+    """The branch of orbits by collocation, its special points on meshes of their own."""
     problem, u, tangent = start
     field = problem.field
     attributes: dict[str, Any] = {
         "state_names": list(field.state_names), "parameter_names": list(field.parameters),
         "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
         "periods": problem.periods}
+    if limits is not None:
+        attributes["limits"] = limits
     name = list(field.parameters)[problem.free]
     stops = [settings.stop_at] if isinstance(settings.stop_at, str) else list(settings.stop_at)
     ended = replace(settings, stop_at=[*stops, HALVING])
@@ -240,95 +373,4 @@ def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
     """A special point located once more, on the mesh that suits its own orbit."""
     point = branch.points[index]
     before = next((one for one in branch.points[index::-1] if one.kind is None), branch.points[-1])
-    return sharpened(point, restored(field, branch, point), restored(field, branch, before))
-
-
-def orbits_by_shooting(
-    field: ContactField, parameter: str, times: ArrayLike, states: ArrayLike, *,
-    values: ArrayLike | None = None, period: float | None = None, periods: int = 1,
-    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
-    segments: int = 4, rtol: float = 1e-9, derivative_rtol: float | None = None,
-    scales: ArrayLike | None = None, width: float | None = None, direction: float = 1.0,
-    both: bool = False,
-) -> Branch:
-    """The branch through the orbit to which a motion of a contact system has settled.
-
-    By multiple shooting with the compiled integrator, for steep friction and many states, where
-    collocation (:func:`fecontact.bifurcation.orbits.branches.orbits_from_motion`) needs many
-    intervals. The stored values have the same names; minimum and maximum are those of samples, and
-    period doublings come without normal forms.
-
-    Parameters
-    ----------
-    field : ContactField
-        From :func:`fecontact.contact_field`.
-    parameter : str
-        The one that is varied.
-    times, states : (k,) and (k, d) array
-        The motion, over at least one period; its end counts. Orbits whose period is unknown begin
-        where it is fastest, if it is at least two periods long.
-    segments : int
-        Pieces of the period, each run for itself: more of them for unstable orbits.
-    rtol : float
-        Relative tolerance of the runs.
-    derivative_rtol : float, optional
-        That of their derivatives, as for :func:`fecontact.sensitivity`. With many fast modes that
-        the motion hardly excites, 1e-2 saves most of the time, and changes their small multipliers
-        alone; with impacts it spoils all of them.
-    values, period, periods, settings, bounds, scales, width, direction, both
-        See :func:`fecontact.bifurcation.orbits.branches.orbits_from_motion`.
-
-    Raises
-    ------
-    InputError
-        If the samples do not cover a period, the field is not one of a contact system, or the
-        bounds exclude the start.
-    AnalysisError
-        If Newton's method finds no orbit near them.
-    """
-    require_field(field)
-    free = field.index(parameter)
-    given = field.values if values is None else np.array(values, dtype=float)
-    chosen = settings_of(settings, bounds)
-    require_inside(float(given[free]), chosen)
-    motion = as_floats(times, "times"), as_floats(states, "states")
-    if motion[1].ndim != 2 or motion[1].size == 0:
-        raise InputError(f"states must be those of a motion (k, d), not of shape "
-                         f"{motion[1].shape}.")
-    amplitudes = np.ptp(motion[1], axis=0) / 2.0
-    sizes, _ = sizes_of(scales, np.maximum(amplitudes, 1e-3 * amplitudes.max()) + 1e-300)
-    if (period is not None and isinstance(field, ContactField)
-            and motion[1].shape == (motion[0].size, field.dimension)
-            and field.forcing_period(given) is None):
-        motion = _to_fastest(*motion, sizes, period, field.system().basis.modes)
-    found = from_samples(field, given, free, *motion, period, 200, 4, periods,
-                         np.append(sizes, width_of(width, chosen, given[free])))
-    problem, u = shooting_from(*found, segments, rtol, derivative_rtol)
-    attributes = {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
-                  "parameter_values": given, "scales": problem.scales, "segments": segments,
-                  "periods": periods, "rtol": rtol}
-    if derivative_rtol is not None:
-        attributes["derivative_rtol"] = derivative_rtol
-    try:
-        return follow(problem, u, chosen, name=parameter, direction=direction, both=both,
-                      attributes=attributes)
-    except (AnalysisError, InputError) as error:
-        raise AnalysisError(f"No periodic orbit was found at {parameter} = {given[free]:.6g} near "
-                            f"the motion: Newton's method does not converge; run it longer until "
-                            f"it has settled, or take more than {segments} segments.") from error
-
-
-def _to_fastest(
-    times: Array, states: Array, sizes: Array, period: float, modes: int
-) -> tuple[Array, Array]:
-    """The motion up to where it was fastest, within a period before its end.
-
-    There the phase is fixed best; beside transitions of stick and slip an orbit that is guessed
-    is far off.
-    """
-    last = np.flatnonzero(times > times[-1] - period)
-    if len(last) == 0 or times[last[0]] - times[0] < period:
-        return times, states
-    speeds = np.linalg.norm(states[last, modes : 2 * modes] / sizes[:modes], axis=1)
-    end = last[np.argmax(speeds)] + 1
-    return times[:end], states[:end]
+    return sharpened(point, restored(field, point), restored(field, before))

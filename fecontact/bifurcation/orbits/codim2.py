@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, require_on_branch
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem, Settings, settings_of
-from fecontact.bifurcation.continuation.pseudo_arclength import follow
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
-from fecontact.bifurcation.orbits.branches import restored
-from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.normal_forms import Expansion
+from fecontact.bifurcation.orbits.restored import restored
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_finite, require_positive
 from fecontact.core.types import Array
 
@@ -36,7 +38,7 @@ class OrbitCurve(Problem):
 
     Attributes
     ----------
-    orbit : Collocation
+    orbit : CollocationProblem
         With a second free parameter.
     kind : str
         'fold', 'period doubling' or 'Neimark-Sacker'.
@@ -44,7 +46,7 @@ class OrbitCurve(Problem):
         The tangent's direction is measured along it; for folds.
     """
 
-    orbit: Collocation
+    orbit: CollocationProblem
     kind: str
     row: Array
 
@@ -163,7 +165,7 @@ class CurveLinearised:
 
 
 def orbit_curve(
-    field: VectorField, branch: Branch, point: BranchPoint, second: str, *,
+    field: VectorField, point: BranchPoint, second: str, *,
     settings: Settings | None = None, bounds: tuple[float, float] | None = None,
     width: float | None = None, direction: float = 1.0, both: bool = False,
 ) -> Branch:
@@ -173,9 +175,9 @@ def orbit_curve(
     ----------
     field : VectorField
         The system, with both parameters.
-    branch, point : Branch, BranchPoint
-        A branch of orbits from :mod:`fecontact.bifurcation.orbits.branches`, and a special point of
-        the kind 'fold', 'period doubling' or 'Neimark-Sacker' on it.
+    point : BranchPoint
+        A special point of the kind 'fold', 'period doubling' or 'Neimark-Sacker' on a branch from
+        :func:`fecontact.orbit_branch` by collocation.
     second : str
         The second parameter.
     settings, bounds : optional
@@ -199,16 +201,15 @@ def orbit_curve(
         If the point is of another kind, or a parameter is unknown.
     """
     require_field(field)
-    require_on_branch("orbit_curve", branch, point)
+    require_kind("orbit_curve", BranchPoint, point=point)
     require_finite("orbit_curve", direction=direction)
     if point.kind not in _KINDS:
-        raise InputError(f"The point at {branch.name} = {point.parameter:.6g} is "
-                         f"{point.kind or 'a regular point'!r}; curves start at "
+        raise InputError(f"{point.place} starts no curve; curves start at "
                          f"{', '.join(repr(kind) for kind in _KINDS)}.")
-    index = field.index(second)
-    if second == branch.name:
+    index, first = field.index(second), point.branch.parameter_name
+    if second == first:
         raise InputError(f"second = {second!r} is the parameter of the branch; name another one.")
-    problem, u, _ = restored(field, branch, point)
+    problem, u, _ = restored(field, point)
     value = float(problem.values[index])
     if width is None:
         width = abs(value) or 1.0
@@ -219,13 +220,13 @@ def orbit_curve(
     curve = OrbitCurve(orbit, point.kind, np.zeros(len(start)))
     if point.kind == "fold":
         curve = replace(curve, row=orbit.weights() * curve.rest(start))
-    attributes = {**branch.attributes, "second": second, "kind": point.kind}
+    attributes = {**point.branch.attributes, "second": second, "kind": point.kind}
     unit = _unit(len(start), -1)
     tangent = CurveLinearised(curve, start).solve(unit, unit)
     if not np.isfinite(tangent).all():
         tangent = CurveLinearised(curve, start).solve(_unit(len(start), -2), unit)
     tangent = np.copysign(1.0, direction) * tangent
-    return follow(curve, start, settings_of(settings, bounds), name=branch.name, tangent=tangent,
+    return follow(curve, start, settings_of(settings, bounds), name=first, tangent=tangent,
                   both=both, attributes=attributes)
 
 

@@ -27,7 +27,7 @@ _UNLIKE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Collocation(Discretisation, Problem):
+class CollocationProblem(Discretisation, Problem):
     """The problem of following orbits by collocation; see :class:`Discretisation`.
 
     Attributes
@@ -105,7 +105,7 @@ class Collocation(Discretisation, Problem):
         within: float,
     ) -> Array | None:
         """See :meth:`Problem.met_again`: on this mesh, in the phase of ``like``."""
-        if not (isinstance(origin, Collocation)
+        if not (isinstance(origin, CollocationProblem)
                 and same_heading(self.weights(), tangent, heading, self.common)):
             return None
         # No shift in time changes period, parameter and amplitude.
@@ -134,7 +134,7 @@ class Collocation(Discretisation, Problem):
         straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
         return guess if straight else guess + aside
 
-    def adapted(self, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
+    def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
         """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
         bend = self._bend(u, tangent)
         vectors = [u, tangent] if bend is None else [u, tangent, bend]
@@ -164,7 +164,9 @@ class Collocation(Discretisation, Problem):
             return self.scales
         return np.concatenate([larger, self.scales[d:]])
 
-    def on_mesh(self, mesh: Array, u: Array, tangent: Array) -> tuple["Collocation", Array, Array]:
+    def on_mesh(
+        self, mesh: Array, u: Array, tangent: Array
+    ) -> tuple["CollocationProblem", Array, Array]:
         """Problem, u and tangent on another mesh."""
         moved, turned = self._on_other_mesh(mesh, [u, tangent])
         nodal = (len(mesh) - 1) * self.degree * self.field.dimension

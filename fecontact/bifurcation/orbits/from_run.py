@@ -1,10 +1,9 @@
 """The periodic motion on which a run settles, as a start for branches of orbits."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from fecontact.analysis.periodicity import count_periods
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_not_negative
 from fecontact.core.types import Array
@@ -20,29 +19,10 @@ _TRANSIENT_PERIODS, _LARGEST = 200, 16
 _MISFIT = 1e-2
 
 
-class SettledMotion(NamedTuple):
-    """One period, at least, of a motion that has settled.
-
-    Attributes
-    ----------
-    times, states : (k,) and (k, d) array
-        [s]; y = [q, q', z].
-    period : float
-        Of the motion [s].
-    periods : int
-        Periods of the excitation in one of the motion; 1 where nothing excites it.
-    """
-
-    times: Array
-    states: Array
-    period: float
-    periods: int
-
-
-def settled_motion(
+def periodic_motion(
     system: ContactSystem, *, initial: Initial = "rest", transient: float | None = None,
     longest_period: float | None = None, rtol: float = 1e-8,
-) -> SettledMotion:
+) -> PeriodicMotion:
     """Run a system until its motion repeats.
 
     Parameters
@@ -58,6 +38,12 @@ def settled_motion(
     rtol : float
         Relative tolerance.
 
+    Returns
+    -------
+    PeriodicMotion
+        One period of the motion, or two and more where nothing excites it; a start for
+        :func:`fecontact.orbit_branch`.
+
     Raises
     ------
     InputError
@@ -65,10 +51,10 @@ def settled_motion(
     AnalysisError
         If the motion does not repeat, or comes to rest.
     """
-    require_kind("settled_motion", ContactSystem, system=system)
+    require_kind("periodic_motion", ContactSystem, system=system)
     for name, value in (("transient", transient), ("longest_period", longest_period)):
         if value is not None:
-            require_not_negative("settled_motion", **{name: value})
+            require_not_negative("periodic_motion", **{name: value})
     excitation = common_period(system)
     if excitation is None:
         if transient is None or longest_period is None:
@@ -80,7 +66,7 @@ def settled_motion(
             raise AnalysisError(f"The run comes to rest, or slides steadily, after {transient:g} "
                                 f"s; there is no periodic orbit to start from, so take another "
                                 f"start, or equilibria and their Hopf points.")
-        return SettledMotion(run.time, run.states, _period(run, longest_period), 1)
+        return PeriodicMotion(run.time, run.states, _period(run, longest_period), 1)
     first = _TRANSIENT_PERIODS if transient is None else max(1, round(transient / excitation))
     largest = _LARGEST if longest_period is None else max(1, round(longest_period / excitation))
     checks = largest + max(2 * largest, 8)
@@ -99,7 +85,7 @@ def settled_motion(
                             f"{first * excitation:.4g} s (it misses by {found.misfit:.1e} of its "
                             f"size); start at another value of the parameter, or run it longer.")
     count = found.periods * _SAMPLES + 1
-    return SettledMotion(fine.time[:count], fine.states[:count], found.periods * excitation,
+    return PeriodicMotion(fine.time[:count], fine.states[:count], found.periods * excitation,
                          found.periods)
 
 

@@ -13,7 +13,7 @@ from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
-from fecontact.bifurcation.orbits.collocation import Collocation
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of, unresolved
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.same_orbit import same_heading
@@ -33,7 +33,7 @@ _AT_START = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Shooting(Problem):
+class ShootingProblem(Problem):
     """Equations of a periodic orbit of a contact system, one parameter free.
 
     The period is cut into K segments; the run from the start x_j of each ends at the start of the
@@ -44,8 +44,8 @@ class Shooting(Problem):
 
     The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. What is stored,
     and the tests for special points, are those of
-    :class:`fecontact.bifurcation.orbits.collocation.Collocation`; minimum and maximum are those of
-    samples.
+    :class:`fecontact.bifurcation.orbits.collocation.CollocationProblem`; minimum and maximum are
+    those of samples.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class Shooting(Problem):
         size = float(np.sqrt(self.weights() @ aside**2))
         return guess if size > _MOST_BENT * step else guess + aside
 
-    def adapted(self, u: Array, tangent: Array) -> "tuple[Shooting, Array, Array]":
+    def adapted(self, u: Array, tangent: Array) -> "tuple[ShootingProblem, Array, Array]":
         """The problem for the next step: the phase fixed by u."""
         bend = None
         if self.before is not None:
@@ -226,10 +226,16 @@ class Shooting(Problem):
         return found
 
 
+def require_segments(segments: int) -> None:
+    """Raise :class:`InputError` unless the period can be cut into so many segments."""
+    if not (isinstance(segments, int | np.integer) and segments >= 1):
+        raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
+
+
 def shooting_from(
-    problem: Collocation, u: Array, segments: int = 4, rtol: float = 1e-9,
+    problem: CollocationProblem, u: Array, segments: int = 4, rtol: float = 1e-9,
     derivative_rtol: float | None = None,
-) -> tuple[Shooting, Array]:
+) -> tuple[ShootingProblem, Array]:
     """The same orbit by shooting over so many segments of equal time, with its first guess.
 
     Raises
@@ -241,11 +247,10 @@ def shooting_from(
     if not isinstance(field, ContactField):
         raise InputError("Shooting runs contact systems; make the field with contact_field, or "
                          "stay with collocation.")
-    if not (isinstance(segments, int | np.integer) and segments >= 1):
-        raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
+    require_segments(segments)
     mesh = np.linspace(0.0, 1.0, segments + 1)
     starts = interpolate(problem.mesh, problem.nodes(u), mesh[:-1])
-    result = Shooting(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
+    result = ShootingProblem(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
                       problem.scales, problem.periods, rtol, derivative_rtol)
     return result, np.concatenate([starts.reshape(-1), u[problem.size :]])
 
@@ -261,7 +266,7 @@ def run_from(system: ContactSystem, times: Array, starts: Array, rtol: float) ->
     return found.states
 
 
-def started_in_phase(problem: Shooting, u: Array, like: Array) -> Array:
+def started_in_phase(problem: ShootingProblem, u: Array, like: Array) -> Array:
     """An orbit by shooting, started where it is next to another one.
 
     Where the phase is free it starts on the plane of the phase condition, else a whole number of
@@ -304,7 +309,7 @@ def started_in_phase(problem: Shooting, u: Array, like: Array) -> Array:
 class ShootingLinearisation:
     """Residual of the shooting equations at u, and solutions of systems with their derivative."""
 
-    def __init__(self, problem: Shooting, u: Array) -> None:
+    def __init__(self, problem: ShootingProblem, u: Array) -> None:
         self.problem, self.u = problem, u
         self._last: tuple[Array, Bordered] | None = None
 

@@ -3,18 +3,22 @@
 A start is a problem, its unknowns u and the direction in which the branch leaves.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fecontact.bifurcation.continuation.points import HopfPoint
+from fecontact.bifurcation.continuation.problem import Settings, sizes_of, width_of
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.orbits.collocation import Collocation, require_mesh
+from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
 from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.types import Array
 
-Start = tuple[Collocation, Array, Array]
+Start = tuple[CollocationProblem, Array, Array]
 
 _CORRECTIONS = 25
 # First amplitudes of orbits at a Hopf point, tried one after the other. Where the friction law
@@ -55,7 +59,7 @@ def from_hopf(
     phase = 2.0j * np.pi * node_times(mesh, degree)
     shape = np.array((np.exp(phase)[:, None] * np.asarray(vector)).real, order="C")
     period = 2.0 * np.pi / angular_frequency
-    problem = Collocation(field, values.copy(), free, mesh, degree, shape,
+    problem = CollocationProblem(field, values.copy(), free, mesh, degree, shape,
                           _with_period(scales, period))
     leaving = np.concatenate([shape.reshape(-1), [0.0, 0.0]])
     leaving /= np.sqrt(problem.weights() @ leaving**2)
@@ -65,10 +69,24 @@ def from_hopf(
     return problem, u + amplitude * leaving, leaving
 
 
+def at_hopf(
+    field: VectorField, point: HopfPoint, intervals: int, degree: int, settings: Settings,
+    scales: ArrayLike | None, width: float | None,
+) -> Iterator[tuple[Start, Array | None]]:
+    """Starts at a Hopf point, one for each of the amplitudes to try, and limits of the scales."""
+    values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
+    state = np.ascontiguousarray(point.u[:-1])
+    sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
+    widths = np.append(sizes, width_of(width, settings, point.parameter))
+    for amplitude in AMPLITUDES:
+        yield from_hopf(field, values, free, state, point.angular_frequency, point.eigenvector,
+                        intervals, degree, widths, amplitude), limits
+
+
 def from_samples(
     field: VectorField, values: Array, free: int, times: ArrayLike, states: ArrayLike,
     period: float | None, intervals: int, degree: int, periods: int, scales: Array,
-) -> tuple[Collocation, Array]:
+) -> tuple[CollocationProblem, Array]:
     """Problem and first guess from a nearly periodic motion.
 
     Parameters
@@ -112,7 +130,7 @@ def from_samples(
     mesh = equidistributed(np.linspace(0.0, 1.0, 4 * intervals + 1), sampled(phases), degree,
                            intervals)
     nodes = sampled(node_times(mesh, degree))
-    problem = Collocation(field, values.copy(), free, mesh, degree, nodes,
+    problem = CollocationProblem(field, values.copy(), free, mesh, degree, nodes,
                           _with_period(scales, T), periods)
     return problem, np.concatenate([nodes.reshape(-1), [T] if forcing is None else [],
                                     [values[free]]])
@@ -140,8 +158,8 @@ def _return_time(t: Array, x: Array) -> float:
 
 
 def corrected(
-    problem: Collocation, u: Array, tolerance: float = 1e-10
-) -> tuple[Collocation, Array]:
+    problem: CollocationProblem, u: Array, tolerance: float = 1e-10
+) -> tuple[CollocationProblem, Array]:
     """The orbit near u, with the parameter held, on a mesh that suits it.
 
     Raises
@@ -159,7 +177,7 @@ def corrected(
     return problem, u
 
 
-def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
+def _newton(problem: CollocationProblem, u: Array, tolerance: float) -> Array:
     row = np.zeros_like(u)
     row[-1] = 1.0
     name = list(problem.field.parameters)[problem.free]
@@ -196,17 +214,14 @@ def _newton(problem: Collocation, u: Array, tolerance: float) -> Array:
                         f"take more than {problem.intervals} intervals.")
 
 
-def _at_rest(problem: Collocation, u: Array, size: float) -> bool:
+def _at_rest(problem: CollocationProblem, u: Array, size: float) -> bool:
     return float(np.linalg.norm(np.ptp(problem.nodes(u), axis=0))) <= 1e-4 * size
 
 
-def doubled(
-    problem: Collocation, u: Array, intervals: int | None = None
-) -> Start:
-    """Orbits of twice the period, born at the period doubling u.
+def doubled(problem: CollocationProblem, u: Array) -> Start:
+    """Orbits of twice the period, with twice the intervals, born at the period doubling u.
 
     The direction is the eigenfunction of the multiplier -1, which changes sign after one period.
-    ``intervals`` are those of the doubled orbit, twice as many by default.
     """
     linearised = problem.linearise(u)
     row = np.zeros_like(u)
@@ -228,14 +243,19 @@ def doubled(
     result = replace(problem, mesh=mesh, reference=twice, periods=periods, age=0)
     start = np.concatenate([twice.reshape(-1), common])
     leaving = np.concatenate([shape.reshape(-1), -shape.reshape(-1), np.zeros(problem.common)])
-    if intervals is None or intervals == result.intervals:
-        return result, start, leaving
-    require_mesh(intervals, problem.degree)
-    mesh = equidistributed(result.mesh, twice, problem.degree, intervals)
-    return result.on_mesh(mesh, start, leaving)
+    return result, start, leaving
 
 
-def crossing(problem: Collocation, u: Array, incoming: Array) -> Start:
+def on_intervals(start: Start, intervals: int | None) -> Start:
+    """The start on so many intervals; None to leave them."""
+    problem, u, tangent = start
+    if intervals is None or intervals == problem.intervals:
+        return start
+    mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, intervals)
+    return problem.on_mesh(mesh, u, tangent)
+
+
+def crossing(problem: CollocationProblem, u: Array, incoming: Array) -> Start:
     """The other branch of orbits through the branch point u.
 
     ``incoming`` is the direction of the first branch nearby: at the point itself the equations
@@ -250,6 +270,6 @@ def crossing(problem: Collocation, u: Array, incoming: Array) -> Start:
     return replace(problem, reference=problem.nodes(u).copy()), u, other
 
 
-def at_phase(problem: Collocation, u: Array, phases: Array) -> Array:
+def at_phase(problem: CollocationProblem, u: Array, phases: Array) -> Array:
     """States (k, d) of the orbit at phases (k,), in periods."""
     return interpolate(problem.mesh, problem.nodes(u), np.mod(phases, 1.0))

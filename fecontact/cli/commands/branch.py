@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.cli.console import complain, progress_bar, say, say_written, show
 from fecontact.cli.options import Changes, Folder, StudyFile
 from fecontact.core.atomic_write import write_text

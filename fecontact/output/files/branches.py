@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint, Status
+from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.stored import (

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fecontact.bifurcation.attractors.poincare_scan import BruteForce
-    from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+    from fecontact.bifurcation.continuation.branch import Branch
+    from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.output.plots.diagram_insets import Inset
 
 Quantity = str | int | Callable[["BranchPoint"], float]

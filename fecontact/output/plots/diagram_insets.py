@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fecontact.bifurcation.attractors.poincare_scan import BruteForce
-    from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+    from fecontact.bifurcation.continuation.branch import Branch
+    from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
 
 
@@ -68,9 +69,7 @@ def phase_inset(
     InputError
         If the point is no orbit.
     """
-    from fecontact.bifurcation.orbits.samples import motion_of
-
-    states = motion_of(field, branch, point)[1]
+    states = point.orbit(field).states
     row = field.displacement_row(*observe)
     modes = field.system().basis.modes
     rate = np.concatenate([np.zeros(modes), row[:modes], np.zeros(len(row) - 2 * modes)])

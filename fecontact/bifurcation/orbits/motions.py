@@ -1,0 +1,105 @@
+"""Periodic motions as samples: of runs that repeat, and of the orbits of branches."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fecontact.bifurcation.orbits.mesh import interpolate
+from fecontact.core.checks import as_floats
+from fecontact.core.errors import InputError, require_positive
+from fecontact.core.types import Array
+from fecontact.integrate.simulate import simulate
+from fecontact.system.contact_system import ContactSystem
+
+# Relative tolerance of the runs that give an orbit by shooting.
+_RTOL = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicMotion:
+    """A motion that repeats, over one period at least: a start for branches of orbits.
+
+    Parameters
+    ----------
+    times, states : (k,) and (k, d) sequences
+        Samples [s] of the states; of contact systems y = [q, q', z]. The end counts.
+    period : float, optional
+        Of the motion [s]. Without it the time since the last return to where the motion ends, and
+        for excited systems ``periods`` periods of the excitation.
+    periods : int
+        Periods of the excitation in one of the motion; 1 where nothing excites it.
+    parameter_values : (k,) sequence, optional
+        Values of the field's parameters to which the motion belongs; by default its base values.
+
+    Raises
+    ------
+    InputError
+        If these are no numbers, or the period is not positive.
+    """
+
+    times: Array
+    states: Array
+    period: float | None = None
+    periods: int = 1
+    parameter_values: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("times", "states", "parameter_values"):
+            given: ArrayLike | None = getattr(self, name)
+            if given is not None or name != "parameter_values":
+                object.__setattr__(self, name, as_floats(given, name))
+        if self.states.ndim != 2 or self.states.size == 0:
+            raise InputError(f"states must be those of a motion (k, d), not of shape "
+                             f"{self.states.shape}.")
+        if self.period is not None:
+            require_positive("PeriodicMotion", period=self.period)
+        if not (isinstance(self.periods, int | np.integer) and self.periods >= 1):
+            raise InputError(f"PeriodicMotion: periods = {self.periods!r} must be a whole number "
+                             f"from 1 on.")
+
+    @property
+    def amplitudes(self) -> Array:
+        """Half the range (d,) of each state, those of small ones not below 1e-3 of the largest."""
+        found = np.ptp(self.states, axis=0) / 2.0
+        return np.asarray(np.maximum(found, 1e-3 * found.max()))
+
+
+def nodes_on_mesh(u: Array, mesh: Array, states: int) -> tuple[Array, int]:
+    """Nodes (N m, d) and degree m of an orbit by collocation on N intervals.
+
+    Raises
+    ------
+    InputError
+        If the orbit was found by shooting.
+    """
+    # Behind the nodes stand the parameter and, without excitation, the period.
+    intervals = len(mesh) - 1
+    degree = (len(u) - 1) // (intervals * states)
+    if degree < 2:
+        raise InputError("The orbit was found by shooting, which keeps the states at the ends of "
+                         "its segments only; run it from there with point.orbit(field).")
+    return np.ascontiguousarray(u[: intervals * degree * states].reshape(-1, states)), degree
+
+
+def collocated(u: Array, mesh: Array, states: int, period: float, samples: int) -> PeriodicMotion:
+    """An orbit by collocation over one period, both ends included."""
+    nodes, _ = nodes_on_mesh(u, mesh, states)
+    phases = np.linspace(0.0, 1.0, samples)
+    return PeriodicMotion(phases * period, interpolate(mesh, nodes, phases), period)
+
+
+def run_again(
+    system: ContactSystem, u: Array, mesh: Array, period: float, samples: int
+) -> PeriodicMotion:
+    """An orbit by shooting over one period, each segment run from its start; at least so many
+    samples, both ends included.
+    """
+    count = len(mesh) - 1
+    starts, ends = u[: count * system.size].reshape(count, -1), mesh * period
+    each = max(2, -(-samples // count))
+    runs = [simulate(system, float(end), t_start=float(begin), initial=start, outputs=each,
+                     rtol=_RTOL)
+            for start, begin, end in zip(starts, ends[:-1], ends[1:], strict=True)]
+    return PeriodicMotion(np.concatenate([run.time for run in runs]),
+                          np.concatenate([run.states for run in runs]), period)

@@ -1,0 +1,77 @@
+"""The continuation problem of an orbit, from what a branch stores of it."""
+
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import sizes_of
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
+from fecontact.bifurcation.orbits.shooting import ShootingProblem
+from fecontact.core.errors import InputError, require_positive
+from fecontact.core.types import Array
+
+P = TypeVar("P", CollocationProblem, ShootingProblem)
+
+
+def restored(
+    field: VectorField, point: BranchPoint
+) -> tuple[CollocationProblem, Array, Array]:
+    """Problem, unknowns and tangent of an orbit by collocation, to go on from.
+
+    Raises
+    ------
+    InputError
+        If the point is no such orbit, or one of another field.
+    """
+    known = point.branch.attributes
+    if "degree" not in known or "mesh" not in point.values:
+        raise InputError(f"{point.place} is no periodic orbit by collocation.")
+    values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
+    mesh, degree, d = np.asarray(point.values["mesh"]), int(known["degree"]), field.dimension
+    nodes = point.u[: (len(mesh) - 1) * degree * d].reshape(-1, d).copy()
+    problem = CollocationProblem(field, values, free, mesh, degree, nodes,
+                                 np.asarray(known["scales"]), int(known["periods"]))
+    return problem, point.u, point.tangent
+
+
+def restored_shooting(
+    field: VectorField, point: BranchPoint
+) -> tuple[ShootingProblem, Array, Array]:
+    """Problem, unknowns and tangent of an orbit by shooting.
+
+    Raises
+    ------
+    InputError
+        If the point is no such orbit, or one of another field, or the field is not one of a
+        contact system.
+    """
+    known = point.branch.attributes
+    if "segments" not in known or "mesh" not in point.values:
+        raise InputError(f"{point.place} is no periodic orbit by shooting.")
+    values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
+    if not isinstance(field, ContactField):
+        raise InputError(f"{point.place} was found by shooting, which runs contact systems; make "
+                         f"the field with contact_field.")
+    problem = ShootingProblem(field, values, free, np.asarray(point.values["mesh"], dtype=float),
+                              point.u[: field.dimension].copy(),
+                              np.asarray(known["scales"], dtype=float), int(known["periods"]),
+                              float(known.get("rtol", 1e-9)), known.get("derivative_rtol"))
+    return problem, point.u, point.tangent
+
+
+def rescaled(problem: P, scales: ArrayLike | None, width: float | None) -> P:
+    """The problem with other scales of the states and another width of the diagram, if given."""
+    if scales is None and width is None:
+        return problem
+    changed, d = problem.scales.copy(), problem.field.dimension
+    if scales is not None:
+        changed[:d] = sizes_of(scales, changed[:d])[0]
+    if width is not None:
+        require_positive("A branch", width=width)
+        changed[-1] = width
+    return replace(problem, scales=changed)

@@ -1,0 +1,274 @@
+"""Branches of orbits by shooting: from a motion, at Hopf points and at period doublings."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import Settings, Status
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.orbits.mesh import interpolate
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
+from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.bifurcation.orbits.shooting import (
+    ShootingLinearisation,
+    ShootingProblem,
+    shooting_from,
+)
+from fecontact.bifurcation.orbits.starts import Start, from_samples
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.types import Array
+
+# Part of their largest distance below which the two halves of an orbit come together. Closer to
+# single orbits Newton's method finds either, as both solve the equations.
+_CLOSE = 0.1
+# Mesh on which a motion is sampled before it is cut into segments.
+_INTERVALS, _DEGREE = 200, 4
+
+
+def _attributes(problem: ShootingProblem) -> dict[str, Any]:
+    """What is kept with a branch."""
+    names = problem.field
+    found = {"state_names": list(names.state_names), "parameter_names": list(names.parameters),
+             "parameter_values": problem.values, "scales": problem.scales,
+             "segments": len(problem.mesh) - 1, "periods": problem.periods, "rtol": problem.rtol}
+    if problem.derivative_rtol is not None:
+        found["derivative_rtol"] = problem.derivative_rtol
+    return found
+
+
+def _name(problem: ShootingProblem) -> str:
+    return list(problem.field.parameters)[problem.free]
+
+
+def born(
+    start: Start, segments: int, rtol: float, derivative_rtol: float | None, settings: Settings
+) -> Branch:
+    """The branch from a start at a Hopf point; for orbits that come to stick on steep friction."""
+    found, u, leaving = start
+    problem, first = shooting_from(found, u, segments, rtol, derivative_rtol)
+    shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
+    tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
+    return follow(problem, first, settings, name=_name(problem),
+                  tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
+                  attributes=_attributes(problem))
+
+
+def from_motion(
+    field: VectorField, values: Array, free: int, motion: PeriodicMotion, segments: int,
+    rtol: float, derivative_rtol: float | None, settings: Settings, widths: Array,
+    direction: float, both: bool,
+) -> Branch:
+    """The branch through the orbit to which a motion of a contact system has settled.
+
+    Orbits whose period is unknown begin where the motion is fastest, if it is at least two periods
+    long. ``widths`` (d + 1,) are the scales of states and parameter.
+
+    Raises
+    ------
+    AnalysisError
+        If Newton's method finds no orbit near the motion.
+    """
+    times, states = motion.times, motion.states
+    if (motion.period is not None and isinstance(field, ContactField)
+            and states.shape == (times.size, field.dimension)
+            and field.forcing_period(values) is None):
+        times, states = _to_fastest(times, states, widths[:-1], motion.period,
+                                    field.system().basis.modes)
+    found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
+                         motion.periods, widths)
+    problem, u = shooting_from(*found, segments, rtol, derivative_rtol)
+    try:
+        return follow(problem, u, settings, name=_name(problem), direction=direction, both=both,
+                      attributes=_attributes(problem))
+    except (AnalysisError, InputError) as error:
+        raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {values[free]:.6g} "
+                            f"near the motion: Newton's method does not converge; run it longer "
+                            f"until it has settled, or take more than {segments} segments."
+                            ) from error
+
+
+def _to_fastest(
+    times: Array, states: Array, sizes: Array, period: float, modes: int
+) -> tuple[Array, Array]:
+    """The motion up to where it was fastest, within a period before its end.
+
+    There the phase is fixed best; beside transitions of stick and slip an orbit that is guessed
+    is far off.
+    """
+    last = np.flatnonzero(times > times[-1] - period)
+    if len(last) == 0 or times[last[0]] - times[0] < period:
+        return times, states
+    speeds = np.linalg.norm(states[last, modes : 2 * modes] / sizes[:modes], axis=1)
+    end = last[np.argmax(speeds)] + 1
+    return times[:end], states[:end]
+
+
+def goes_on(
+    field: VectorField, point: BranchPoint, rtol: float | None, settings: Settings,
+    scales: ArrayLike | None, width: float | None, sign: float, both: bool,
+) -> Branch:
+    """The branch on from one of its points, or back where ``sign`` is -1."""
+    problem, u, tangent = restored_shooting(field, point)
+    problem = rescaled(problem, scales, width)
+    if rtol is not None:
+        problem = replace(problem, rtol=rtol)
+    return follow(problem, u, settings, name=_name(problem), tangent=sign * tangent, both=both,
+                  attributes=_attributes(problem))
+
+
+def doubled(
+    field: VectorField, point: BranchPoint, options: tuple[int, float, float | None] | None,
+    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
+) -> Branch:
+    """The branch of orbits of twice the period that begins at a period doubling.
+
+    They leave along the eigenvector of the multiplier -1, carried along the orbit; the second
+    round takes it with the other sign. Where the two rounds become the same again, at another
+    doubling of the single orbit, the branch ends with a point 'period halving': beyond it are the
+    same orbits with their halves exchanged. ``options`` are segments, rtol and derivative_rtol, by
+    default those of the branch with twice the segments.
+
+    Raises
+    ------
+    InputError
+        If the point is no period doubling, or the segments are others.
+    """
+    if point.kind != "period doubling":
+        raise InputError(f"{point.place} was found by shooting, by which other orbits begin at "
+                         f"period doublings alone.")
+    problem, u, _ = restored_shooting(field, point)
+    problem = rescaled(problem, scales, width)
+    if options is not None:
+        segments = 2 * (len(problem.mesh) - 1)
+        if options[0] != segments:
+            raise InputError(f"segments = {options[0]} must be {segments}, twice those of the "
+                             f"branch, for the orbits of twice the period; or leave the method "
+                             f"out.")
+        problem = replace(problem, rtol=options[1], derivative_rtol=options[2])
+    twice, start, tangent = _doubled(problem, u)
+    tangent = np.copysign(1.0, direction) * tangent
+    stops = [settings.stop_at] if isinstance(settings.stop_at, str) else list(settings.stop_at)
+    twice, start, tangent = twice.adapted(start + settings.step * tangent, tangent)
+    found = follow(twice, start, replace(settings, stop_at=[*stops, HALVING]), name=_name(twice),
+                   tangent=tangent, attributes=_attributes(twice))
+    return _ended(found, problem, settings)
+
+
+def _halves(u: Array, common: int) -> tuple[Array, Array]:
+    first, second = np.split(u[:-common], 2)
+    return first, second
+
+
+@dataclass(frozen=True, eq=False)
+class _Doubled(ShootingProblem):
+    """Orbits of twice a period, with a test for those that come back to single ones.
+
+    ``apart`` (K d / 2,) is by how much the halves of the last orbit differed, ``largest`` the
+    largest length of such a difference so far.
+    """
+
+    apart: Array = field(default_factory=lambda: np.zeros(0))
+    largest: float = 0.0
+
+    def length(self, apart: Array) -> float:
+        """Length of a difference of the halves."""
+        return float(np.sqrt(self.weights()[: len(apart)] @ apart**2))
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[_Doubled, Array, Array]":
+        first, second = _halves(u, self.common)
+        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
+                       apart=first - second,
+                       largest=max(self.largest, self.length(first - second))), u, tangent
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        first, second = _halves(u, self.common)
+        along = self.weights()[: len(first)] * self.apart @ (first - second)
+        return {**super().tests(u, linearisation, tangent), HALVING: float(
+            along / (self.length(self.apart) * self.largest) - _CLOSE)}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        return {} if kind == HALVING else super().examine(kind, u, linearisation, tangent)
+
+
+def _ended(branch: Branch, single: ShootingProblem, settings: Settings) -> Branch:
+    """The branch, with an end that comes back to single orbits located on these.
+
+    Where that was passed in one step, what follows are single orbits, and is left out.
+    """
+    common = single.common
+    weights = single.weights()[:-common]
+    sizes = np.array([np.sqrt(weights @ np.subtract(*_halves(point.u, common)) ** 2)
+                      for point in branch.points])
+    close = np.flatnonzero(sizes <= 1.1 * _CLOSE * np.maximum.accumulate(sizes))
+    if not len(close):
+        return branch
+    points = branch.points[: close[0] + 1]
+    branch = replace(branch, status=Status.CLOSED, message="")
+    before, last = points[-2:]
+    # The parameter is even in what parts the halves.
+    one, other = sizes[close[0] - 1 : close[0] + 1] ** 2
+    there = last.parameter + other * (last.parameter - before.parameter) / (other - one)
+    first, second = _halves(last.u, common)
+    tail = last.u[-common:].copy()
+    tail[:-1] /= 2.0
+    tail[-1] = there
+    near = _doublings_near(single, np.concatenate([(first + second) / 2.0, tail]), settings,
+                           abs(there - last.parameter), branch.name)
+    if not near:
+        return replace(branch, points=points[:-1])
+    closest = min(near, key=lambda point: abs(point.parameter - there))
+    start, tail = closest.u[:-common], closest.u[-common:].copy()
+    tail[:-1] *= 2.0
+    end = replace(last, kind=HALVING, u=np.concatenate([start, start, tail]), values={
+        **last.values, "period": 2.0 * closest.values["period"],
+        "multipliers": closest.values["multipliers"] ** 2})
+    return replace(branch, points=(*points[:-1], end))
+
+
+def _doublings_near(
+    single: ShootingProblem, u: Array, settings: Settings, off: float, name: str
+) -> tuple[BranchPoint, ...]:
+    """Doublings of the single orbits, ``off`` or so in the parameter from that near u."""
+    step = max(4.0 * off / float(single.scales[-1]), settings.step)
+    low, high = settings.bounds
+    beside = replace(settings, step=step, largest_step=step, points=4, stop_at=(),
+                     bounds=(min(low, u[-1] - 20.0 * off), max(high, u[-1] + 20.0 * off)))
+    try:
+        return follow(single, u, beside, name=name, both=True).of_kind("period doubling")
+    except FecontactError:
+        return ()
+
+
+def _doubled(problem: ShootingProblem, u: Array) -> tuple[_Doubled, Array, Array]:
+    """The orbit run through twice, and the direction (of length one) in which it parts."""
+    starts = problem.starts(u)
+    rounds = [run.monodromy for run in ShootingLinearisation(problem, u).runs]
+    around = np.eye(starts.shape[1])
+    for matrix in rounds:
+        around = matrix @ around
+    values, vectors = np.linalg.eig(around)
+    vector = vectors[:, np.argmin(np.abs(values + 1.0))].real
+    carried = [vector]
+    for matrix in rounds[:-1]:
+        carried.append(matrix @ carried[-1])
+    mesh = np.concatenate([problem.mesh[:-1], 1.0 + problem.mesh]) / 2.0
+    scales = problem.scales.copy()
+    scales[-2] *= 2.0
+    tail = u[-problem.common:].copy()
+    if problem.autonomous:
+        tail[0] *= 2.0
+    start = np.concatenate([starts.reshape(-1), starts.reshape(-1), tail])
+    shape = np.concatenate(carried)
+    twice = _Doubled(problem.field, problem.values, problem.free, mesh, problem.reference, scales,
+                     2 * problem.periods, problem.rtol, problem.derivative_rtol)
+    tangent = np.concatenate([shape, -shape, np.zeros(problem.common)])
+    return twice, start, tangent / np.sqrt(twice.weights() @ tangent**2)
