@@ -239,7 +239,7 @@ from fecontact.output.files.case import write_case
 trajectory = run(times=50)
 folder, said = Path(sys.argv[1]), []
 for name, write in (("a.vtkhdf", write_case), ("a.csv", export_csv), ("a.mat", export_mat),
-                    ("a.png", plot_history)):
+                    ("a.png", lambda run, path: plot_history(run, path=path))):
     path = folder / name
     write(trajectory, path) if write is not write_case else write_case(path, trajectory)
     whole = path.read_bytes()

@@ -249,24 +249,6 @@ POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "conta
           "friction")
 
 
-@kernel(types.void(f8, vector, SYSTEM, vector, vector))
-def powers(t, y, s, out, friction):  # type: ignore[no-untyped-def]
-    """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
-    n = len(s.Tx)
-    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
-    state = np.empty((n, 6))
-    contact_state(t, y, s, state)
-    body_powers(t, y, s, out)
-    for j in range(n):
-        force, tangential, v, slip = state[j, 0], state[j, 1], state[j, 3], state[j, 4]
-        elastic = normal_at(s.normal[j])(state[j, 2], 0.0, s.normal_parameters[j])[0]
-        out[1] += force * state[j, 5]
-        out[2] -= tangential * speed
-        out[6] += (force - elastic) * v
-        friction[j] = tangential * slip
-        out[7] += friction[j]
-
-
 @helper
 def body_powers(t, y, s, out):  # type: ignore[no-untyped-def]
     """Fill out (8,) with the powers outside the contact, the others with zero."""
@@ -302,3 +284,21 @@ def drive_jump(before, after, y, s):  # type: ignore[no-untyped-def]
             pull -= s.drive_shapes[axis, i] * y[i]
         work += pull * (new - old)
     return work
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, vector))
+def powers(t, y, s, out, friction):  # type: ignore[no-untyped-def]
+    """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
+    n = len(s.Tx)
+    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
+    state = np.empty((n, 6))
+    contact_state(t, y, s, state)
+    body_powers(t, y, s, out)
+    for j in range(n):
+        force, tangential, v, slip = state[j, 0], state[j, 1], state[j, 3], state[j, 4]
+        elastic = normal_at(s.normal[j])(state[j, 2], 0.0, s.normal_parameters[j])[0]
+        out[1] += force * state[j, 5]
+        out[2] -= tangential * speed
+        out[6] += (force - elastic) * v
+        friction[j] = tangential * slip
+        out[7] += friction[j]
