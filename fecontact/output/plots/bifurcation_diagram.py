@@ -78,10 +78,10 @@ def plot_branches(
     from fecontact.bifurcation.continuation.branch import Branch
 
     require_kind("plot_branches", (Branch, Sequence), branches=branches)
-    several = [branches] if isinstance(branches, Branch) else list(branches)
-    for branch in several:
+    branches = [branches] if isinstance(branches, Branch) else list(branches)
+    for branch in branches:
         require_kind("plot_branches", Branch, branch=branch)
-    if not several:
+    if not branches:
         raise InputError("branches = [] holds nothing to draw; give at least one Branch.")
     with new_figure(8.0, 7.2 if insets else 5.2, path) as figure:
         axis = main_axis(figure, insets)
