@@ -1,10 +1,13 @@
+import inspect
 import struct
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from synthetic import basis, run
 
+import fecontact
 from fecontact import basis_from_matrices
 from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Energies, Trajectory
@@ -276,3 +279,44 @@ def test_plots_leave_matplotlib_as_it_was(tmp_path):
     plot_energies(run(times=11), path=tmp_path / "energies.png")
     assert dict(matplotlib.rcParams) == before
     assert ("matplotlib.pyplot" in sys.modules) == pyplot
+
+
+def test_every_plot_returns_its_figure_and_takes_a_path_by_name():
+    names = [name for name in fecontact.__all__ if name.startswith("plot_")]
+    assert len(names) > 12
+    for name in names:
+        signature = inspect.signature(getattr(fecontact, name))
+        assert signature.return_annotation.strip('"') == "Figure"
+        path = list(signature.parameters.values())[-1]
+        assert (path.name, path.default, path.kind) == ("path", None, path.KEYWORD_ONLY)
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_a_figure_saved_later_is_the_one_in_the_file(tmp_path, monkeypatch, suffix):
+    """Settings of the user between drawing and saving do not change its style."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    first, second = tmp_path / f"first.{suffix}", tmp_path / f"second.{suffix}"
+    with rc_context({"svg.hashsalt": "one"}):
+        figure = plot_energies(run(times=41), path=first)
+        with rc_context({"grid.color": "red", "xtick.color": "red", "savefig.dpi": 40,
+                         "svg.fonttype": "path", "pdf.fonttype": 3, "font.size": 20.0,
+                         "axes.formatter.useoffset": True}):
+            figure.savefig(second)
+    assert second.read_bytes() == first.read_bytes()
+
+
+def test_notebooks_show_the_figure_at_its_size():
+    figure = plot_phase(run(times=41))
+    picture, size = figure._repr_png_()
+    width, height = struct.unpack(">II", picture[16:24])
+    assert picture[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (width, height) == (960, 780)  # 6.4 x 5.2 inches at 150 dots per inch
+    assert size == {"width": 614, "height": 499}
+
+
+def test_a_file_among_what_is_drawn_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"path='a\.png'"):
+        plot_history(run(times=11), "a.png")
+    with pytest.raises(TypeError):
+        plot_energies(run(times=11), tmp_path / "a.png")
+    assert not list(tmp_path.iterdir())

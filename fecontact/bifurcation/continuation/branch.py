@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
+from fecontact.core.units import Summarised, listed, span
 
 
 class Status(Enum):
@@ -56,8 +57,8 @@ class BranchPoint:
         return float(self.u[-1])
 
 
-@dataclass(frozen=True, eq=False)
-class Branch:
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch(Summarised):
     """Solutions over a parameter, in their order along the branch.
 
     Attributes
@@ -85,6 +86,19 @@ class Branch:
 
     def __iter__(self) -> Iterator[BranchPoint]:
         return iter(self.points)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Parameter and its range, special points, stability, and how the branch ended."""
+        special = [f"{point.kind} at {point.parameter:.5g}" for point in self.special]
+        known = [bool(point.values["stable"]) for point in self.points
+                 if point.kind is None and "stable" in point.values]
+        return [
+            ("parameter", self.name), ("range", span(self.parameter)),
+            ("points", f"{len(self)}"),
+            ("special", listed(special, 5)),
+            *([("stable", f"{sum(known)} of {len(known)} regular points")] if known else []),
+            ("end", self.status.name.lower()),
+        ]
 
     @property
     def parameter(self) -> Array:
