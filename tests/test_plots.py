@@ -297,7 +297,7 @@ def test_a_figure_saved_later_is_the_one_in_the_file(tmp_path, monkeypatch, suff
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     first, second = tmp_path / f"first.{suffix}", tmp_path / f"second.{suffix}"
     with rc_context({"svg.hashsalt": "one"}):
-        figure = plot_energies(run(times=41), path=first)
+        figure = plot_phase(run(times=41), path=first)
         with rc_context({"grid.color": "red", "xtick.color": "red", "savefig.dpi": 40,
                          "svg.fonttype": "path", "pdf.fonttype": 3, "font.size": 20.0,
                          "axes.formatter.useoffset": True}):

@@ -191,6 +191,9 @@ def test_curves_scatter_and_names_on_axes():
     curves = [line for line in figure.axes[0].lines if len(line.get_xdata()) == 5]
     assert [curve.get_label() for curve in curves] == ["a", "b"]
     assert curves[1].get_ydata().tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
+    over = plots.plot_sweep(grid, "friction_power", ["load.normal"]).axes[0]
+    assert over.lines[0].get_linestyle() == "None"  # ten speeds at each load are no curve
+    assert curves[0].get_linestyle() == "-"
     loose = SweepTable(grid.parameters, grid.values, grid.keys, grid.reasons)
     figure = plots.plot_sweep(loose, "friction_power")
     assert [axes.get_xlabel() for axes in figure.axes] == [

@@ -98,7 +98,9 @@ def _curves(
             places, values = x[order], table.values[name][order] / factor
             if not np.isfinite(values).any():
                 continue
-            axes.plot(places, values, "-" if len(places) <= 200 else "", color=colour,
+            # Cases that differ in other parameters too are no curve.
+            curve = len(places) <= 200 and (np.diff(places) > 0.0).all()
+            axes.plot(places, values, linestyle="-" if curve else "none", color=colour,
                       linewidth=0.9, marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
                       label=None if by is None else f"{_shown(value)}")
         _mark_failed(axes, table, x)
