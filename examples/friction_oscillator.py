@@ -168,29 +168,29 @@ def soft_block(nodes: int = 16, youngs_modulus: float = 5e6) -> fc.ContactSystem
                        reduction="residual", tolerance=0.2), **{**LAWS, "ground": EVEN})
 
 
-def figure(runs: dict[str, fc.Trajectory]) -> Any:
+def figure(runs: dict[str, fc.Trajectory], path: Path | None = None) -> Any:
     """Phase planes of B and of the contact, one row a run, as in Fig. 4.3-2."""
-    from fecontact.output.plots.style import COLOURS, new_figure
+    from fecontact.output.plots.figure import new_figure
+    from fecontact.output.plots.style import COLOURS
 
-    drawn = new_figure(8.0, 2.6 * len(runs))
-    axes = drawn.subplots(len(runs), 2, sharex=True, sharey="col", squeeze=False)
-    for row, (name, run) in zip(axes, runs.items(), strict=True):
-        for axis, (point, title) in zip(row, (("B", "drive B"), (0, "contact")), strict=True):
-            x, v = run.displacement(point)[:, 0], run.velocity(point)[:, 0]
-            axis.plot(1e3 * x, 1e3 * v, color=COLOURS[0], linewidth=0.6)
-            axis.axhline(1e3 * BELT_SPEED, color="#303030", linewidth=0.7, linestyle=(0, (4, 3)))
-            axis.set_title(f"{name}, {title}", fontsize=9.5)
-        row[0].set_ylabel("velocity [mm/s]")
-    for axis in axes[-1]:
-        axis.set_xlabel("displacement [mm]")
+    with new_figure(8.0, 2.6 * len(runs), path) as drawn:
+        axes = drawn.subplots(len(runs), 2, sharex=True, sharey="col", squeeze=False)
+        for row, (name, run) in zip(axes, runs.items(), strict=True):
+            for axis, (point, title) in zip(row, (("B", "drive B"), (0, "contact")), strict=True):
+                x, v = run.displacement(point)[:, 0], run.velocity(point)[:, 0]
+                axis.plot(1e3 * x, 1e3 * v, color=COLOURS[0], linewidth=0.6)
+                axis.axhline(1e3 * BELT_SPEED, color="#303030", linewidth=0.7,
+                             linestyle=(0, (4, 3)))
+                axis.set_title(f"{name}, {title}", fontsize=9.5)
+            row[0].set_ylabel("velocity [mm/s]")
+        for axis in axes[-1]:
+            axis.set_xlabel("displacement [mm]")
     return drawn
 
 
 def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> None:
     """Run all cases; print slips, periods and vibrations, and draw them."""
     skip, periods, end = (12, 24, 0.1) if quick else (40, 100, 1.4)
-    from fecontact.output.plots.style import save_figure
-
     folder.mkdir(parents=True, exist_ok=True)
     runs = {name: settled(case(), skip, periods) for name, case in CASES.items()}
     print(f"{'case':30s} {'periods':>7s} {'slips':>6s} {'different':>9s}   {'length [mm]':13s}   "
@@ -206,9 +206,10 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     print(f"Normal force found by the static equilibrium: {prescribed().normal.force:.6f} N")
     names = list(runs)
     shown = {name: run.between(run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
-    save_figure(folder / "phase.png", lambda: figure({n: shown[n] for n in names[:3]}))
-    save_figure(folder / "irregular.png", lambda: figure({n: shown[n] for n in names[3:]}))
-    fc.plot_spectrogram(shown[names[1]], folder / "spectrogram.png", piece=0.25, highest_hz=60.0)
+    figure({n: shown[n] for n in names[:3]}, folder / "phase.png")
+    figure({n: shown[n] for n in names[3:]}, folder / "irregular.png")
+    fc.plot_spectrogram(shown[names[1]], piece=0.25, highest_hz=60.0,
+                        path=folder / "spectrogram.png")
 
     block = soft_block()
     print(f"Soft block: {block.basis.contact_nodes} contact nodes, elastic modes from "
@@ -217,8 +218,8 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     parts = (run.contact_state == fc.ContactState.SLIP).mean(axis=1)
     print(f"Part of the time in which only a part of its face slips: "
           f"{((parts > 0.0) & (parts < 1.0)).mean():.0%}")
-    fc.plot_contact_map(run.between(0.8 * end), folder / "block-contact.png")
-    fc.plot_friction_work(run, folder / "block-friction-work.png")
+    fc.plot_contact_map(run.between(0.8 * end), path=folder / "block-contact.png")
+    fc.plot_friction_work(run, path=folder / "block-friction-work.png")
 
 
 if __name__ == "__main__":

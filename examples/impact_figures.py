@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 from impact_oscillator import FREQUENCIES, mesh_system, settled, two_mode_system
-from matplotlib import rc_context
 
 from fecontact import ContactSystem, Trajectory
 from fecontact.analysis.periodicity import drive_period
-from fecontact.output.plots.style import COLOURS, STYLE, new_figure
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import COLOURS
 
 SHOWN_PERIODS = {64.32: 4, 30.84: 4, 37.41: 4, 23.63: 25, 9.845: 2}
 SECTION_POINTS = 3000
@@ -44,53 +44,55 @@ def draw_phase(axes: Any, run: Trajectory) -> None:
 
 def phase_figure(runs: dict[float, Trajectory]) -> Any:
     """Phase diagrams at the five frequencies, as Fig. 4.2-2."""
-    figure = new_figure(10.0, 5.8)
-    for axes, (frequency, run) in zip(figure.subplots(2, 3).flat, runs.items(), strict=False):
-        draw_phase(axes, run)
-        axes.set_title(f"{frequency:g} rad/s: {FREQUENCIES[frequency]}", fontsize=9.5)
-    empty = figure.axes[-1]
-    empty.axis("off")
-    empty.legend(handles=[
-        empty.plot([], [], color=COLOURS[0], label="middle of the contact")[0],
-        empty.plot([], [], ".", color=COLOURS[1], label="once a period, drive at zero, rising")[0],
-        empty.fill_between([], [], color="#e3e0da", label="stop")], loc="center")
+    with new_figure(10.0, 5.8) as figure:
+        for axes, (frequency, run) in zip(figure.subplots(2, 3).flat, runs.items(), strict=False):
+            draw_phase(axes, run)
+            axes.set_title(f"{frequency:g} rad/s: {FREQUENCIES[frequency]}", fontsize=9.5)
+        empty = figure.axes[-1]
+        empty.axis("off")
+        empty.legend(handles=[
+            empty.plot([], [], color=COLOURS[0], label="middle of the contact")[0],
+            empty.plot([], [], ".", color=COLOURS[1],
+                       label="once a period, drive at zero, rising")[0],
+            empty.fill_between([], [], color="#e3e0da", label="stop")], loc="center")
     return figure
 
 
 def chatter_figure(run: Trajectory) -> Any:
     """Displacement and velocity over a period, and their phase diagram, as Fig. 4.2-3."""
-    figure = new_figure(10.0, 6.2)
-    grid = figure.subplot_mosaic([["height", "phase"], ["velocity", "phase"], ["close", "near"]])
-    height, velocity = contact_motion(run)
-    period = drive_period(run.system)
-    part = (run.time - run.time[0]) / period
-    for name, values, label in (("height", height, "height [µm]"),
-                                ("velocity", velocity, "velocity [mm/s]"),
-                                ("close", height, "height [µm], close")):
-        grid[name].plot(part, values, color=COLOURS[0], linewidth=0.8)
-        grid[name].set_xlabel("time / period of the drive")
-        grid[name].set_ylabel(label)
-    grid["close"].set_xlim(0.5, 1.05)
-    grid["close"].set_ylim(-7.0, 42.0)
-    grid["close"].axhspan(-7.0, 0.0, color="#e3e0da", linewidth=0.0)
-    draw_phase(grid["phase"], run)
-    draw_phase(grid["near"], run)
-    grid["near"].set_xlim(-7.0, 42.0)
+    with new_figure(10.0, 6.2) as figure:
+        grid = figure.subplot_mosaic(
+            [["height", "phase"], ["velocity", "phase"], ["close", "near"]])
+        height, velocity = contact_motion(run)
+        period = drive_period(run.system)
+        part = (run.time - run.time[0]) / period
+        for name, values, label in (("height", height, "height [µm]"),
+                                    ("velocity", velocity, "velocity [mm/s]"),
+                                    ("close", height, "height [µm], close")):
+            grid[name].plot(part, values, color=COLOURS[0], linewidth=0.8)
+            grid[name].set_xlabel("time / period of the drive")
+            grid[name].set_ylabel(label)
+        grid["close"].set_xlim(0.5, 1.05)
+        grid["close"].set_ylim(-7.0, 42.0)
+        grid["close"].axhspan(-7.0, 0.0, color="#e3e0da", linewidth=0.0)
+        draw_phase(grid["phase"], run)
+        draw_phase(grid["near"], run)
+        grid["near"].set_xlim(-7.0, 42.0)
     return figure
 
 
 def section_figure(points: dict[float, np.ndarray]) -> Any:
     """States at the middle of the contact once a period: heights [um], velocities [mm/s]."""
-    figure = new_figure(10.0, 4.2)
-    chaos, orbits = figure.subplots(1, 2)
-    for axes, frequencies in ((chaos, [23.63]), (orbits, [w for w in points if w != 23.63])):
-        for number, frequency in enumerate(frequencies):
-            height, velocity = points[frequency]
-            axes.plot(height, velocity, "." if axes is chaos else "o", label=f"{frequency:g} rad/s",
-                      markersize=1.5 if axes is chaos else 5, color=COLOURS[number])
-        axes.set_xlabel("height [µm]")
-        axes.set_ylabel("velocity [mm/s]")
-        axes.legend(loc="best", markerscale=5 if axes is chaos else 1)
+    with new_figure(10.0, 4.2) as figure:
+        chaos, orbits = figure.subplots(1, 2)
+        for axes, frequencies in ((chaos, [23.63]), (orbits, [w for w in points if w != 23.63])):
+            for number, frequency in enumerate(frequencies):
+                height, velocity = points[frequency]
+                axes.plot(height, velocity, "." if axes is chaos else "o", color=COLOURS[number],
+                          markersize=1.5 if axes is chaos else 5, label=f"{frequency:g} rad/s")
+            axes.set_xlabel("height [µm]")
+            axes.set_ylabel("velocity [mm/s]")
+            axes.legend(loc="best", markerscale=5 if axes is chaos else 1)
     return figure
 
 
@@ -108,9 +110,8 @@ def figures(system: ContactSystem, transient: int = 300,
             for w, one in driven.items()}
     sections = {w: strobed(one, points if w == 23.63 else min(points, 40), min(transient, 200))
                 for w, one in driven.items()}
-    with rc_context(STYLE):
-        return {"phase": phase_figure(runs), "chatter": chatter_figure(runs[9.845]),
-                "sections": section_figure(sections)}
+    return {"phase": phase_figure(runs), "chatter": chatter_figure(runs[9.845]),
+            "sections": section_figure(sections)}
 
 
 def main(folder: Path = Path("impact-figures"), quick: bool = False) -> None:

@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 from impact_oscillator import FREQUENCIES, settled, start, two_mode_system
-from matplotlib import rc_context
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from fecontact import ContactSystem
 from fecontact.analysis.periodicity import count_periods
 from fecontact.cli.console import progress_bar
 from fecontact.integrate.ensemble import strobe
-from fecontact.output.plots.style import COLOURS, STYLE, new_figure
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import COLOURS
 
 EXPECTED = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
 SWEPT = np.linspace(5.0, 80.0, 600)  # rad/s
@@ -99,47 +99,47 @@ def classes(periods: np.ndarray) -> np.ndarray:
 
 def bifurcation_figure(diagram: Diagram) -> Any:
     """Heights of the contact once a period over the frequency, upwards and downwards."""
-    figure = new_figure(10.0, 6.2)
-    for axes, points, words in zip(figure.subplots(2, 1, sharex=True, sharey=True),
-                                   (diagram.up, diagram.down), ("upwards", "downwards"),
-                                   strict=True):
-        heights = 1e6 * points[:, :, 0]
-        axes.plot(np.repeat(diagram.frequencies, heights.shape[1]), heights.ravel(), ".",
-                  color=COLOURS[0], markersize=1.0, rasterized=True)
-        for frequency in FREQUENCIES:
-            axes.axvline(frequency, color=COLOURS[1], linewidth=0.8, alpha=0.7)
-        axes.set_ylabel("height once a period [µm]")
-        axes.set_title(f"{words}; lines: frequencies of the source", fontsize=9.5)
-    axes.set_xlabel("angular frequency of the drive [rad/s]")
+    with new_figure(10.0, 6.2) as figure:
+        for axes, points, words in zip(figure.subplots(2, 1, sharex=True, sharey=True),
+                                       (diagram.up, diagram.down), ("upwards", "downwards"),
+                                       strict=True):
+            heights = 1e6 * points[:, :, 0]
+            axes.plot(np.repeat(diagram.frequencies, heights.shape[1]), heights.ravel(), ".",
+                      color=COLOURS[0], markersize=1.0, rasterized=True)
+            for frequency in FREQUENCIES:
+                axes.axvline(frequency, color=COLOURS[1], linewidth=0.8, alpha=0.7)
+            axes.set_ylabel("height once a period [µm]")
+            axes.set_title(f"{words}; lines: frequencies of the source", fontsize=9.5)
+        axes.set_xlabel("angular frequency of the drive [rad/s]")
     return figure
 
 
 def map_figure(bendings_hz: np.ndarray, dampings: np.ndarray,
                periods: dict[float, np.ndarray]) -> Any:
     """Numbers of periods over frequency and damping of the bending mode."""
-    figure = new_figure(10.0, 6.0)
-    panels = figure.subplots(2, 3, sharex=True, sharey=True)
-    colours = ListedColormap([*COLOURS[:5], "#303030"])
-    norm = BoundaryNorm(np.arange(len(CLASSES) + 1) - 0.5, len(CLASSES))
-    agree = np.zeros((len(dampings), len(bendings_hz)), dtype=int)
-    for axes, (frequency, found) in zip(panels.flat, periods.items(), strict=False):
-        image = axes.pcolormesh(bendings_hz, dampings, classes(found), cmap=colours, norm=norm)
-        expected = EXPECTED[frequency]
-        agree += found == (expected or 0)
-        axes.set_title(f"{frequency:g} rad/s: {expected or 'none'} expected", fontsize=9.5)
-    bar = figure.colorbar(image, ax=panels[0], ticks=range(len(CLASSES)),
-                          label="repeats after periods")
-    bar.ax.set_yticklabels(CLASSES)
-    both = panels[1, 2].pcolormesh(bendings_hz, dampings, agree, cmap="Greens", vmin=0, vmax=5)
-    figure.colorbar(both, ax=panels[1], label="how many agree")
-    panels[1, 2].set_title("frequencies that agree with the source", fontsize=9.5)
-    for axes in panels.flat:
-        axes.plot(230.0, 0.03, "x", color="white", markersize=7, markeredgewidth=2)
-        axes.grid(False)
-    for axes in panels[:, 0]:
-        axes.set_ylabel("damping ratio")
-    for axes in panels[1]:
-        axes.set_xlabel("bending mode [Hz]")
+    with new_figure(10.0, 6.0) as figure:
+        panels = figure.subplots(2, 3, sharex=True, sharey=True)
+        colours = ListedColormap([*COLOURS[:5], "#303030"])
+        norm = BoundaryNorm(np.arange(len(CLASSES) + 1) - 0.5, len(CLASSES))
+        agree = np.zeros((len(dampings), len(bendings_hz)), dtype=int)
+        for axes, (frequency, found) in zip(panels.flat, periods.items(), strict=False):
+            image = axes.pcolormesh(bendings_hz, dampings, classes(found), cmap=colours, norm=norm)
+            expected = EXPECTED[frequency]
+            agree += found == (expected or 0)
+            axes.set_title(f"{frequency:g} rad/s: {expected or 'none'} expected", fontsize=9.5)
+        bar = figure.colorbar(image, ax=panels[0], ticks=range(len(CLASSES)),
+                              label="repeats after periods")
+        bar.ax.set_yticklabels(CLASSES)
+        both = panels[1, 2].pcolormesh(bendings_hz, dampings, agree, cmap="Greens", vmin=0, vmax=5)
+        figure.colorbar(both, ax=panels[1], label="how many agree")
+        panels[1, 2].set_title("frequencies that agree with the source", fontsize=9.5)
+        for axes in panels.flat:
+            axes.plot(230.0, 0.03, "x", color="white", markersize=7, markeredgewidth=2)
+            axes.grid(False)
+        for axes in panels[:, 0]:
+            axes.set_ylabel("damping ratio")
+        for axes in panels[1]:
+            axes.set_xlabel("bending mode [Hz]")
     return figure
 
 
@@ -158,9 +158,8 @@ def main(folder: Path = Path("impact-map"), quick: bool = False) -> None:
     print(f"map: {time.perf_counter() - begin:.0f} s", flush=True)
     agree = sum((found == (EXPECTED[w] or 0)).astype(int) for w, found in periods.items())
     print(f"up to {np.max(agree)} of {len(EXPECTED)} frequencies agree with the source")
-    with rc_context(STYLE):
-        bifurcation_figure(diagram).savefig(folder / "impact-bifurcation.png", dpi=100)
-        map_figure(bendings, dampings, periods).savefig(folder / "impact-map.png", dpi=100)
+    bifurcation_figure(diagram).savefig(folder / "impact-bifurcation.png", dpi=100)
+    map_figure(bendings, dampings, periods).savefig(folder / "impact-map.png", dpi=100)
 
 
 if __name__ == "__main__":

@@ -242,13 +242,13 @@ def draw(
         insets.append(fc.phase_inset(field_at(w), branch, point, float(section(point)[0]),
                                      ("B", "y"), f"{point.parameter:.2f} rad/s{kind}"))
     part = (low <= found.values) & (found.values <= high)
-    fc.plot_branches(shown, path, "observed_section",
+    fc.plot_branches(shown, "observed_section",
                      x_label="angular frequency of the drive [rad/s]",
                      y_label="displacement once per period [m]",
                      names=[f"period {periods(branch)}" for branch in shown],
                      beneath=replace(found, values=found.values[part], up=found.up[part],
                                      down=found.down[part]),
-                     observe=("B", "y"), insets=insets)
+                     observe=("B", "y"), insets=insets, path=path)
 
 
 def main(folder: Path = Path("impact-orbits"), quick: bool = False) -> None:

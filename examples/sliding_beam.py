@@ -102,10 +102,10 @@ def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
     # Archard's k of 1e-14 m^2/N, of steel on steel in mild wear, over the coefficient of friction.
     depth = complete.wear_depth(1e-14 / 0.35, THICKNESS)[-1]
     print(f"In mild wear this takes off {1e9 * depth.min():.3f} to {1e9 * depth.max():.3f} nm.")
-    fc.plot_energies(complete, folder / "energies.png")
-    fc.plot_contact_map(complete, folder / "contact.png")
-    fc.plot_friction_work(complete, folder / "friction-work.png")
-    fc.plot_history(complete, folder / "history.png", ("B", "C", "end"))
+    fc.plot_energies(complete, path=folder / "energies.png")
+    fc.plot_contact_map(complete, path=folder / "contact.png")
+    fc.plot_friction_work(complete, path=folder / "friction-work.png")
+    fc.plot_history(complete, ("B", "C", "end"), path=folder / "history.png")
     fc.render(complete, folder / "sliding-beam.mp4", frames=2 if quick else 90, colour="von_mises",
               title="Steel beam sliding over waves")
 

@@ -35,9 +35,9 @@ def main(folder: Path = Path(), quick: bool = False) -> tuple[fc.Branch, fc.Bran
     folder.mkdir(parents=True, exist_ok=True)
     columns, rows = (7, 5) if quick else (31, 29)
     field = fc.contact_field(system(), [FRICTION, "load.normal"])
-    branch = fc.equilibrium_branch(field, parameter=FRICTION, bounds=(0.0, 0.6))
-    fc.plot_eigenvalues(branch, folder / "squeal_modes.png", x_label="friction coefficient",
-                        range_hz=(300.0, 1200.0))
+    branch = fc.equilibrium_branch(field, FRICTION, bounds=(0.0, 0.6))
+    fc.plot_eigenvalues(branch, x_label="friction coefficient", range_hz=(300.0, 1200.0),
+                        path=folder / "squeal_modes.png")
     hopf = branch.of_kind("Hopf")[0]
     print(f"flutter from a friction coefficient of {hopf.parameter:.4f} on, "
           f"at {hopf.frequency_hz:.1f} Hz, {hopf.criticality}")
@@ -53,8 +53,8 @@ def main(folder: Path = Path(), quick: bool = False) -> tuple[fc.Branch, fc.Bran
           f"{frictions.max():.3f}, load from {loads.min():.1f} to {loads.max():.1f} N")
     found = fc.stability_map(field, {FRICTION: np.linspace(0.0, 0.6, columns),
                                      "load.normal": np.linspace(2.0, 30.0, rows)})
-    fc.plot_stability_map(found, folder / "squeal_map.png", borders=[border],
-                          x_label="friction coefficient", y_label="load [N]")
+    fc.plot_stability_map(found, borders=[border], x_label="friction coefficient",
+                          y_label="load [N]", path=folder / "squeal_map.png")
     return branch, border
 
 

@@ -42,7 +42,8 @@ from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.bifurcation.orbits.samples import amplitude
 from fecontact.output.plots.basins import plot_basins
 from fecontact.output.plots.bifurcation_diagram import plot_branches
-from fecontact.output.plots.style import COLOURS, new_figure, save_figure
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -176,21 +177,23 @@ def basins_of_attraction(v0: float, count: int = 60) -> tuple[Basins, list[np.nd
     return found, [axis.row(system) for axis in (place, speed)]
 
 
-def phase_figure(motions: Sequence[tuple[str, np.ndarray]], v0: float) -> "Figure":
+def phase_figure(
+    motions: Sequence[tuple[str, np.ndarray]], v0: float, path: Path | None = None
+) -> "Figure":
     """The attractors in the plane of x_3 and x_3'."""
-    figure = new_figure(8.0, 4.8)
-    axis = figure.subplots()
-    for colour, (name, motion) in zip(COLOURS, motions, strict=False):
-        if np.ptp(motion[:, 0]) > 0.01:
-            axis.plot(motion[:, 0], motion[:, 1], color=colour, label=name)
-        else:
-            axis.plot(motion[-1, 0], motion[-1, 1], "o", color=colour, label=name)
-    axis.axhline(v0, color="#8a8a8a", linewidth=0.8, linestyle=":")
-    axis.annotate("belt", (axis.get_xlim()[0], v0), xytext=(4, 3), textcoords="offset points",
-                  color="#6a6a6a", fontsize=9.0)
-    axis.set_xlabel("x3 [m]")
-    axis.set_ylabel("x3' [m/s]")
-    figure.legend(loc="outside right upper")
+    with new_figure(8.0, 4.8, path) as figure:
+        axis = figure.subplots()
+        for colour, (name, motion) in zip(COLOURS, motions, strict=False):
+            if np.ptp(motion[:, 0]) > 0.01:
+                axis.plot(motion[:, 0], motion[:, 1], color=colour, label=name)
+            else:
+                axis.plot(motion[-1, 0], motion[-1, 1], "o", color=colour, label=name)
+        axis.axhline(v0, color="#8a8a8a", linewidth=0.8, linestyle=":")
+        axis.annotate("belt", (axis.get_xlim()[0], v0), xytext=(4, 3), textcoords="offset points",
+                      color="#6a6a6a", fontsize=9.0)
+        axis.set_xlabel("x3 [m]")
+        axis.set_ylabel("x3' [m/s]")
+        figure.legend(loc="outside right upper")
     return figure
 
 
@@ -228,9 +231,9 @@ def quick_diagram(folder: Path) -> None:
     sliding = equilibrium_branch(field, parameter="B", bounds=bounds)
     orbits = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=bounds,
                           settings=Settings(step=0.01, largest_step=0.1), scales=SMALL)
-    plot_branches([sliding, orbits], folder / "two_masses_over_B.png",
-                  amplitude(field.displacement_row(1)), x_label="B [m]",
-                  y_label="amplitude of x3 [m]", names=["steady sliding", "orbits"])
+    plot_branches([sliding, orbits], amplitude(field.displacement_row(1)), x_label="B [m]",
+                  y_label="amplitude of x3 [m]", names=["steady sliding", "orbits"],
+                  path=folder / "two_masses_over_B.png")
     for point in (*sliding.special, *orbits.special):
         print(f"{point.kind} at B = {point.parameter:.4f}")
 
@@ -244,13 +247,13 @@ def main(folder: Path = Path()) -> None:
                 "over_D_B10": (diagram_over_damping(10.0), "D (B = 10 m)"),
                 "over_D_B20": (diagram_over_damping(20.0), "D (B = 20 m)")}
     for name, (branches, label) in diagrams.items():
-        plot_branches(list(branches.values()), folder / f"two_masses_{name}.png", x3,
-                      x_label=label, y_label="amplitude of x3 [m]", names=list(branches))
+        plot_branches(list(branches.values()), x3, x_label=label, y_label="amplitude of x3 [m]",
+                      names=list(branches), path=folder / f"two_masses_{name}.png")
     motions = attractors(3.8, over_speed)
-    save_figure(folder / "two_masses_attractors.png", lambda: phase_figure(motions, 3.8))
+    phase_figure(motions, 3.8, folder / "two_masses_attractors.png")
     found, rows = basins_of_attraction(3.8)
-    plot_basins(found, folder / "two_masses_basins.png", x_label="x3 at the start [m]",
-                y_label="x3' at the start [m/s]", rows=rows)
+    plot_basins(found, x_label="x3 at the start [m]", y_label="x3' at the start [m/s]", rows=rows,
+                path=folder / "two_masses_basins.png")
     print(f"{'':48} printed  computed")
     for what, printed, value in table(over_B, over_speed):
         print(f"{what:48} {printed:>7}  {value:.4f}")

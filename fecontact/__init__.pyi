@@ -91,7 +91,8 @@ from .output.plots.analysis import (
 from .output.plots.basins import plot_basins
 from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.diagram_insets import Inset, phase_inset
-from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
+from .output.plots.modes import plot_modes
+from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.render.movie import picture, render
 from .reduction.convergence import mode_convergence

@@ -5,11 +5,9 @@ from pathlib import Path
 import friction_oscillator as friction
 import numpy as np
 from comparison import Comparison, comparisons, table
-from matplotlib import rc_context
 from pictures import save
 
 from fecontact import Scipy, Trajectory, periodicity, simulate
-from fecontact.output.plots.style import STYLE
 
 FIGURES = {
     "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop with one slip, which "
@@ -27,9 +25,7 @@ def section(images: Path) -> str:
     """Text with tables; a picture into a folder."""
     runs = {name: friction.settled(friction.CASES[name](), rtol=1e-7) for name in FIGURES}
     shown = {name: run.between(run.time[-1] - 16 * friction.PERIOD) for name, run in runs.items()}
-    with rc_context(STYLE):
-        figure = friction.figure(shown)
-    save(figure, images / "friction-phase.png")
+    save(friction.figure(shown), images / "friction-phase.png")
     return TEXT.format(
         figures=table(("figure", "the source shows", "shown here"), list(FIGURES.values())),
         slips=slips_table(runs), numbers=comparisons(vibration(runs) + solvers()))

@@ -5,10 +5,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
 from PIL import Image
-
-from fecontact.output.plots.style import STYLE
 
 LARGEST = 100_000  # bytes
 
@@ -16,8 +13,7 @@ LARGEST = 100_000  # bytes
 def save(figure: Any, path: Path, dpi: int = 90) -> None:
     """Write a figure as PNG of few colours, below 100 kB, whole or not at all."""
     drawn = BytesIO()
-    with rc_context(STYLE):
-        figure.savefig(drawn, format="png", dpi=dpi)
+    figure.savefig(drawn, format="png", dpi=dpi)
     for colours in (128, 64, 32, 16):
         small = BytesIO()
         Image.open(drawn).convert("RGB").quantize(colours, dither=Image.Dither.NONE).save(

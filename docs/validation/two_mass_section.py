@@ -6,14 +6,10 @@ from pathlib import Path
 import numpy as np
 import two_mass_friction as example
 from comparison import Comparison, comparisons, table
-from matplotlib import rc_context
 from pictures import save
 from scipy.optimize import brentq
 
-from fecontact import Branch, amplitude
-from fecontact.output.plots.basins import basins_figure
-from fecontact.output.plots.bifurcation_diagram import branches_figure
-from fecontact.output.plots.style import STYLE
+from fecontact import Branch, amplitude, plot_basins, plot_branches
 
 SPEED = 3.8  # between the folds
 KINDS = (("Hopf", "Hopf points of steady sliding"), ("fold", "turning points of the orbits"),
@@ -25,15 +21,14 @@ def section(images: Path) -> str:
     over_B, over_speed = example.diagram_over_B(), example.diagram_over_speed()
     height = amplitude(example.oscillator().displacement_row(1))
     motions = example.attractors(SPEED, over_speed)
-    with rc_context(STYLE):
-        for name, branches, label in (("B", over_B, "B [m]"), ("v0", over_speed, "v0 [m/s]")):
-            figure = branches_figure(list(branches.values()), height, x_label=label,
-                                     y_label="amplitude of x3 [m]", names=list(branches))
-            save(figure, images / f"two-masses-{name}.png")
-        save(example.phase_figure(motions, SPEED), images / "two-masses-attractors.png")
-        found, axes = example.basins_of_attraction(SPEED)
-        save(basins_figure(found, "x3 at the start [m]", "x3' at the start [m/s]", axes),
-             images / "two-masses-basins.png")
+    for name, branches, label in (("B", over_B, "B [m]"), ("v0", over_speed, "v0 [m/s]")):
+        figure = plot_branches(list(branches.values()), height, x_label=label,
+                               y_label="amplitude of x3 [m]", names=list(branches))
+        save(figure, images / f"two-masses-{name}.png")
+    save(example.phase_figure(motions, SPEED), images / "two-masses-attractors.png")
+    found, axes = example.basins_of_attraction(SPEED)
+    save(plot_basins(found, x_label="x3 at the start [m]", y_label="x3' at the start [m/s]",
+                     rows=axes), images / "two-masses-basins.png")
     rows = [(what, printed, f"{value:.4f}", deviation(printed, value))
             for what, printed, value in example.table(over_B, over_speed)]
     rows.append((f"stable motions at v_0 = {SPEED:g} m/s", 3, len(motions), ""))

@@ -61,7 +61,7 @@ def _show_study(name: str, text: str, folder: Path, log: Log) -> None:
     from fecontact.fem.mesh_files import write_mesh
     from fecontact.integrate.trajectory import Status
     from fecontact.output.files.case import write_case
-    from fecontact.output.plots.run import plot_modes
+    from fecontact.output.plots.modes import plot_modes
     from fecontact.study.study import Study
 
     path = folder / f"{name}.toml"
@@ -84,7 +84,9 @@ def _show_study(name: str, text: str, folder: Path, log: Log) -> None:
     if trajectory.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
     with log.step(name, "plotting"):
-        log.files.append(plot_modes(system.basis, folder / f"{name}-modes.png"))
+        shapes = folder / f"{name}-modes.png"
+        plot_modes(system.basis, path=shapes)
+        log.files.append(shapes)
         log.files += write_plots(study, trajectory, folder)
     with log.step(name, f"drawing {study.render.frames} pictures"):
         log.files.append(movie(trajectory, folder / f"{name}.mp4", study.render))

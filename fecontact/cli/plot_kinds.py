@@ -4,6 +4,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from fecontact.core.errors import AnalysisError, InputError, choices, nearest, r
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots import analysis
 from fecontact.output.plots import run as plots
+from fecontact.output.plots.modes import plot_modes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -44,17 +49,16 @@ class Choice:
         """The first point, or B."""
         return self.points[0] if self.points else "B"
 
-
     @property
     def direction(self) -> str:
         """The axis, x where none is chosen."""
         return self.axis or "x"
 
 
-Draw = Callable[[Trajectory, Path, Choice], Path]
+Draw = Callable[[Trajectory, Choice, Path | None], "Figure"]
 
 
-def _receptance(run: Trajectory, path: Path, c: Choice) -> Path:
+def _receptance(run: Trajectory, c: Choice, path: Path | None) -> "Figure":
     basis = run.system.basis
     end = c.highest_hz or 1.2 * float(basis.frequencies_hz[-1] or 100.0)
     f = np.linspace(end / 2000.0, end, 2000)
@@ -68,23 +72,24 @@ def _receptance(run: Trajectory, path: Path, c: Choice) -> Path:
     with suppress(AnalysisError):
         found.append(frequency_response(run.system, f, place, linearised_at="sliding"))
         labels.append("steadily sliding")
-    return analysis.plot_response(found, path, labels)
+    return analysis.plot_response(found, labels, path=path)
 
 
 KINDS: dict[str, Draw] = {
-    "history": lambda run, path, c: plots.plot_history(run, path, c.points),
-    "phase": lambda run, path, c: plots.plot_phase(run, path, c.point, c.direction),
-    "contact": lambda run, path, c: plots.plot_contact_map(run, path),
-    "energies": lambda run, path, c: plots.plot_energies(run, path),
-    "modes": lambda run, path, c: plots.plot_modes(run.system.basis, path),
-    "spectrum": lambda run, path, c: analysis.plot_spectrum(
-        run, path, c.quantity, c.point, c.direction, highest_hz=c.highest_hz),
-    "density": lambda run, path, c: analysis.plot_spectrum(
-        run, path, c.quantity, c.point, c.direction, density=True, highest_hz=c.highest_hz),
-    "spectrogram": lambda run, path, c: analysis.plot_spectrogram(
-        run, path, c.quantity, c.point, c.direction, highest_hz=c.highest_hz),
-    "poincare": lambda run, path, c: analysis.plot_poincare(run, path, c.point, c.direction),
-    "friction_work": lambda run, path, c: analysis.plot_friction_work(run, path),
+    "history": lambda run, c, path: plots.plot_history(run, c.points, path=path),
+    "phase": lambda run, c, path: plots.plot_phase(run, c.point, c.direction, path=path),
+    "contact": lambda run, c, path: plots.plot_contact_map(run, path=path),
+    "energies": lambda run, c, path: plots.plot_energies(run, path=path),
+    "modes": lambda run, c, path: plot_modes(run.system.basis, path=path),
+    "spectrum": lambda run, c, path: analysis.plot_spectrum(
+        run, c.quantity, c.point, c.direction, highest_hz=c.highest_hz, path=path),
+    "density": lambda run, c, path: analysis.plot_spectrum(
+        run, c.quantity, c.point, c.direction, density=True, highest_hz=c.highest_hz, path=path),
+    "spectrogram": lambda run, c, path: analysis.plot_spectrogram(
+        run, c.quantity, c.point, c.direction, highest_hz=c.highest_hz, path=path),
+    "poincare": lambda run, c, path: analysis.plot_poincare(
+        run, c.point, c.direction, path=path),
+    "friction_work": lambda run, c, path: analysis.plot_friction_work(run, path=path),
     "receptance": _receptance,
 }
 
@@ -92,13 +97,13 @@ KINDS: dict[str, Draw] = {
 def redraw(
     trajectory: Trajectory,
     kind: str,
-    path: Path,
     choice: Choice | None = None,
     *,
     t_start: float | None = None,
     t_end: float | None = None,
-) -> Path:
-    """Draw a stored run once more; the file.
+    path: Path | None = None,
+) -> "Figure":
+    """Draw a stored run once more.
 
     Parameters
     ----------
@@ -106,12 +111,12 @@ def redraw(
         The run.
     kind : str
         One of :data:`KINDS`.
-    path : Path
-        A .png, .pdf or .svg file.
     choice : Choice, optional
         What to draw.
     t_start, t_end : float, optional
         The part of the run [s].
+    path : Path, optional
+        A .png, .pdf or .svg file to write too.
 
     Raises
     ------
@@ -126,7 +131,7 @@ def redraw(
     chosen = choice or Choice()
     if chosen.axis is None:
         chosen = replace(chosen, axis=usual_axis(part.system))
-    return KINDS[kind](part, path, chosen)
+    return KINDS[kind](part, chosen, path)
 
 
 def point_of(text: str) -> Point:

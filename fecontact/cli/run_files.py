@@ -52,18 +52,16 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
     from fecontact.analysis.histories import usual_axis
     from fecontact.output.plots import run as plots
 
-    def file(what: str) -> Path:
-        return folder / f"{study.name}-{what}.png"
-
     system, points = trajectory.system, study.output.points
     middle = system.basis.contact_nodes // 2
     point = points[0] if points else "B" if system.basis.T[0].any() else middle
-    return [
-        plots.plot_history(trajectory, file("history"), points),
-        plots.plot_phase(trajectory, file("phase"), point, usual_axis(system)),
-        plots.plot_contact_map(trajectory, file("contact")),
-        plots.plot_energies(trajectory, file("energies")),
-    ]
+    history, phase, contact, energies = files = [
+        folder / f"{study.name}-{what}.png" for what in ("history", "phase", "contact", "energies")]
+    plots.plot_history(trajectory, points, path=history)
+    plots.plot_phase(trajectory, point, usual_axis(system), path=phase)
+    plots.plot_contact_map(trajectory, path=contact)
+    plots.plot_energies(trajectory, path=energies)
+    return files
 
 
 @dataclass(frozen=True)

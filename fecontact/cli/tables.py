@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.core.units import count
-
 if TYPE_CHECKING:
     from fecontact.fem.mesh import Mesh
     from fecontact.integrate.events import Events
@@ -31,16 +29,7 @@ def table(*headings: str, rows: Iterable[Iterable[str]], left: int = 1) -> Any:
 
 def mesh_table(mesh: "Mesh") -> Any:
     """Counts, size and groups of a mesh."""
-    kind = "triangles" if mesh.cells.shape[1] == 3 else "quadrilaterals"
-    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
-    groups = [(f"boundary {name}", count(len(edges), "edge"))
-              for name, edges in mesh.boundaries.items()]
-    points = [(f"point {name}", count(len(nodes), "node")) for name, nodes in mesh.points.items()]
-    return table("", "", rows=[
-        ("nodes", f"{len(mesh.nodes)}"), (kind, f"{len(mesh.cells)}"),
-        ("x", f"{low[0]:g} ... {high[0]:g} m"), ("y", f"{low[1]:g} ... {high[1]:g} m"),
-        ("area", f"{mesh.area:.4g} m²"), *groups, *points,
-    ])
+    return table("", "", rows=mesh.summary())
 
 
 def run_table(trajectory: "Trajectory") -> Any:

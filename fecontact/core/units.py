@@ -1,6 +1,9 @@
-"""Numbers for people: a unit that suits their size, and round numbers."""
+"""What people are shown: numbers in units that suit their size, and objects in short."""
 
 import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from itertools import chain, repeat
 
 _UNITS = {
     "m": ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m")),
@@ -15,6 +18,8 @@ _UNITS = {
     "Hz": ((1.0, "Hz"), (1e3, "kHz")),
     "J": ((1e-9, "nJ"), (1e-6, "µJ"), (1e-3, "mJ"), (1.0, "J"), (1e3, "kJ")),
 }
+
+_LONGEST = 360  # characters of an object in a line
 
 
 def suitable_unit(size: float, unit: str) -> tuple[float, str]:
@@ -54,3 +59,50 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 def count(number: int, noun: str) -> str:
     """A number of things: ``1 node``, ``2 nodes``."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def span(values: Iterable[float], unit: str = "") -> str:
+    """Smallest and largest of some numbers: ``0.3 ... 9.6 Hz``; one where they agree."""
+    known = [float(value) for value in values if math.isfinite(value)]
+    if not known:
+        return "none"
+    low, high = f"{min(known):.4g}", f"{max(known):.4g}"
+    return " ".join(filter(None, (low if low == high else f"{low} ... {high}", unit)))
+
+
+def listed(items: Sequence[str], most: int = 4) -> str:
+    """The first of some texts, and how many more there are: ``a, b and 3 more``."""
+    shown = ", ".join(items[:most])
+    return f"{shown} and {len(items) - most} more" if len(items) > most else shown or "none"
+
+
+def html_table(
+    title: str, rows: Iterable[Sequence[str]], headings: Sequence[str] = ()
+) -> str:
+    """A table for a notebook, its first column as headings of the rows; texts are escaped."""
+    def row(kinds: Iterable[str], texts: Iterable[str]) -> str:
+        return "<tr>" + "".join(f'<{kind} style="text-align: left">{escape(text)}</{kind}>'
+                                for kind, text in zip(kinds, texts, strict=False)) + "</tr>"
+
+    head = f"<thead>{row(repeat('th'), headings)}</thead>" if headings else ""
+    body = "".join(row(chain(["th"], repeat("td")), texts) for texts in rows)
+    return f"<table><caption>{escape(title)}</caption>{head}<tbody>{body}</tbody></table>"
+
+
+class Summarised:
+    """What a console shows in a line and a notebook as a small table.
+
+    Subclasses say in :meth:`summary` what matters; dataclasses among them have ``repr=False``.
+    """
+
+    def summary(self) -> list[tuple[str, str]]:
+        """What matters about the object, as pairs of a name and a text."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        facts = "; ".join(f"{name}: {text}" for name, text in self.summary())
+        line = " ".join(f"{type(self).__name__} {facts}".split())
+        return f"<{line}>" if len(line) <= _LONGEST else f"<{line[:_LONGEST]}...>"
+
+    def _repr_html_(self) -> str:
+        return html_table(type(self).__name__, self.summary())

@@ -18,6 +18,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.memory import require_memory
 from fecontact.core.types import Array, Integers
+from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.supports import check_supports, expansion, fixed_dofs, hinges
 
@@ -70,8 +71,8 @@ class Material:
 _MATERIALS = {"steel": (2.1e11, 0.3, 7850.0), "aluminium": (7.0e10, 0.33, 2700.0)}
 
 
-@dataclass(frozen=True, eq=False)
-class ElasticBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class ElasticBody(Summarised):
     """A plane linear elastic body of quadratic (or linear) finite elements.
 
     Displacement nodes are the mesh nodes, then the middles of the edges, then those of the
@@ -126,6 +127,21 @@ class ElasticBody:
         if pieces > 1:
             raise MeshError(f"The mesh falls into {pieces} pieces that share no node; a body must "
                             f"be one piece.")
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Mesh, material, kind of elements and supports."""
+        kind = "triangles" if self.mesh.cells.shape[1] == 3 else "quadrilaterals"
+        x, y = self.mesh.nodes.T
+        material = self.material
+        return [
+            ("mesh", f"{len(self.mesh.cells)} {kind}, {len(self.mesh.nodes)} nodes, degree "
+                     f"{self.degree}"),
+            ("x", span(x, "m")), ("y", span(y, "m")),
+            ("thickness", f"{self.thickness:.4g} m, plane {self.plane}"),
+            ("material", f"{quantity(material.youngs_modulus, 'Pa')}, Poisson ratio "
+                         f"{material.poisson_ratio:.4g}, {material.density:.4g} kg/m³"),
+            ("fixed", listed([f"{name} in {way}" for name, way in self.fixed.items()])),
+        ]
 
     @cached_property
     def basis(self) -> Any:

@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike
 from fecontact.core.checks import as_floats, as_integers
 from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
+from fecontact.core.units import Summarised, count, span
 
 _FLAT = 1e-12  # area of a degenerate cell, as part of its squared sides
 
 
-@dataclass(frozen=True, eq=False)
-class Mesh:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mesh(Summarised):
     """A plane mesh of first-order triangles or quadrilaterals with named boundaries and points.
 
     Parameters
@@ -150,6 +151,18 @@ class Mesh:
 
         return Mesh(np.concatenate(nodes), cells,
                     {name: halves(group) for name, group in self.boundaries.items()}, self.points)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Counts, size and named groups."""
+        x, y = self.nodes.T
+        return [
+            ("nodes", f"{len(self.nodes)}"),
+            ("triangles" if self.cells.shape[1] == 3 else "quadrilaterals", f"{len(self.cells)}"),
+            ("x", span(x, "m")), ("y", span(y, "m")), ("area", f"{self.area:.4g} m²"),
+            *((f"boundary {name}", count(len(edges), "edge"))
+              for name, edges in self.boundaries.items()),
+            *((f"point {name}", count(len(nodes), "node")) for name, nodes in self.points.items()),
+        ]
 
     @property
     def area(self) -> float:

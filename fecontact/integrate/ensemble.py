@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
+from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.events import Events, Watched, as_watched
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
@@ -27,8 +28,8 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble(Summarised):
     """States of E runs at K times each.
 
     Attributes
@@ -50,6 +51,17 @@ class Ensemble:
     status: tuple[Status, ...]
     steps: Integers
     events: tuple[Events, ...] | None = None
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Number of runs, how they ended, and their times."""
+        ends = [f"{self.status.count(status)} {status.name.lower().replace('_', ' ')}"
+                for status in dict.fromkeys(self.status)]
+        return [
+            ("runs", f"{len(self.status)}"), ("status", listed(ends)),
+            ("time", span(self.times.ravel(), "s")), ("outputs", f"{self.times.shape[-1]}"),
+            ("values of a state", f"{self.states.shape[-1]}"),
+            ("steps", span(self.steps)),
+        ]
 
     @property
     def finished(self) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
+from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.events import Events
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
@@ -149,8 +150,8 @@ class Solution:
     events: Events | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Summarised):
     """Motion of a contact system at N output times.
 
     Attributes
@@ -191,6 +192,19 @@ class Trajectory:
     held_normal_force: Array | None = None
     held_friction_force: Array | None = None
     events: Events | None = None
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Status, time span and the system; nothing that would take time to compute."""
+        steps = self.statistics.get("steps")
+        facts = [
+            ("status", self.status.name.lower().replace("_", " ")),
+            ("time", f"{quantity(float(self.time[0]), 's', 5)} ... "
+                     f"{quantity(float(self.time[-1]), 's', 5)}"),
+            ("outputs", f"{len(self.time)}"),
+            *([] if steps is None else [("steps", f"{steps}")]),
+            *([] if self.events is None else [("events", f"{len(self.events.time)}")]),
+        ]
+        return [*facts, *self.system.summary()[:5]]
 
     @property
     def states(self) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, Integers
+from fecontact.core.units import Summarised, listed, span
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +71,8 @@ class Quality:
     compliance: Array
 
 
-@dataclass(frozen=True, eq=False)
-class ModalBasis:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalBasis(Summarised):
     """Mass-normalised modes ``q`` of a body and its motion at the points of interest.
 
     The equations of motion are ``q'' + damping q' + angular_frequencies^2 q = T^T f`` (4.1-1),
@@ -139,6 +140,24 @@ class ModalBasis:
             if getattr(self, name).shape != shape:
                 raise InputError(f"Modal basis: {name} must have shape {shape}, not "
                                  f"{getattr(self, name).shape}.")
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Modes, frequencies, damping, contact nodes and points."""
+        hertz = [f"{value:.5g}" for value in self.frequencies_hz[self.rigid_modes :]]
+        middle = hertz if len(hertz) < 6 else [*hertz[:3], "...", hertz[-1]]
+        diagonal = (self.damping == np.diag(np.diag(self.damping))).all()
+        groups = [f"{count} {name}" for name, count in self.groups]
+        return [
+            ("modes", f"{self.modes}, {self.rigid_modes} rigid"),
+            ("frequencies", f"{', '.join(middle)} Hz" if hertz else "none"),
+            ("damping", "none" if not self.damping.any() else "full matrix" if not diagonal
+             else f"ratios {span(self.damping_ratios[self.rigid_modes :])}"),
+            ("contact nodes", f"{self.contact_nodes}"
+             + (f" ({listed(groups)})" if len(groups) > 1 else "")),
+            ("points", listed(["B", "C", *self.extra])),
+            ("shapes over the body", "none" if self.field is None
+             else f"at {len(self.field.nodes)} nodes"),
+        ]
 
     @property
     def modes(self) -> int:

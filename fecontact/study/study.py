@@ -21,6 +21,7 @@ from fecontact.core.tables import (
     shown,
     to_table,
 )
+from fecontact.core.units import Summarised, listed, quantity
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.integrate.events import ContactEvents
@@ -66,8 +67,8 @@ _MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body_settings"),
               "_basis": ("geometry", "body_settings", "basis_settings")}
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(Summarised):
     """A study: geometry, body, modes, laws, run and output, as in its TOML file.
 
     Each attribute is a section of the file, the fields of its class are the keys of the section.
@@ -121,6 +122,22 @@ class Study:
     render: RenderSettings = field(default_factory=RenderSettings)
     sweep: SweepSettings | None = None
     path: Path | None = field(default=None, compare=False)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """File, geometry, modes, laws and length of the run."""
+        groups = [f"own laws for {listed(list(self.contact))}"] if self.contact else []
+        end = self.simulation.t_end
+        laws = [type(law).__name__ for law in (self.normal, self.friction) if law is not None]
+        return [
+            ("file", "none" if self.path is None else self.path.name),
+            ("geometry", type(self.geometry).__name__),
+            ("modes", f"{self.basis_settings.modes}"),
+            ("contact nodes", f"{self.basis_settings.contact_nodes}"),
+            ("laws", ", ".join([*laws, *groups]) or "none"),
+            ("ground", quantity(self.ground.speed, "m/s")),
+            ("t_end", "none" if end is None else quantity(end, "s", 5)),
+            *([] if self.sweep is None else [("sweep", self.sweep.method)]),
+        ]
 
     @classmethod
     def read(cls, path: str | Path) -> "Study":

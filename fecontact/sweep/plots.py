@@ -1,4 +1,4 @@
-"""Plots of sweeps as files: PNG, PDF or SVG, written whole or not at all."""
+"""Plots of sweeps: curves, maps, scatter, displacements once per period, Sobol indices."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,8 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
-from fecontact.output.plots.style import COLOURS, distinct_colours, new_figure, save_figure
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import COLOURS, distinct_colours
 from fecontact.study.study import Study
 from fecontact.sweep.statistics import SobolIndices
 from fecontact.sweep.summaries import unit_of
@@ -27,72 +28,133 @@ _MOST_LINES = 7
 _COLOUR_MAP = "viridis"
 
 
-def sweep_figure(table: SweepTable, name: str) -> "Figure":
-    """A summary over the parameters: a map for a grid of two, curves for one, scatter for more."""
+def plot_sweep(
+    table: SweepTable, name: str, over: Sequence[str] | None = None, *,
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot a summary of a sweep over the parameters that changed.
+
+    A map for a grid of two parameters with many values each, curves for a grid of one parameter,
+    or of two where one has few values or values that are not numbers; for all other sweeps a
+    scatter plot for each parameter, and a histogram.
+
+    Parameters
+    ----------
+    table : SweepTable
+        What :func:`fecontact.sweep` returned.
+    name : str
+        The summary.
+    over : one or two parameters, optional
+        One for curves, two for a map in which the others have their first value.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For a summary or parameter that does not exist, a sweep of one case, another suffix, or a
+        file that cannot be written.
+    """
+    require_kind("plot_sweep", SweepTable, table=table)
+    for column in (name, *(over or ())):
+        table.column(column)
+    if name not in table.values:
+        raise InputError(f"'{name}' is a parameter of the sweep; plot one of its summaries "
+                         f"{choices(table.values)}.")
+    if over is not None:
+        return (_curves(table, name, over[0], path=path) if len(over) == 1
+                else _map(table, name, over[0], over[1], path))
     names = [key for key, values in table.parameters.items() if len(set(values)) > 1]
     if not names:
         raise InputError("The sweep has one case only; there is nothing to plot.")
     numeric = [is_numeric(table.parameters[key]) for key in names]
     if table.shape is not None and len(names) == 2 and all(numeric) and min(
             len(set(table.parameters[key])) for key in names) > _MOST_LINES:
-        return map_figure(table, name, names[0], names[1])
+        return _map(table, name, names[0], names[1], path)
     if table.shape is not None and len(names) <= 2:
         few = sorted(names, key=lambda key: (is_numeric(table.parameters[key]),
                                              len(set(table.parameters[key]))))
-        return diagram_figure(table, name, few[-1], few[0] if len(names) == 2 else None)
-    return scatter_figure(table, name, names)
+        return _curves(table, name, few[-1], few[0] if len(names) == 2 else None, path)
+    return _scatter(table, name, names, path)
 
 
-def diagram_figure(
-    table: SweepTable, name: str, parameter: str, by: str | None = None
+def _curves(
+    table: SweepTable, name: str, parameter: str, by: str | None = None,
+    path: str | Path | None = None,
 ) -> "Figure":
     """A summary over one parameter, a curve for each value of another."""
-    figure = new_figure(7.0, 4.6)
-    axes = figure.subplots()
-    factor = _label(axes, name, table.values[name])
-    x, labels = _places(table.parameters[parameter])
-    groups: dict[Any, list[int]] = {None: list(range(len(table)))}
-    if by is not None:
-        groups = {}
-        for k, value in enumerate(table.parameters[by]):
-            groups.setdefault(value, []).append(k)
-    for (value, cases), colour in zip(groups.items(), distinct_colours(len(groups)), strict=True):
-        order = sorted(cases, key=lambda k: x[k])
-        places, values = x[order], table.values[name][order] / factor
-        if not np.isfinite(values).any():
-            continue
-        axes.plot(places, values, "-" if len(places) <= 200 else "",
-                  color=colour, linewidth=0.9,
-                  marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
-                  label=None if by is None else f"{_shown(value)}")
-    _mark_failed(axes, table, x)
-    axes.set_xlabel(parameter_label(parameter, Study))
-    _spaced(axes, "x", x, labels)
-    if by is not None:
-        figure.legend(title=parameter_label(by, Study), loc="outside right upper")
+    with new_figure(7.0, 4.6, path) as figure:
+        axes = figure.subplots()
+        factor = _label(axes, name, table.values[name])
+        x, labels = _places(table.parameters[parameter])
+        groups: dict[Any, list[int]] = {None: list(range(len(table)))}
+        if by is not None:
+            groups = {}
+            for k, value in enumerate(table.parameters[by]):
+                groups.setdefault(value, []).append(k)
+        colours = distinct_colours(len(groups))
+        for (value, cases), colour in zip(groups.items(), colours, strict=True):
+            order = sorted(cases, key=lambda k: x[k])
+            places, values = x[order], table.values[name][order] / factor
+            if not np.isfinite(values).any():
+                continue
+            # Cases that differ in other parameters too are no curve.
+            curve = len(places) <= 200 and (np.diff(places) > 0.0).all()
+            axes.plot(places, values, linestyle="-" if curve else "none", color=colour,
+                      linewidth=0.9, marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
+                      label=None if by is None else f"{_shown(value)}")
+        _mark_failed(axes, table, x)
+        axes.set_xlabel(parameter_label(parameter, Study))
+        _spaced(axes, "x", x, labels)
+        if by is not None:
+            figure.legend(title=parameter_label(by, Study), loc="outside right upper")
     return figure
 
 
-def strobed_figure(table: SweepTable, parameter: str) -> "Figure":
-    """Displacements once per period over a parameter: a brute-force bifurcation diagram."""
+def plot_strobed(
+    table: SweepTable, parameter: str, *, path: str | Path | None = None
+) -> "Figure":
+    """Plot displacements once per period over a parameter: a brute-force bifurcation diagram.
+
+    Parameters
+    ----------
+    table : SweepTable
+        Of a sweep that strobes.
+    parameter : str
+        One of those that changed.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For a sweep that does not strobe, a parameter that does not exist, another suffix, or a
+        file that cannot be written.
+    """
+    require_kind("plot_strobed", SweepTable, table=table)
+    if parameter not in table.parameters:
+        raise InputError(f"The sweep has no parameter '{parameter}'; there are: "
+                         f"{choices(table.parameters)}.")
     if table.strobed is None:
         raise InputError("The sweep has no displacements once per period; give it a key strobe.")
-    figure = new_figure(7.5, 4.8)
-    axes = figure.subplots()
-    x, labels = _places(table.parameters[parameter])
-    known = table.strobed[np.isfinite(table.strobed)]
-    factor, unit = suitable_unit(float(np.abs(known).max()) if len(known) else 0.0, "m")
-    axes.plot(np.repeat(x, table.strobed.shape[1]), table.strobed.ravel() / factor, ".",
-              color="#1a1a1a", markersize=float(np.clip(60.0 / np.sqrt(len(table)), 0.8, 4.0)),
-              markeredgewidth=0, rasterized=True)
-    _mark_failed(axes, table, x)
-    axes.set_xlabel(parameter_label(parameter, Study))
-    axes.set_ylabel(f"displacement once per period [{unit}]")
-    _spaced(axes, "x", x, labels)
+    with new_figure(7.5, 4.8, path) as figure:
+        axes = figure.subplots()
+        x, labels = _places(table.parameters[parameter])
+        known = table.strobed[np.isfinite(table.strobed)]
+        factor, unit = suitable_unit(float(np.abs(known).max()) if len(known) else 0.0, "m")
+        axes.plot(np.repeat(x, table.strobed.shape[1]), table.strobed.ravel() / factor, ".",
+                  color="#1a1a1a", markersize=float(np.clip(60.0 / np.sqrt(len(table)), 0.8, 4.0)),
+                  markeredgewidth=0, rasterized=True)
+        _mark_failed(axes, table, x)
+        axes.set_xlabel(parameter_label(parameter, Study))
+        axes.set_ylabel(f"displacement once per period [{unit}]")
+        _spaced(axes, "x", x, labels)
     return figure
 
 
-def map_figure(table: SweepTable, name: str, first: str, second: str) -> "Figure":
+def _map(
+    table: SweepTable, name: str, first: str, second: str, path: str | Path | None
+) -> "Figure":
     """A summary over two parameters of a grid; grey where cases failed."""
     from matplotlib import colormaps
 
@@ -107,82 +169,102 @@ def map_figure(table: SweepTable, name: str, first: str, second: str) -> "Figure
     order = [np.argsort(np.array(list(dict.fromkeys(table.column(key).tolist()))))
              for key in (second, first)]
     values = values[np.ix_(*order)]
-    figure = new_figure(7.0, 5.2)
-    axes = figure.subplots()
-    axes.grid(False)
-    axes.set_facecolor(_FAILED)
-    known = values[np.isfinite(values)]
-    factor, unit = _unit(name, known)
-    logs = [_is_geometric(points) for points in (x, y)]
-    drawn = axes.pcolormesh(_edges(x, logs[0]), _edges(y, logs[1]),
-                            np.ma.masked_invalid(values / factor),
-                            cmap=colormaps[_COLOUR_MAP], rasterized=True)
-    for which, log in zip("xy", logs, strict=True):
-        if log:
-            _logarithmic(axes, which)
-    bar = figure.colorbar(drawn, ax=axes, pad=0.02)
-    bar.set_label(_with_unit(name, unit))
-    bar.outline.set_visible(False)
-    axes.set_xlabel(parameter_label(first, Study))
-    axes.set_ylabel(parameter_label(second, Study))
-    if len(known) < values.size:
-        axes.set_title("grey: failed or not computed", loc="right", fontsize=9, color="#606060")
+    with new_figure(7.0, 5.2, path) as figure:
+        axes = figure.subplots()
+        axes.grid(False)
+        axes.set_facecolor(_FAILED)
+        known = values[np.isfinite(values)]
+        factor, unit = _unit(name, known)
+        logs = [_is_geometric(points) for points in (x, y)]
+        drawn = axes.pcolormesh(_edges(x, logs[0]), _edges(y, logs[1]),
+                                np.ma.masked_invalid(values / factor),
+                                cmap=colormaps[_COLOUR_MAP], rasterized=True)
+        for which, log in zip("xy", logs, strict=True):
+            if log:
+                _logarithmic(axes, which)
+        bar = figure.colorbar(drawn, ax=axes, pad=0.02)
+        bar.set_label(_with_unit(name, unit))
+        bar.outline.set_visible(False)
+        axes.set_xlabel(parameter_label(first, Study))
+        axes.set_ylabel(parameter_label(second, Study))
+        if len(known) < values.size:
+            axes.set_title("grey: failed or not computed", loc="right", fontsize=9, color="#606060")
     return figure
 
 
-def scatter_figure(table: SweepTable, name: str, parameters: Sequence[str]) -> "Figure":
+def _scatter(
+    table: SweepTable, name: str, parameters: Sequence[str], path: str | Path | None
+) -> "Figure":
     """A summary over each of the parameters, and its distribution."""
     rows = -(-(len(parameters) + 1) // 4)
     columns = -(-(len(parameters) + 1) // rows)
-    figure = new_figure(3.1 * columns, 3.1 * rows)
-    grid = np.atleast_1d(figure.subplots(rows, columns, sharey=True)).ravel()
-    for axes, parameter in zip(grid, parameters, strict=False):
-        x, labels = _places(table.parameters[parameter])
-        factor = _label(axes, name, table.values[name])
-        axes.plot(x, table.values[name] / factor, ".", color=COLOURS[0], markeredgewidth=0,
-                  markersize=float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0)),
-                  alpha=0.7)
-        _mark_failed(axes, table, x)
-        axes.set_xlabel(parameter_label(parameter, Study))
-        _spaced(axes, "x", x, labels)
-    last = grid[len(parameters)]
-    known = table.values[name][np.isfinite(table.values[name])]
-    if len(known):
-        factor = _unit(name, known)[0]
-        last.hist(known / factor, bins=int(np.clip(np.sqrt(len(known)), 5, 60)),
-                  orientation="horizontal", color=COLOURS[0], alpha=0.7)
-    last.set_xlabel("cases")
-    for k, axes in enumerate(grid):
-        if k % columns:
-            axes.set_ylabel("")
-        axes.set_visible(k <= len(parameters))
+    with new_figure(3.1 * columns, 3.1 * rows, path) as figure:
+        grid = np.atleast_1d(figure.subplots(rows, columns, sharey=True)).ravel()
+        for axes, parameter in zip(grid, parameters, strict=False):
+            x, labels = _places(table.parameters[parameter])
+            factor = _label(axes, name, table.values[name])
+            axes.plot(x, table.values[name] / factor, ".", color=COLOURS[0], markeredgewidth=0,
+                      markersize=float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0)),
+                      alpha=0.7)
+            _mark_failed(axes, table, x)
+            axes.set_xlabel(parameter_label(parameter, Study))
+            _spaced(axes, "x", x, labels)
+        last = grid[len(parameters)]
+        known = table.values[name][np.isfinite(table.values[name])]
+        if len(known):
+            factor = _unit(name, known)[0]
+            last.hist(known / factor, bins=int(np.clip(np.sqrt(len(known)), 5, 60)),
+                      orientation="horizontal", color=COLOURS[0], alpha=0.7)
+        last.set_xlabel("cases")
+        for k, axes in enumerate(grid):
+            if k % columns:
+                axes.set_ylabel("")
+            axes.set_visible(k <= len(parameters))
     return figure
 
 
-def sensitivity_figure(found: Mapping[str, SobolIndices]) -> "Figure":
-    """First-order and total Sobol indices of summaries, with their confidence intervals."""
+def plot_sobol(
+    found: Mapping[str, SobolIndices], *, path: str | Path | None = None
+) -> "Figure":
+    """Plot first-order and total Sobol indices of summaries, with their confidence intervals.
+
+    Parameters
+    ----------
+    found : mapping of summary to SobolIndices
+        What :func:`fecontact.sobol_indices` found.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For nothing to draw, another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_sobol", Mapping, found=found)
+    if not found:
+        raise InputError("found = {} holds nothing to draw; give the indices of a summary.")
     names = list(found)
     parameters = list(next(iter(found.values())).first)
-    figure = new_figure(7.5, 0.9 + len(names) * (0.5 + 0.36 * len(parameters)))
-    grid = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
-    places = np.arange(len(parameters))[::-1]
-    for axes, name in zip(grid, names, strict=True):
-        for shift, indices, colour, label in (
-                (0.18, found[name].first, COLOURS[0], "alone"),
-                (-0.18, found[name].total, COLOURS[5], "with others")):
-            value = np.array([indices[key].value for key in parameters])
-            low = np.array([indices[key].low for key in parameters])
-            high = np.array([indices[key].high for key in parameters])
-            axes.barh(places + shift, value, height=0.34, color=colour, label=label)
-            axes.errorbar(value, places + shift,
-                          xerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
-                          fmt="none", ecolor="#303030", elinewidth=0.9, capsize=2)
-        axes.set_yticks(places, [parameter_label(key, Study) for key in parameters])
-        axes.grid(False, axis="y")
-        axes.set_title(name.replace("_", " "), loc="left")
-    grid[-1].set_xlabel("part of the variance")
-    grid[-1].set_xlim(left=min(0.0, grid[-1].get_xlim()[0]))
-    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    with new_figure(7.5, 0.9 + len(names) * (0.5 + 0.36 * len(parameters)), path) as figure:
+        grid = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
+        places = np.arange(len(parameters))[::-1]
+        for axes, name in zip(grid, names, strict=True):
+            for shift, indices, colour, label in (
+                    (0.18, found[name].first, COLOURS[0], "alone"),
+                    (-0.18, found[name].total, COLOURS[5], "with others")):
+                value = np.array([indices[key].value for key in parameters])
+                low = np.array([indices[key].low for key in parameters])
+                high = np.array([indices[key].high for key in parameters])
+                axes.barh(places + shift, value, height=0.34, color=colour, label=label)
+                axes.errorbar(value, places + shift,
+                              xerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
+                              fmt="none", ecolor="#303030", elinewidth=0.9, capsize=2)
+            axes.set_yticks(places, [parameter_label(key, Study) for key in parameters])
+            axes.grid(False, axis="y")
+            axes.set_title(name.replace("_", " "), loc="left")
+        grid[-1].set_xlabel("part of the variance")
+        grid[-1].set_xlim(left=min(0.0, grid[-1].get_xlim()[0]))
+        figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return figure
 
 
@@ -256,83 +338,3 @@ def _edges(points: Array, log: bool) -> Array:
     edges = np.concatenate([[2.0 * p[0] - middle[0]], middle, [2.0 * p[-1] - middle[-1]]])
     return np.asarray(np.exp(edges) if log else edges)
 
-
-def plot_sweep(
-    table: SweepTable, name: str, path: str | Path, over: Sequence[str] | None = None
-) -> Path:
-    """Plot a summary of a sweep over the parameters that changed.
-
-    A map for a grid of two parameters with many values each, curves for a grid of one parameter,
-    or of two where one has few values or values that are not numbers; for all other sweeps a
-    scatter plot for each parameter, and a histogram.
-
-    Parameters
-    ----------
-    table : SweepTable
-        What :func:`fecontact.sweep` returned.
-    name : str
-        The summary.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-    over : one or two parameters, optional
-        One for curves, two for a map in which the others have their first value.
-
-    Raises
-    ------
-    InputError
-        For a summary or parameter that does not exist, a sweep of one case, another suffix, or a
-        file that cannot be written.
-    """
-    require_kind("plot_sweep", SweepTable, table=table)
-    for column in (name, *(over or ())):
-        table.column(column)
-    if name not in table.values:
-        raise InputError(f"'{name}' is a parameter of the sweep; plot one of its summaries "
-                         f"{choices(table.values)}.")
-    if over is None:
-        return save_figure(path, lambda: sweep_figure(table, name))
-    if len(over) == 1:
-        return save_figure(path, lambda: diagram_figure(table, name, over[0]))
-    return save_figure(path, lambda: map_figure(table, name, over[0], over[1]))
-
-
-def plot_strobed(table: SweepTable, parameter: str, path: str | Path) -> Path:
-    """Plot displacements once per period over a parameter: a brute-force bifurcation diagram.
-
-    Parameters
-    ----------
-    table : SweepTable
-        Of a sweep that strobes.
-    parameter : str
-        One of those that changed.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Raises
-    ------
-    InputError
-        For a sweep that does not strobe, a parameter that does not exist, another suffix, or a
-        file that cannot be written.
-    """
-    if parameter not in table.parameters:
-        raise InputError(f"The sweep has no parameter '{parameter}'; there are: "
-                         f"{choices(table.parameters)}.")
-    return save_figure(path, lambda: strobed_figure(table, parameter))
-
-
-def plot_sobol(found: Mapping[str, SobolIndices], path: str | Path) -> Path:
-    """Plot Sobol indices of summaries with their confidence intervals.
-
-    Parameters
-    ----------
-    found : mapping of summary to SobolIndices
-        What :func:`fecontact.sobol_indices` found.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    return save_figure(path, lambda: sensitivity_figure(found))

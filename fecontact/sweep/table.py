@@ -14,13 +14,15 @@ import numpy as np
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
+from fecontact.core.units import Summarised, html_table, listed, span
 from fecontact.sweep.store import write_whole
 
 _BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
+_SHOWN_CASES = 12  # in a notebook
 
 
-@dataclass(frozen=True, eq=False)
-class SweepTable:
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepTable(Summarised):
     """Parameters and summaries of the N cases of a sweep.
 
     Attributes
@@ -54,6 +56,29 @@ class SweepTable:
 
     def __len__(self) -> int:
         return len(self.keys)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Numbers of cases, ranges of the parameters, names of the summaries."""
+        shape = "" if self.shape is None else f", grid {' x '.join(map(str, self.shape))}"
+        return [
+            ("cases", f"{len(self)}{shape}"), ("failed", f"{len(self.failed)}"),
+            ("not computed", f"{len(self.missing)}"),
+            ("parameters", listed([f"{name} {_shown_range(values)}"
+                                   for name, values in self.parameters.items()])),
+            ("summaries", listed(list(self.values), 8)),
+        ]
+
+    def _repr_html_(self) -> str:
+        cases = range(min(len(self), _SHOWN_CASES))
+        rows = [[f"{k}", *(_shown(values[k]) for values in self.parameters.values()),
+                 *(_shown(values[k]) for values in self.values.values()),
+                 "not computed" if (reason := self.reasons[k]) is None else reason]
+                for k in cases]
+        title = "; ".join(f"{name}: {text}" for name, text in self.summary()[:3])
+        if len(self) > len(cases):
+            title += f"; the first {len(cases)} are shown"
+        return html_table(f"SweepTable, {title}", rows,
+                          ["case", *self.parameters, *self.values, "failed because"])
 
     @property
     def failed(self) -> dict[int, str]:
@@ -187,3 +212,12 @@ def _read_strobed(path: Path, count: int) -> Array | None:
 
 def _is_parameter(name: str) -> bool:
     return name == "gap" or ("." in name.partition("@")[0] and ".py:" not in name)
+
+
+def _shown(value: Any) -> str:
+    """A cell of the table for people."""
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _shown_range(values: Sequence[Any]) -> str:
+    return span(values) if is_numeric(values) else f"of {len(set(values))} values"

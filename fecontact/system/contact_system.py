@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
+from fecontact.core.units import Summarised, listed, quantity
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
@@ -41,8 +42,8 @@ def needs_friction(basis: ModalBasis) -> bool:
     return bool(basis.contact_T[:, 0].any())
 
 
-@dataclass(frozen=True, eq=False)
-class ContactSystem:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactSystem(Summarised):
     """Reduced equations of an elastic body in contact with moving ground, (4.1-1) to (4.1-23).
 
     ``q'' + D q' + w^2 q = T^T f`` with, at B, the drive's springs and dashpots, at C and other
@@ -124,6 +125,24 @@ class ContactSystem:
         if missing:
             raise InputError(f"ContactSystem: {name} lacks a law for the contact "
                              f"group{'s' * (len(missing) > 1)} {choices(missing)}.")
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Modes and contact nodes, laws, ground, drive and load."""
+        modes, frequencies, _, nodes, *_ = self.basis.summary()
+        drive, ground = self.drive, self.ground
+        low, high = ground.height_range
+        stiffness = [f"{quantity(value, 'N/m')} in {axis}" for axis, value in (
+            ("x", drive.stiffness_x), ("y", drive.stiffness_y)) if value]
+        moved = drive.frequency_hz if any(motion.largest > 0.0 for motion in drive.motions) else 0.0
+        return [
+            modes, frequencies, nodes,
+            *((kind, _law_names(getattr(self, kind))) for kind in ("normal", "friction")),
+            ("ground", quantity(ground.speed, "m/s")
+             + (f", {quantity(high - low, 'm')} from valley to peak" if ground.wavy else "")),
+            ("drive", listed(stiffness) + (f", {moved:.5g} Hz" if moved else "")),
+            ("load", quantity(self.load.normal, "N")
+             + (f", {len(self.load.forces)} in time" if self.load.forces else "")),
+        ]
 
     def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
         """Contact nodes that share a law: their place, each one's part of their face, the law.
@@ -287,6 +306,13 @@ class ContactSystem:
         return InputError(f"The system has no parameter '{_outer_name(self, name)}'"
                           f"{nearest(name, names)}; "
                           f"its parameters are: {choices(names)}.")
+
+
+def _law_names(law: Any) -> str:
+    """Class of a law, or those of the contact groups."""
+    if isinstance(law, Mapping):
+        return listed([f"{type(one).__name__} ({group})" for group, one in law.items()])
+    return type(law).__name__
 
 
 def _inner_name(name: str) -> str:

@@ -15,7 +15,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.linear import LinearContact
 from fecontact.laws.normal.rough_surface import RoughSurface
 from fecontact.laws.signals.harmonic import Harmonic
-from fecontact.output.plots.analysis import response_figure
+from fecontact.output.plots.analysis import plot_response
 from fecontact.reduction.from_matrices import basis_from_matrices
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.system.contact_system import ContactSystem
@@ -99,10 +99,10 @@ def test_response_tells_that_steady_sliding_is_unstable(damping, tmp_path):
         assert found.growing == pytest.approx(expected[expected.imag > 0.0], rel=1e-3)
         assert found.growth_in_words == "vibrations at 4.35 Hz grow by 1.25 1/s"
     run = simulate(system, 0.1, initial="sliding")
-    redraw(run, "receptance", tmp_path / "receptance.svg", Choice(axis="x"))
+    redraw(run, "receptance", Choice(axis="x"), path=tmp_path / "receptance.svg")
     text = (tmp_path / "receptance.svg").read_text()
     assert ("UNSTABLE" in text) == (left < 0.0)
-    figure = response_figure([frequency_response(system, F, [("B", "x")]), found], ["a", "b"])
+    figure = plot_response([frequency_response(system, F, [("B", "x")]), found], ["a", "b"])
     assert [line.is_dashed() for line in figure.axes[0].lines] == [False, left < 0.0]
 
 

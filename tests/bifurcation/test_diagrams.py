@@ -10,13 +10,8 @@ from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.stability_map import stability_map
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.core.errors import InputError
-from fecontact.output.plots.bifurcation_diagram import branches_figure, plot_branches
-from fecontact.output.plots.stability import (
-    eigenvalues_figure,
-    plot_eigenvalues,
-    plot_stability_map,
-    stability_map_figure,
-)
+from fecontact.output.plots.bifurcation_diagram import plot_branches
+from fecontact.output.plots.stability import plot_eigenvalues, plot_stability_map
 
 
 def point(p, x, stable, kind=None):
@@ -31,7 +26,7 @@ BRANCH = Branch("p", (point(0.0, 1.0, True), point(1.0, 2.0, True),
 
 
 def test_stable_parts_are_solid_unstable_ones_dashed():
-    axis = branches_figure([BRANCH], 0).axes[0]
+    axis = plot_branches([BRANCH], 0).axes[0]
     lines = [line for line in axis.lines if line.get_linestyle() != "None"]
     assert [line.get_xdata().tolist() for line in lines] == [
         [0.0, 1.0, 1.5], [1.5, 2.0, 3.0, 2.5], [2.5, 2.0]]
@@ -48,8 +43,8 @@ def test_stable_parts_are_solid_unstable_ones_dashed():
 
 def test_quantities_and_numbers_of_points():
     twice = Branch("p", (*BRANCH.points, point(3.0, 7.0, True, "Hopf"), point(4.0, 8.0, True)))
-    axis = branches_figure([twice, BRANCH], "size", lambda at: 10.0 * at.parameter, "ten p",
-                           names=["first", "second"]).axes[0]
+    axis = plot_branches([twice, BRANCH], "size", x=lambda at: 10.0 * at.parameter,
+                         x_label="ten p", names=["first", "second"]).axes[0]
     assert axis.lines[0].get_xdata().tolist() == [0.0, 10.0, 15.0]
     assert axis.lines[0].get_ydata().tolist() == [2.0, 4.0, 5.0]
     # The Hopf point at 1.5 is on both branches, and is marked once.
@@ -57,12 +52,12 @@ def test_quantities_and_numbers_of_points():
     assert axis.get_xlabel() == "ten p"
     assert axis.lines[0].get_color() != axis.lines[3].get_color()
     with pytest.raises(InputError, match=r"'state' is not one number .* 'size', 'stable'"):
-        branches_figure([BRANCH], "state")
+        plot_branches([BRANCH], "state")
 
 
 def test_branches_of_one_name_share_colour_and_entry():
     above = Branch("p", (point(0.0, 7.0, True), point(1.0, 8.0, True)))
-    axis = branches_figure([BRANCH, above, above], 0, names=["a", "b", "a"]).axes[0]
+    axis = plot_branches([BRANCH, above, above], 0, names=["a", "b", "a"]).axes[0]
     first, *_, other, again = (line.get_color() for line in axis.lines
                                if line.get_linestyle() != "None")
     assert first == again != other
@@ -99,7 +94,7 @@ def differences(colours):
 def test_no_two_branches_have_the_same_colour(count):
     several = [Branch("p", (point(0.0, k, True), point(1.0, k + 0.5, True),
                             point(2.0, k + 0.7, False))) for k in range(count)]
-    axis = branches_figure(several, 0).axes[0]
+    axis = plot_branches(several, 0).axes[0]
     colours = [line.get_color() for line in axis.lines]
     # The stable and the unstable part of a branch are of one colour and two styles.
     assert colours[::2] == colours[1::2]
@@ -115,7 +110,7 @@ def test_no_two_branches_have_the_same_colour(count):
 def test_letters_are_left_out_where_there_is_no_room():
     crowd = tuple(point(1.0 + 1e-4 * k, 2.0 + 1e-4 * k, True, "fold") for k in range(9))
     far = (point(0.0, 0.0, True), *crowd, point(3.0, 3.0, True, "fold"))
-    axis = branches_figure([Branch("p", far)], 0).axes[0]
+    axis = plot_branches([Branch("p", far)], 0).axes[0]
     assert len([line for line in axis.lines if line.get_marker() == "s"]) == 10
     letters = [text.get_text() for text in axis.texts]
     assert "F10" in letters
@@ -125,7 +120,7 @@ def test_letters_are_left_out_where_there_is_no_room():
 def test_flutter_shows_frequencies_that_meet(tmp_path):
     field = contact_field(mode_coupling(0.1), ["friction.friction_coefficient"])
     branch = equilibrium_branch(field, parameter="friction.friction_coefficient", bounds=(0.0, 1.0))
-    upper, lower = eigenvalues_figure(branch, "friction").axes
+    upper, lower = plot_eigenvalues(branch, path=tmp_path / "modes.png").axes
     modes = [line for line in upper.lines if len(line.get_xdata()) == len(branch)]
     mu = branch.parameter
     expected = np.emath.sqrt(1.0 - 4.0 * mu / 3.0)
@@ -137,18 +132,18 @@ def test_flutter_shows_frequencies_that_meet(tmp_path):
     growth = [line.get_ydata() for line in lower.lines if len(line.get_xdata()) == len(branch)]
     assert np.max(growth[0][-1:] + growth[1][-1:]) == pytest.approx(-0.1, rel=1e-6)
     assert [text.get_text() for text in upper.texts] == ["0.2251 Hz"]
-    assert plot_eigenvalues(branch, tmp_path / "modes.png").stat().st_size > 10_000
+    assert (tmp_path / "modes.png").stat().st_size > 10_000
 
 
 def test_map_and_files(tmp_path):
     found = stability_map(two_mass_field(), {"B": np.linspace(0.5, 9.0, 12),
                                              "ground.speed": np.linspace(0.8, 2.0, 10)})
-    axis = stability_map_figure(found).axes[0]
+    axis = plot_stability_map(found, path=tmp_path / "map.pdf").axes[0]
     shown = np.ma.asarray(axis.collections[0].get_array()).reshape(10, 12)
     assert (shown.mask == (found.unstable == 0).T).all()
     assert shown.compressed() == pytest.approx(found.frequency_hz.T[~shown.mask])
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("B", "ground speed [m/s]")
-    assert plot_stability_map(found, tmp_path / "map.pdf").exists()
-    assert plot_branches(BRANCH, tmp_path / "branch.svg", "size").exists()
+    plot_branches(BRANCH, "size", path=tmp_path / "branch.svg")
+    assert {path.name for path in tmp_path.iterdir()} == {"map.pdf", "branch.svg"}
     with pytest.raises(InputError, match="must end in"):
-        plot_branches(BRANCH, tmp_path / "branch.gif")
+        plot_branches(BRANCH, path=tmp_path / "branch.gif")

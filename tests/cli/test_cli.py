@@ -262,12 +262,12 @@ def test_a_run_that_fails_is_written_and_reported(cli, study, monkeypatch):
 
 
 def test_ctrl_c_while_drawing_leaves_nothing(cli, study, monkeypatch, tmp_path):
-    from fecontact.output.plots import run as plots
+    from fecontact.output.plots import modes
 
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plots, "plot_modes", interrupted)
+    monkeypatch.setattr(modes, "plot_modes", interrupted)
     code, _, err = cli("modes", study)
     assert code == 130
     assert err == "error: interrupted.\n"

@@ -51,7 +51,7 @@ def test_bounds_of_branches(bounds):
 
 def test_no_branch_to_draw(tmp_path):
     with pytest.raises(InputError, match="nothing to draw"):
-        plot_branches([], tmp_path / "none.png")
+        plot_branches([], path=tmp_path / "none.png")
 
 
 @pytest.mark.parametrize(("first", "names"), [

@@ -47,17 +47,17 @@ def test_spectrum_shows_peaks_in_suitable_units(trajectory):
     q[:, 0] = 1e-5 * np.sin(2.0 * np.pi * 2000.0 * trajectory.time)
     q[:, 1:] = 0.0
     swinging = replace(trajectory, modal_coordinates=q)
-    panel = analysis.spectrum_figure(swinging, "displacement", 1, "x").axes[0]
+    panel = analysis.plot_spectrum(swinging, "displacement", 1, "x").axes[0]
     assert panel.get_ylabel() == "amplitude [µm]"
     assert panel.get_title() == "displacement x of contact node 1"
     assert panel.lines[0].get_ydata().max() == pytest.approx(10.0, rel=1e-2)
     assert [float(text.get_text()) for text in panel.texts] == pytest.approx([2000.0], rel=1e-3)
-    density = analysis.spectrum_figure(trajectory, density=True)
+    density = analysis.plot_spectrum(trajectory, density=True)
     assert density.axes[0].get_ylabel() == "density [(m/s)²/Hz]"
 
 
 def test_friction_work_per_length(trajectory):
-    upper, lower = analysis.friction_work_figure(trajectory).axes
+    upper, lower = analysis.plot_friction_work(trajectory).axes
     length = trajectory.system.basis.tributary
     heights = np.array([bar.get_height() for bar in upper.patches])
     scale = {"mJ/m": 1e-3, "µJ/m": 1e-6, "J/m": 1.0}[upper.get_ylabel().split("[")[1][:-1]]
@@ -69,7 +69,7 @@ def test_friction_work_per_length(trajectory):
 
 
 def test_poincare_section_takes_one_point_a_period(trajectory):
-    figure = analysis.poincare_figure(trajectory, "B", "x", period=0.005)
+    figure = analysis.plot_poincare(trajectory, "B", "x", period=0.005)
     points = figure.axes[0].lines[1]
     times = np.arange(5) * 500
     x = trajectory.displacement("B")[times, 0]
@@ -82,7 +82,7 @@ def test_response_figure_names_its_curves(trajectory):
     f = np.linspace(10.0, 3000.0, 50)
     one = frequency_response(body, f, [("B", "x")])
     two = frequency_response(body, f, [("B", "x")], [("C", "y"), (2, "y")])
-    figure = analysis.response_figure([one, two], ["drive", "other"])
+    figure = analysis.plot_response([one, two], ["drive", "other"])
     names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert names == ["drive", "other, C y by B x", "other, contact node 2 y by B x"]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), np.abs(one.values[:, 0, 0]))
@@ -112,14 +112,12 @@ def test_a_pendulum_is_drawn_across_the_ground(tmp_path):
 
     trajectory = simulate(impact_oscillator(w=64.32), 0.5, outputs=801)
     for kind in ("phase", "spectrum", "spectrogram", "receptance"):
-        plot_kinds.redraw(trajectory, kind, tmp_path / f"{kind}.svg")
+        plot_kinds.redraw(trajectory, kind, path=tmp_path / f"{kind}.svg")
     assert b"velocity y" in (tmp_path / "phase.svg").read_bytes()
     for kind in ("spectrum", "spectrogram"):
-        plot_kinds.redraw(trajectory, kind, tmp_path / f"{kind}.png",
-                          plot_kinds.Choice("total_friction_force"))
+        plot_kinds.redraw(trajectory, kind, plot_kinds.Choice("total_friction_force"))
     with pytest.raises(InputError, match="B x does not move by a force at B x"):
-        plot_kinds.redraw(trajectory, "receptance", tmp_path / "none.png",
-                          plot_kinds.Choice(axis="x"))
+        plot_kinds.redraw(trajectory, "receptance", plot_kinds.Choice(axis="x"))
 
 
 def test_points_of_a_command_line():

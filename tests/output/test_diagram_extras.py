@@ -9,8 +9,8 @@ from fecontact.bifurcation.attractors.basins import Attractor, Basins
 from fecontact.bifurcation.attractors.poincare_scan import BruteForce
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.output.plots.basins import basins_figure, plot_basins
-from fecontact.output.plots.bifurcation_diagram import branches_figure, plot_branches
+from fecontact.output.plots.basins import plot_basins
+from fecontact.output.plots.bifurcation_diagram import plot_branches
 from fecontact.output.plots.diagram_insets import Inset
 
 
@@ -29,8 +29,8 @@ def test_sections_over_runs():
     up = np.zeros((3, 2, 4))
     up[..., 0] = np.array([[1.0, 2.0], [1.5, 2.5], [1.0, 3.0]]) / r[0]
     runs = BruteForce(system, "w", np.array([1.0, 2.0, 3.0]), up, up[:0])
-    axis = branches_figure([BRANCH], "observed_section", beneath=runs,
-                           observe=("B", "y")).axes[0]
+    axis = plot_branches([BRANCH], "observed_section", beneath=runs,
+                         observe=("B", "y")).axes[0]
     dots, *curves = axis.lines
     assert dots.get_xdata().tolist() == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]
     assert dots.get_ydata() == pytest.approx([1.0, 2.0, 1.5, 2.5, 1.0, 3.0])
@@ -41,14 +41,14 @@ def test_sections_over_runs():
 def test_phase_planes_stand_in_the_order_of_their_places(tmp_path):
     insets = [Inset(p, 1.0, np.cos(CURVE) * 1e-3, np.sin(CURVE), f"w = {p:g}", p < 2.0)
               for p in (3.0, 1.0)]
-    figure = branches_figure([BRANCH], "observed_section", insets=insets)
+    figure = plot_branches([BRANCH], "observed_section", insets=insets)
     _, first, second = figure.axes
     assert [axis.get_title() for axis in (first, second)] == ["w = 1", "w = 3"]
     assert [axis.lines[0].is_dashed() for axis in (first, second)] == [False, True]
     assert first.lines[0].get_xdata().max() == pytest.approx(1.0)
     assert first.get_xlabel() == "displacement [mm]"
     assert len(figure.artists) == 2
-    plot_branches(BRANCH, tmp_path / "with_insets.png", "observed_section", insets=insets)
+    plot_branches(BRANCH, "observed_section", insets=insets, path=tmp_path / "with_insets.png")
     assert (tmp_path / "with_insets.png").stat().st_size > 10_000
 
 
@@ -57,7 +57,7 @@ def test_maps_of_basins(tmp_path):
     found = Basins(np.array([0.0, 1.0]), np.array([0.0, 1.0, 2.0]), label, (
         Attractor("periodic", np.array([[0.5, 1.0], [0.6, 1.1]]), 0.5),
         Attractor("equilibrium", np.array([[0.2, 0.3]]), 1.0 / 3.0)))
-    axis = basins_figure(found, "x [m]", "v [m/s]", rows=np.eye(2)).axes[0]
+    axis = plot_basins(found, x_label="x [m]", y_label="v [m/s]", rows=np.eye(2)).axes[0]
     drawn = axis.collections[0].get_array()
     assert np.array_equal(np.asarray(drawn).reshape(3, 2), label.T)
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
@@ -65,15 +65,15 @@ def test_maps_of_basins(tmp_path):
     assert axis.lines[0].get_xdata().tolist() == [0.5, 0.6]
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [m]", "v [m/s]")
     with pytest.raises(InputError, match="must end in"):
-        plot_basins(found, tmp_path / "basins.gif")
+        plot_basins(found, path=tmp_path / "basins.gif")
 
 
 def test_basins_of_a_system(tmp_path):
     found = basins(impact_oscillator(2), (Axis("B", "y"), [0.0, 4e-4]),
-                   (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient_periods=60, keep=4)
-    path = plot_basins(found, tmp_path / "basins.png")
-    assert path.stat().st_size > 5_000
+                   (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient=60, keep=4)
+    plot_basins(found, path=tmp_path / "basins.png")
+    assert (tmp_path / "basins.png").stat().st_size > 5_000
     runs = brute_force(impact_oscillator(2), "drive.angular_frequency", [64.0, 65.0],
-                       transient_periods=60, keep=2, initial=np.zeros(4))
-    assert len(branches_figure([BRANCH], "observed_section", beneath=runs,
-                               observe=("B", "y")).axes[0].lines) == 4
+                       transient=60, keep=2, initial=np.zeros(4))
+    assert len(plot_branches([BRANCH], "observed_section", beneath=runs,
+                             observe=("B", "y")).axes[0].lines) == 4

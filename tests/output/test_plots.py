@@ -1,21 +1,23 @@
+import inspect
 import struct
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from synthetic import basis, run
 
+import fecontact
 from fecontact import basis_from_matrices
 from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Energies, Trajectory
-from fecontact.output.plots import run as figures
 from fecontact.output.plots import run as plots
-from fecontact.output.plots.modes import modes_figure
+from fecontact.output.plots.modes import plot_modes
 from fecontact.output.plots.run import (
-    contact_map_figure,
-    energies_figure,
-    history_figure,
-    phase_figure,
+    plot_contact_map,
+    plot_energies,
+    plot_history,
+    plot_phase,
 )
 from fecontact.system import kernels as kernels
 
@@ -30,7 +32,7 @@ def mesh_values(axis):
 
 def test_history_shows_each_point_in_suitable_units():
     trajectory = run(times=101)
-    figure = history_figure(trajectory, ["B", 0, (0.2, 0.02)])
+    figure = plot_history(trajectory, ["B", 0, (0.2, 0.02)])
     assert labels(figure) == [
         "displacement x [µm]", "velocity x [mm/s]", "displacement y [µm]", "velocity y [mm/s]",
         "total normal force [N]", "total friction force [mN]"]
@@ -46,22 +48,22 @@ def test_history_shows_each_point_in_suitable_units():
 
 def test_phase_plane_is_velocity_over_displacement_with_the_ground():
     trajectory = run(times=101)
-    figure = phase_figure(trajectory, 2, "x")
+    figure = plot_phase(trajectory, 2, "x")
     plane = figure.axes[0]
     assert (plane.get_xlabel(), plane.get_ylabel()) == ("displacement x [µm]", "velocity x [mm/s]")
     np.testing.assert_allclose(plane.lines[0].get_xdata(), 1e6 * trajectory.displacement(2)[:, 0])
     np.testing.assert_allclose(plane.lines[0].get_ydata(), 1e3 * trajectory.velocity(2)[:, 0])
     assert list(plane.lines[2].get_ydata()) == [20.0, 20.0]  # the belt runs at 0.02 m/s
-    assert len(phase_figure(trajectory, "B", "y").axes[0].lines) == 2
+    assert len(plot_phase(trajectory, "B", "y").axes[0].lines) == 2
     with pytest.raises(InputError, match="axis = 'z'"):
-        phase_figure(trajectory, "B", "z")
+        plot_phase(trajectory, "B", "z")
     with pytest.raises(InputError, match="no point 'Z'"):
-        phase_figure(trajectory, "Z")
+        plot_phase(trajectory, "Z")
 
 
 def test_contact_map_shows_pressure_and_states():
     trajectory = run(times=101)
-    figure = contact_map_figure(trajectory)
+    figure = plot_contact_map(trajectory)
     upper, lower = figure.axes[:2]
     assert upper.get_ylabel() == lower.get_ylabel() == "contact position x [mm]"
     assert lower.get_xlabel() == "time [ms]"
@@ -80,7 +82,7 @@ def test_contact_map_of_a_long_run_keeps_short_impacts():
     force = np.zeros((30_001, 5))
     force[12_345, 3] = 7.0
     trajectory.__dict__["_contact"] = np.stack([force] + [0 * force] * 5, axis=2)
-    upper, lower = contact_map_figure(trajectory).axes[:2]
+    upper, lower = plot_contact_map(trajectory).axes[:2]
     assert mesh_values(upper).shape == (5, 1500)
     assert mesh_values(upper).max() == pytest.approx(7.0 / 0.04)
     assert np.flatnonzero(mesh_values(upper)[3]) == [12_345 * 1500 // 30_001]
@@ -94,7 +96,7 @@ def test_contact_map_of_one_node_and_few_times(times):
     short = Trajectory(trajectory.system, *(values[:times] for values in (
         trajectory.time, trajectory.modal_coordinates, trajectory.modal_velocities,
         trajectory.work)))
-    upper, lower = contact_map_figure(short).axes[:2]
+    upper, lower = plot_contact_map(short).axes[:2]
     assert mesh_values(upper).shape == mesh_values(lower).shape == (1, times)
     assert upper.get_ylabel() == "contact node"
 
@@ -111,7 +113,7 @@ def placed(x_mm, length_mm, groups=()):
 def bands(trajectory):
     """Ends [mm] of the coloured rows of both maps and, in that order, the pressures shown."""
     found = []
-    for axis in contact_map_figure(trajectory).axes[:2]:
+    for axis in plot_contact_map(trajectory).axes[:2]:
         assert axis.get_ylabel() == "contact position x [mm]"
         mesh = axis.collections[0]
         edges = mesh.get_coordinates()[:, 0, 1]
@@ -154,7 +156,7 @@ def test_bands_of_the_contact_map_are_as_wide_as_tributary_lengths(x, length, gr
 
 
 def test_contact_map_goes_by_numbers_where_nodes_share_a_place():
-    upper = contact_map_figure(placed([50, 50, 80], [10, 10, 10])).axes[0]
+    upper = plot_contact_map(placed([50, 50, 80], [10, 10, 10])).axes[0]
     assert upper.get_ylabel() == "contact node"
     assert mesh_values(upper).shape == (3, 41)
 
@@ -166,7 +168,7 @@ def test_contact_map_without_friction_shows_contact():
     smooth = replace(trajectory)
     smooth.__dict__["_contact"] = contact
     assert (smooth.contact_state == 2).any()
-    figure = contact_map_figure(smooth)
+    figure = plot_contact_map(smooth)
     names = [text.get_text() for axis in figure.axes if axis.get_ylabel() == "state"
              for text in axis.get_yticklabels()]
     assert names == ["open", "contact"]
@@ -177,7 +179,7 @@ def test_energies_leave_out_what_is_zero():
     trajectory = run(times=101)
     work = np.zeros((101, 8))
     work[:, 7] = 1e-3 * np.linspace(0.0, 1.0, 101)
-    figure = energies_figure(replace(trajectory, work=work))
+    figure = plot_energies(replace(trajectory, work=work))
     assert labels(figure) == ["stored energy [mJ]", "work put in [J]", "energy lost [mJ]"]
     shown = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
     assert shown == [["kinetic", "elastic", "contact", "total"], ["total"], ["friction", "total"]]
@@ -188,71 +190,74 @@ def test_energies_leave_out_what_is_zero():
 
 def test_modes_are_titled_by_their_frequencies():
     body = basis(columns=12, rows=3)
-    figure = modes_figure(body)
+    figure = plot_modes(body)
     titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
     assert titles == ["mode 0: rigid", "mode 1: rigid", "mode 2: rigid", "mode 3: 2000 Hz",
                       "mode 4: 9000 Hz"]
     amplitude = mesh_values(figure.axes[4])
     stretch = np.abs(body.field.nodes[:, 0] - 0.1) / 0.1
     np.testing.assert_allclose(amplitude, stretch, atol=1e-12)
-    assert sum(bool(axis.get_title()) for axis in modes_figure(body, 2).axes) == 2
+    assert sum(bool(axis.get_title()) for axis in plot_modes(body, count=2).axes) == 2
     with pytest.raises(InputError, match="count = 0"):
-        modes_figure(body, 0)
+        plot_modes(body, count=0)
     plain = basis_from_matrices(np.eye(1), np.eye(1), {"contact": np.ones((1, 3, 1))})
     with pytest.raises(InputError, match="no shapes"):
-        modes_figure(plain)
+        plot_modes(plain)
 
 
 def test_colours_of_energies_tell_where_they_are():
     named = {entry.name for entry in fields(Energies)}
-    assert set(figures.ENERGY_COLOURS) == named
+    assert set(plots.ENERGY_COLOURS) == named
     panels = (("kinetic", "elastic", "drive_spring", "contact"),
               ("drive_work", "ground_work", "belt_work", "load_work"),
               ("modal_damping", "dashpots", "contact_damping", "friction"))
     for names in panels:
-        assert len({figures.ENERGY_COLOURS[name] for name in names}) == 4
+        assert len({plots.ENERGY_COLOURS[name] for name in names}) == 4
 
 
 def test_long_lines_are_thinned_without_losing_peaks():
     t = np.linspace(0.0, 1.0, 100_003)
     y = np.sin(2.0 * np.pi * 3.0 * t)
     y[77_777], y[50_001], y[-1] = 5.0, -4.0, 3.0
-    x, thinned = figures.thinned(t, y)
+    x, thinned = plots.thinned(t, y)
     assert len(x) < 5000
     assert (thinned.max(), thinned.min()) == (5.0, -4.0)
     assert x[np.argmax(thinned)] == t[77_777]
     assert (x[0], x[-1], thinned[-1]) == (0.0, 1.0, 3.0)
     assert (np.diff(x) > 0.0).all()
-    assert figures.thinned(t[:100], y[:100])[0] is not None
-    assert len(figures.thinned(t[:7999], y[:7999])[0]) == 7999
+    assert plots.thinned(t[:100], y[:100])[0] is not None
+    assert len(plots.thinned(t[:7999], y[:7999])[0]) == 7999
 
 
 @pytest.mark.parametrize("triangles", [False, True])
 def test_files_are_pictures(tmp_path, triangles):
     body = basis(columns=8, rows=2, triangles=triangles)
     trajectory = run(body, times=41)
-    made = [plots.plot_history(trajectory, tmp_path / "history.png"),
-            plots.plot_phase(trajectory, tmp_path / "phase.png", 0),
-            plots.plot_contact_map(trajectory, tmp_path / "map.png"),
-            plots.plot_energies(trajectory, tmp_path / "energies.png"),
-            plots.plot_modes(body, tmp_path / "modes.png")]
+    made = [tmp_path / f"{what}.png" for what in ("history", "phase", "map", "energies", "modes")]
+    plot_history(trajectory, path=made[0])
+    plot_phase(trajectory, 0, path=made[1])
+    plot_contact_map(trajectory, path=made[2])
+    plot_energies(trajectory, path=made[3])
+    plot_modes(body, path=made[4])
     for path in made:
         header = path.read_bytes()[:24]
         width, height = struct.unpack(">II", header[16:24])
         assert header[:8] == b"\x89PNG\r\n\x1a\n"
         assert width >= 900
         assert height >= 400
-    assert plots.plot_phase(trajectory, tmp_path / "phase.pdf").read_bytes()[:5] == b"%PDF-"
-    assert b"velocity x [mm/s]" in plots.plot_phase(trajectory, tmp_path / "phase.svg").read_bytes()
+    plot_phase(trajectory, path=tmp_path / "phase.pdf")
+    assert (tmp_path / "phase.pdf").read_bytes()[:5] == b"%PDF-"
+    plot_phase(trajectory, path=tmp_path / "phase.svg")
+    assert b"velocity x [mm/s]" in (tmp_path / "phase.svg").read_bytes()
     assert sorted(path.suffix for path in tmp_path.iterdir()) == [".pdf", *[".png"] * 5, ".svg"]
 
 
 def test_interrupted_and_impossible_plots_leave_nothing(tmp_path, monkeypatch):
     trajectory = run(times=11)
     with pytest.raises(InputError, match=r"must end in \.png, \.pdf or \.svg"):
-        plots.plot_energies(trajectory, tmp_path / "energies.jpg")
+        plot_energies(trajectory, path=tmp_path / "energies.jpg")
     with pytest.raises(InputError, match="does not exist"):
-        plots.plot_energies(trajectory, tmp_path / "nowhere" / "energies.png")
+        plot_energies(trajectory, path=tmp_path / "nowhere" / "energies.png")
 
     def stop(self, *args, **options):
         args[0].write_bytes(b"half")
@@ -260,7 +265,7 @@ def test_interrupted_and_impossible_plots_leave_nothing(tmp_path, monkeypatch):
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", stop)
     with pytest.raises(KeyboardInterrupt):
-        plots.plot_energies(trajectory, tmp_path / "energies.png")
+        plot_energies(trajectory, path=tmp_path / "energies.png")
     assert not list(tmp_path.iterdir())
 
 
@@ -271,6 +276,47 @@ def test_plots_leave_matplotlib_as_it_was(tmp_path):
 
     before = dict(matplotlib.rcParams)
     pyplot = "matplotlib.pyplot" in sys.modules
-    plots.plot_energies(run(times=11), tmp_path / "energies.png")
+    plot_energies(run(times=11), path=tmp_path / "energies.png")
     assert dict(matplotlib.rcParams) == before
     assert ("matplotlib.pyplot" in sys.modules) == pyplot
+
+
+def test_every_plot_returns_its_figure_and_takes_a_path_by_name():
+    names = [name for name in fecontact.__all__ if name.startswith("plot_")]
+    assert len(names) > 12
+    for name in names:
+        signature = inspect.signature(getattr(fecontact, name))
+        assert signature.return_annotation.strip('"') == "Figure"
+        path = list(signature.parameters.values())[-1]
+        assert (path.name, path.default, path.kind) == ("path", None, path.KEYWORD_ONLY)
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_a_figure_saved_later_is_the_one_in_the_file(tmp_path, monkeypatch, suffix):
+    """Settings of the user between drawing and saving do not change its style."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    first, second = tmp_path / f"first.{suffix}", tmp_path / f"second.{suffix}"
+    with rc_context({"svg.hashsalt": "one"}):
+        figure = plot_phase(run(times=41), path=first)
+        with rc_context({"grid.color": "red", "xtick.color": "red", "savefig.dpi": 40,
+                         "svg.fonttype": "path", "pdf.fonttype": 3, "font.size": 20.0,
+                         "axes.formatter.useoffset": True}):
+            figure.savefig(second)
+    assert second.read_bytes() == first.read_bytes()
+
+
+def test_notebooks_show_the_figure_at_its_size():
+    figure = plot_phase(run(times=41))
+    picture, size = figure._repr_png_()
+    width, height = struct.unpack(">II", picture[16:24])
+    assert picture[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (width, height) == (960, 780)  # 6.4 x 5.2 inches at 150 dots per inch
+    assert size == {"width": 614, "height": 499}
+
+
+def test_a_file_among_what_is_drawn_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"path='a\.png'"):
+        plot_history(run(times=11), "a.png")
+    with pytest.raises(TypeError):
+        plot_energies(run(times=11), tmp_path / "a.png")
+    assert not list(tmp_path.iterdir())

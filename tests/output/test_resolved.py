@@ -10,8 +10,8 @@ from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
 from fecontact.laws.normal.linear import LinearContact
 from fecontact.output.files.case import read_case, write_case
-from fecontact.output.plots.analysis import friction_work_figure
-from fecontact.output.plots.run import contact_map_figure, history_figure, phase_figure, thinned
+from fecontact.output.plots.analysis import plot_friction_work
+from fecontact.output.plots.run import plot_contact_map, plot_history, plot_phase, thinned
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 0.3
 
@@ -42,7 +42,7 @@ def test_impacts_have_their_height(outputs):
     run = hit(outputs)
     highest = SPEED * np.sqrt(STIFFNESS * MASS)
     assert run.normal_force.max() < 0.95 * highest
-    axes = history_figure(run, ["B"]).axes
+    axes = plot_history(run, ["B"]).axes
     t, force = drawn(axes[4]).T
     assert force.max() == pytest.approx(highest, rel=0.01)
     assert np.trapezoid(force, 1e-3 * t) == pytest.approx(2.0 * MASS * SPEED, rel=0.01)
@@ -50,7 +50,7 @@ def test_impacts_have_their_height(outputs):
     assert drawn(axes[2])[:, 1].min() == pytest.approx(
         -1e3 * SPEED * np.sqrt(MASS / STIFFNESS), rel=0.01)
     assert drawn(axes[3])[:, 1].max() == pytest.approx(1e3 * SPEED, rel=0.01)
-    pressure = np.asarray(contact_map_figure(run).axes[0].collections[0].get_array())
+    pressure = np.asarray(plot_contact_map(run).axes[0].collections[0].get_array())
     assert pressure.max() == pytest.approx(highest, rel=0.01)
 
 
@@ -60,7 +60,7 @@ def test_free_oscillation_at_seven_outputs_a_period_is_an_ellipse():
     periods = 5
     run = fc.simulate(system, periods * 2.0 * np.pi / w, outputs=7 * periods + 1, rtol=1e-8,
                       initial=np.sqrt(MASS) * np.array([size, 0.0]))
-    curve = drawn(phase_figure(run).axes[0]) / [1e3 * size, 1e3 * size * w]
+    curve = drawn(plot_phase(run).axes[0]) / [1e3 * size, 1e3 * size * w]
     # Of the line, not of its corners alone.
     between = curve[:-1, None] + np.linspace(0.0, 1.0, 9)[:, None] * np.diff(curve, axis=0)[:, None]
     assert np.abs(np.linalg.norm(between, axis=2) - 1.0).max() < 0.01
@@ -107,7 +107,7 @@ def test_slip_is_measured_along_the_motion():
     creep = np.trapezoid(fine.slip_velocity[:, 0], fine.time)
     moved = run.displacement(0)[-1, 0] - run.displacement(0)[0, 0] - 1e-3 * run.time[-1]
     assert creep == pytest.approx(moved, rel=5e-3)
-    heights = [bar.get_height() for bar in friction_work_figure(run).axes[1].patches]
+    heights = [bar.get_height() for bar in plot_friction_work(run).axes[1].patches]
     assert 1e-3 * heights[0] == pytest.approx(np.trapezoid(np.abs(fine.slip_velocity[:, 0]),
                                                            fine.time))
 
@@ -144,9 +144,9 @@ def test_pictures_say_where_they_are_too_coarse(tmp_path):
     found = resolved(by_hand)
     assert found.trajectory is by_hand
     assert "not computed by a run" in found.note
-    figure = phase_figure(by_hand, 2)
+    figure = plot_phase(by_hand, 2)
     assert [" ".join(text.get_text().split()) for text in figure.texts] == [found.note]
-    assert not phase_figure(hit(7), axis="y").texts
+    assert not plot_phase(hit(7), axis="y").texts
 
 
 def test_long_runs_and_wrong_outputs_stay_as_they_are():

@@ -5,7 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.output.plots.modes import convergence_figure
+from fecontact.output.plots.modes import plot_convergence
 from fecontact.reduction.convergence import mode_convergence
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.reduction.report import BasisReport
@@ -51,6 +51,6 @@ def test_study_of_a_beam():
     text = str(result)
     assert f"{result.frequencies_hz[0, 0]:.6g}" in text
     assert f"{result.missing[1, 0]:.2%}" in text
-    axes = convergence_figure(result).axes
+    axes = plot_convergence(result).axes
     assert axes[0].get_xlabel() == "unknowns of the mesh"
     assert axes[1].get_ylabel() == "missing contact compliance, worst node [%]"

@@ -166,7 +166,7 @@ def grid_table():
 
 
 def test_a_map_shows_each_case_in_its_place():
-    figure = plots.sweep_figure(grid_table(), "friction_power")
+    figure = plots.plot_sweep(grid_table(), "friction_power")
     axes = figure.axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == (
         "ground speed [m/s]", "load normal [N]")
@@ -187,12 +187,15 @@ def test_curves_scatter_and_names_on_axes():
     few = SweepTable(
         {"friction.law": ("a", "b") * 5, "ground.speed": tuple(np.repeat(np.arange(5.0), 2))},
         {"amplitude_x": np.arange(10.0)}, [f"{k}" for k in range(10)], [""] * 10, shape=(5, 2))
-    figure = plots.sweep_figure(few, "amplitude_x")
+    figure = plots.plot_sweep(few, "amplitude_x")
     curves = [line for line in figure.axes[0].lines if len(line.get_xdata()) == 5]
     assert [curve.get_label() for curve in curves] == ["a", "b"]
     assert curves[1].get_ydata().tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
+    over = plots.plot_sweep(grid, "friction_power", ["load.normal"]).axes[0]
+    assert over.lines[0].get_linestyle() == "None"  # ten speeds at each load are no curve
+    assert curves[0].get_linestyle() == "-"
     loose = SweepTable(grid.parameters, grid.values, grid.keys, grid.reasons)
-    figure = plots.sweep_figure(loose, "friction_power")
+    figure = plots.plot_sweep(loose, "friction_power")
     assert [axes.get_xlabel() for axes in figure.axes] == [
         "ground speed [m/s]", "load normal [N]", "cases"]
     assert figure.axes[2].patches
@@ -200,15 +203,17 @@ def test_curves_scatter_and_names_on_axes():
 
 def test_plots_of_sweeps_as_files(tmp_path):
     table = grid_table()
-    assert plot_sweep(table, "friction_power", tmp_path / "m.png").stat().st_size > 5000
-    plot_sweep(table, "friction_power", tmp_path / "c.svg", over=["load.normal"])
+    plot_sweep(table, "friction_power", path=tmp_path / "m.png")
+    assert (tmp_path / "m.png").stat().st_size > 5000
+    plot_sweep(table, "friction_power", over=["load.normal"], path=tmp_path / "c.svg")
     with pytest.raises(InputError, match=r"no column 'friction_powr' \(did you mean"):
-        plot_sweep(table, "friction_powr", tmp_path / "x.png")
+        plot_sweep(table, "friction_powr")
     with pytest.raises(InputError, match=r"'ground\.speed' is a parameter of the sweep"):
-        plot_sweep(table, "ground.speed", tmp_path / "x.png")
+        plot_sweep(table, "ground.speed")
     one = Estimate(0.5, 0.4, 0.6)
     found = SobolIndices({"a": one, "b": one}, {"a": one, "b": one}, 64)
-    assert plot_sobol({"f": found, "g": found}, tmp_path / "s.png").stat().st_size > 5000
+    plot_sobol({"f": found, "g": found}, path=tmp_path / "s.png")
+    assert (tmp_path / "s.png").stat().st_size > 5000
 
 
 def test_names_of_files_are_safe():

@@ -49,8 +49,8 @@ def test_published_regimes_and_the_numbers_of_ensembles(study, tmp_path):
     assert np.abs(height - found).max() < 1e-4 * np.ptp(found)
     again = read_table(tmp_path / "f/index.csv")
     assert (again.strobed == table.strobed).all()
-    picture = plot_strobed(table, "drive.angular_frequency", tmp_path / "s.png")
-    assert picture.stat().st_size > 5000
+    plot_strobed(table, "drive.angular_frequency", path=tmp_path / "s.png")
+    assert (tmp_path / "s.png").stat().st_size > 5000
     one = sweep(study, {"drive.angular_frequency": [30.84]}, Serial(), folder=tmp_path / "one")
     assert one.keys[0] == table.keys[1]
     assert (one.strobed[0] == table.strobed[1]).all()

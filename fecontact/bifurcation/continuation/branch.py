@@ -23,6 +23,7 @@ from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
 from fecontact.core.types import Array
+from fecontact.core.units import Summarised, listed, span
 
 # Relative distance from a value of the parameter that counts as there.
 _MET = 1e-9
@@ -30,8 +31,8 @@ _MET = 1e-9
 __all__ = ["Branch", "Status"]
 
 
-@dataclass(frozen=True, eq=False)
-class Branch:
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch(Summarised):
     """Solutions over a parameter, in their order along the branch.
 
     Attributes
@@ -64,6 +65,19 @@ class Branch:
 
     def __iter__(self) -> Iterator[BranchPoint]:
         return iter(self.points)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Parameter and its range, special points, stability, and how the branch ended."""
+        special = [f"{point.kind} at {point.parameter:.5g}" for point in self.special]
+        known = [bool(point.values["stable"]) for point in self.points
+                 if point.kind is None and "stable" in point.values]
+        return [
+            ("parameter", self.name), ("range", span(self.parameter)),
+            ("points", f"{len(self)}"),
+            ("special", listed(special, 5)),
+            *([("stable", f"{sum(known)} of {len(known)} regular points")] if known else []),
+            ("end", self.status.name.lower()),
+        ]
 
     @property
     def parameter(self) -> Array:

@@ -16,10 +16,11 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray, Integers
+from fecontact.core.units import Summarised, span
 
 
-@dataclass(frozen=True, eq=False)
-class StabilityMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityMap(Summarised):
     """Eigenvalues of an equilibrium over a grid of two parameters.
 
     Attributes
@@ -42,6 +43,17 @@ class StabilityMap:
     states: Array
     critical: ComplexArray
     unstable: Integers
+
+    def summary(self) -> list[tuple[str, str]]:
+        """The parameters, and how much of the map is unstable at which frequencies."""
+        unstable = self.unstable > 0
+        return [
+            *((name, f"{span(values)}, {len(values)} values")
+              for name, values in zip(self.names, (self.first, self.second), strict=True)),
+            ("unstable", f"{100.0 * unstable.mean():.3g} %"),
+            ("their frequencies", span(self.frequency_hz[unstable], "Hz")),
+            ("no equilibrium", f"{100.0 * (self.unstable < 0).mean():.3g} %"),
+        ]
 
     @property
     def growth_rate(self) -> Array:

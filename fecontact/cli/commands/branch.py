@@ -43,12 +43,13 @@ def write_branch_results(
     files.append(table)
     several = list(result.found.values())
     show = wanted.show if beneath is None else "section"
-    files.append(plot_branches(
-        several, folder / f"{name}-branch.png", f"observed_{show}",
-        y_label=_label(show, *result.observe), names=list(result.found), beneath=beneath,
-        observe=result.observe))
+    files.append(folder / f"{name}-branch.png")
+    plot_branches(
+        several, f"observed_{show}", y_label=_label(show, *result.observe),
+        names=list(result.found), beneath=beneath, observe=result.observe, path=files[-1])
     if wanted.kind != "orbits":
-        files.append(plot_eigenvalues(several[0], folder / f"{name}-stability.png"))
+        files.append(folder / f"{name}-stability.png")
+        plot_eigenvalues(several[0], path=files[-1])
     return files
 
 

@@ -82,7 +82,8 @@ def plot(
     choice = Choice(quantity, tuple(point_of(text) for text in point or ()), axis, highest)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"):
-        say_written(redraw(stored.trajectory, kind, target, choice, t_start=t_start, t_end=t_end))
+        redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)
+        say_written(target)
     note_age(file, stored.current)
 
 

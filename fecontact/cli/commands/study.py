@@ -68,21 +68,21 @@ def modes(
     from fecontact.reduction.report import BasisReport
 
     described = read_study(study, set_)
-    from fecontact.output.plots.run import plot_convergence, plot_modes
+    from fecontact.output.plots.modes import plot_convergence, plot_modes
 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             basis = described.basis()
         say(str(BasisReport(basis)))
         picture = folder / f"{described.name}-modes.png"
-        plot_modes(basis, picture)
+        plot_modes(basis, path=picture)
         say_written(picture)
         if converge:
             with progress_bar("Refining", 1.0) as progress:
                 result = convergence_of(described, progress)
             say(f"\n{result}")
             picture = folder / f"{described.name}-convergence.png"
-            plot_convergence(result, picture)
+            plot_convergence(result, path=picture)
             say_written(picture)
 
 

@@ -159,17 +159,23 @@ def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[
     if len(set(table.keys)) < 2:
         return []
     names = [name for name, values in table.values.items() if (values == values).any()]
-    files = [plot_sweep(table, name, folder / f"{_file_name(name)}.png") for name in names]
+    files = []
+    for name in names:
+        files.append(folder / f"{_file_name(name)}.png")
+        plot_sweep(table, name, path=files[-1])
     if table.strobed is not None:
-        files += [plot_strobed(table, parameter, folder / f"strobed-{_file_name(parameter)}.png")
-                  for parameter, values in table.parameters.items() if len(set(values)) > 1]
+        for parameter, values in table.parameters.items():
+            if len(set(values)) > 1:
+                files.append(folder / f"strobed-{_file_name(parameter)}.png")
+                plot_strobed(table, parameter, path=files[-1])
     if settings.method == "sensitivity" and names:
         found = {}
         for name in names:
             with contextlib.suppress(InputError):  # too few base samples went well
                 found[name] = sobol_indices(table, name, seed=settings.seed)
         if found:
-            files.append(plot_sobol(found, folder / "sensitivity.png"))
+            files.append(folder / "sensitivity.png")
+            plot_sobol(found, path=files[-1])
     return files
 
 

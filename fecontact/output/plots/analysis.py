@@ -1,4 +1,4 @@
-"""Plots of what a run is analysed for, as files: PNG, PDF or SVG, whole or not at all."""
+"""Plots of what a run is analysed for: spectra, sections, wear, frequency responses."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,18 +11,18 @@ from fecontact.analysis.histories import Point, history, point_name
 from fecontact.analysis.periodicity import strobed_states
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import count, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import (
     COLOURS,
     DASHES,
     add_note,
     distinct_colours,
-    new_figure,
-    save_figure,
 )
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _DECADES = 5.0  # shown below the highest value of a logarithmic axis
 _AXES = ("x", "y")
 
 
-def spectrum_figure(
+def plot_spectrum(
     trajectory: Trajectory,
     quantity: str = "velocity",
     point: Point = "B",
@@ -43,37 +43,60 @@ def spectrum_figure(
     *,
     density: bool = False,
     highest_hz: float | None = None,
+    path: str | Path | None = None,
 ) -> "Figure":
-    """Amplitude spectrum of a quantity, its highest peaks named; or its power spectral density."""
+    """Plot the spectrum of a quantity of a run at evenly spaced output times, its peaks named.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run, transients cut off by :func:`fecontact.analysis.window.window`.
+    quantity, point, axis
+        As for :func:`fecontact.analysis.histories.history`.
+    density : bool
+        Power spectral density by Welch's method in the place of amplitudes.
+    highest_hz : float, optional
+        End of the axis [Hz].
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For a quantity or a point that does not exist, uneven times, another suffix, or a file
+        that cannot be written.
+    """
+    require_kind("plot_spectrum", Trajectory, trajectory=trajectory)
     shown = history(trajectory, quantity, point, axis)
     make = power_spectral_density if density else amplitude_spectrum
     found = make(trajectory.time, shown.values)
-    figure = new_figure(9.0, 4.6)
-    panel = figure.subplots()
-    factor, symbol = (1.0, f"({shown.unit})²/Hz") if density else suitable_unit(
-        float(found.values.max()), shown.unit)
-    end = highest_hz or _end_of_content(found.frequency_hz, found.values)
-    panel.semilogy(*_envelope(found.frequency_hz, np.maximum(found.values, 1e-300) / factor, end),
-                   color=COLOURS[0], linewidth=1.0)
-    top = float(found.values.max()) / factor
-    if top > 0.0:
-        panel.set_ylim(top * 10.0**-_DECADES, 4.0 * top)
-    panel.set_xlim(0.0, end)
-    named: list[float] = []
-    for peak in found.peaks(40):
-        # Numbers need room beside those of higher peaks.
-        apart = all(abs(peak.frequency_hz - other) > 0.06 * end for other in named)
-        if peak.frequency_hz < end and apart and len(named) < 6:
-            named.append(peak.frequency_hz)
-            panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value / factor),
-                           xytext=(0, 4), textcoords="offset points", ha="center", fontsize=8.5)
-    panel.set_xlabel("frequency [Hz]")
-    panel.set_ylabel(f"{'density' if density else 'amplitude'} [{symbol}]")
-    panel.set_title(shown.title)
+    with new_figure(9.0, 4.6, path) as figure:
+        panel = figure.subplots()
+        factor, symbol = (1.0, f"({shown.unit})²/Hz") if density else suitable_unit(
+            float(found.values.max()), shown.unit)
+        end = highest_hz or _end_of_content(found.frequency_hz, found.values)
+        heights = np.maximum(found.values, 1e-300) / factor
+        panel.semilogy(*_envelope(found.frequency_hz, heights, end), color=COLOURS[0],
+                       linewidth=1.0)
+        top = float(found.values.max()) / factor
+        if top > 0.0:
+            panel.set_ylim(top * 10.0**-_DECADES, 4.0 * top)
+        panel.set_xlim(0.0, end)
+        named: list[float] = []
+        for peak in found.peaks(40):
+            # Numbers need room beside those of higher peaks.
+            apart = all(abs(peak.frequency_hz - other) > 0.06 * end for other in named)
+            if peak.frequency_hz < end and apart and len(named) < 6:
+                named.append(peak.frequency_hz)
+                panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value / factor),
+                               xytext=(0, 4), textcoords="offset points", ha="center", fontsize=8.5)
+        panel.set_xlabel("frequency [Hz]")
+        panel.set_ylabel(f"{'density' if density else 'amplitude'} [{symbol}]")
+        panel.set_title(shown.title)
     return figure
 
 
-def spectrogram_figure(
+def plot_spectrogram(
     trajectory: Trajectory,
     quantity: str = "velocity",
     point: Point = "B",
@@ -81,47 +104,82 @@ def spectrogram_figure(
     *,
     piece: float | None = None,
     highest_hz: float | None = None,
+    path: str | Path | None = None,
 ) -> "Figure":
-    """Amplitudes of a quantity over time and frequency, below its history."""
+    """Plot the amplitudes of a quantity of a run over time and frequency, below its history.
+
+    Parameters
+    ----------
+    trajectory, quantity, point, axis, highest_hz, path
+        As for :func:`plot_spectrum`.
+    piece : float, optional
+        Length of the pieces that are transformed [s]; a thirty-second of the run by default.
+
+    Raises
+    ------
+    InputError
+        As :func:`plot_spectrum`.
+    """
     from matplotlib.colors import LogNorm
 
+    require_kind("plot_spectrogram", Trajectory, trajectory=trajectory)
     shown = history(trajectory, quantity, point, axis)
     found = spectrogram(trajectory.time, shown.values, piece=piece, overlap=0.9)
-    figure = new_figure(9.5, 5.6)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
-    time_unit, time_symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
-    unit, symbol = suitable_unit(float(np.abs(shown.values).max()), shown.unit)
-    drawn = resolved(trajectory)
-    add_note(figure, drawn)
-    line = history(drawn.trajectory, quantity, point, axis).values
-    upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
-               linewidth=0.8)
-    upper.set_ylabel(f"[{symbol}]")
-    upper.set_title(shown.title)
-    factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
-    top = float(found.values.max()) / factor or 1.0
-    image = lower.pcolormesh(
-        found.time / time_unit, found.frequency_hz, np.maximum(found.values / factor, 1e-300),
-        norm=LogNorm(top * 1e-4, top), cmap="viridis", shading="nearest", rasterized=True)
-    figure.colorbar(image, ax=lower, label=f"amplitude [{symbol}]", pad=0.01)
-    spread = found.values.max(axis=1)
-    lower.set_ylim(0.0, highest_hz or _end_of_content(found.frequency_hz, spread))
-    lower.set_xlim(trajectory.time[0] / time_unit, trajectory.time[-1] / time_unit)
-    lower.set_ylabel("frequency [Hz]")
-    lower.set_xlabel(f"time [{time_symbol}]")
-    lower.grid(False)
+    with new_figure(9.5, 5.6, path) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
+        time_unit, time_symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
+        unit, symbol = suitable_unit(float(np.abs(shown.values).max()), shown.unit)
+        drawn = resolved(trajectory)
+        add_note(figure, drawn)
+        line = history(drawn.trajectory, quantity, point, axis).values
+        upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
+                   linewidth=0.8)
+        upper.set_ylabel(f"[{symbol}]")
+        upper.set_title(shown.title)
+        factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
+        top = float(found.values.max()) / factor or 1.0
+        image = lower.pcolormesh(
+            found.time / time_unit, found.frequency_hz, np.maximum(found.values / factor, 1e-300),
+            norm=LogNorm(top * 1e-4, top), cmap="viridis", shading="nearest", rasterized=True)
+        figure.colorbar(image, ax=lower, label=f"amplitude [{symbol}]", pad=0.01)
+        spread = found.values.max(axis=1)
+        lower.set_ylim(0.0, highest_hz or _end_of_content(found.frequency_hz, spread))
+        lower.set_xlim(trajectory.time[0] / time_unit, trajectory.time[-1] / time_unit)
+        lower.set_ylabel("frequency [Hz]")
+        lower.set_xlabel(f"time [{time_symbol}]")
+        lower.grid(False)
     return figure
 
 
-def poincare_figure(
+def plot_poincare(
     trajectory: Trajectory,
     point: Point = "B",
     axis: str = "x",
     *,
     period: float | None = None,
     phase: float = 0.0,
+    path: str | Path | None = None,
 ) -> "Figure":
-    """Velocity over displacement once per period, over the phase curve of the motion."""
+    """Plot a Poincare section: the state of a point once per period, over its motion.
+
+    Parameters
+    ----------
+    trajectory, path
+        As for :func:`plot_spectrum`.
+    point : str, int or (x, y)
+        As for :meth:`Trajectory.displacement`.
+    axis : "x" or "y"
+        Direction of the motion.
+    period, phase
+        As for :func:`fecontact.analysis.periodicity.strobed_states`.
+
+    Raises
+    ------
+    InputError
+        For a point or an axis that does not exist, a system without a period, another suffix, or
+        a file that cannot be written.
+    """
+    require_kind("plot_poincare", Trajectory, trajectory=trajectory)
     if axis not in _AXES:
         raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
     row = _AXES.index(axis)
@@ -133,27 +191,39 @@ def poincare_figure(
         drawn.trajectory.displacement, drawn.trajectory.velocity))
     rows = trajectory._rows(point)[row]
     m = basis.modes
-    figure = new_figure(6.4, 5.2)
-    add_note(figure, drawn)
-    plane = figure.subplots()
-    unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
-    factor, rate_symbol = suitable_unit(float(np.abs(v).max()), "m/s")
-    plane.plot(x / unit, v / factor, color="#b9c4cc", linewidth=0.6, label="motion")
-    plane.plot(found.states[:, :m] @ rows / unit, found.states[:, m : 2 * m] @ rows / factor, "o",
-               markersize=3.5, color=COLOURS[1], label=f"once per {found.period:.4g} s")
-    plane.set_xlabel(f"displacement {axis} [{symbol}]")
-    plane.set_ylabel(f"velocity {axis} [{rate_symbol}]")
-    plane.legend(loc="best")
-    plane.set_title(f"{point_name(point)}, {count(len(found.time), 'point')}")
+    with new_figure(6.4, 5.2, path) as figure:
+        add_note(figure, drawn)
+        plane = figure.subplots()
+        unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
+        factor, rate_symbol = suitable_unit(float(np.abs(v).max()), "m/s")
+        plane.plot(x / unit, v / factor, color="#b9c4cc", linewidth=0.6, label="motion")
+        once = found.states[:, :m] @ rows / unit, found.states[:, m : 2 * m] @ rows / factor
+        plane.plot(*once, "o", markersize=3.5, color=COLOURS[1],
+                   label=f"once per {found.period:.4g} s")
+        plane.set_xlabel(f"displacement {axis} [{symbol}]")
+        plane.set_ylabel(f"velocity {axis} [{rate_symbol}]")
+        plane.legend(loc="best")
+        plane.set_title(f"{point_name(point)}, {count(len(found.time), 'point')}")
     return figure
 
 
-def friction_work_figure(trajectory: Trajectory) -> "Figure":
-    """Friction work per length of the face, and slip distance, at each contact node.
+def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
+    """Plot where on the face friction works: energy per length [J/m] and slip [m] of each node.
 
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
     constant coefficient is the friction work over that coefficient.
+
+    Parameters
+    ----------
+    trajectory, path
+        As for :func:`plot_spectrum`.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
     """
+    require_kind("plot_friction_work", Trajectory, trajectory=trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     basis = trajectory.system.basis
@@ -162,71 +232,90 @@ def friction_work_figure(trajectory: Trajectory) -> "Figure":
     touching = trajectory.normal_force != 0.0
     speed = np.abs(trajectory.slip_velocity) * touching
     slip = np.trapezoid(speed, trajectory.time, axis=0)
-    figure = new_figure(9.0, 5.6)
-    add_note(figure, drawn)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    unit, symbol = suitable_unit(float(np.abs(x).max() or length.max()), "m")
-    for panel, values, name, base in ((upper, work, "friction work per length", "N"),
-                                      (lower, slip, "slip in contact", "m")):
-        factor, label = suitable_unit(float(np.abs(values).max()), base)
-        panel.bar(x / unit, values / factor, width=0.92 * length / unit, color=COLOURS[0])
-        label = label.replace("N", "J/m") if base == "N" else label
-        panel.set_ylabel(f"{name} [{label}]")
-        panel.set_ylim(bottom=min(0.0, float(values.min()) / factor))
-    lower.set_xlabel(f"contact position x [{symbol}]")
-    figure.align_ylabels([upper, lower])
+    with new_figure(9.0, 5.6, path) as figure:
+        add_note(figure, drawn)
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        unit, symbol = suitable_unit(float(np.abs(x).max() or length.max()), "m")
+        for panel, values, name, base in ((upper, work, "friction work per length", "N"),
+                                          (lower, slip, "slip in contact", "m")):
+            factor, label = suitable_unit(float(np.abs(values).max()), base)
+            panel.bar(x / unit, values / factor, width=0.92 * length / unit, color=COLOURS[0])
+            label = label.replace("N", "J/m") if base == "N" else label
+            panel.set_ylabel(f"{name} [{label}]")
+            panel.set_ylim(bottom=min(0.0, float(values.min()) / factor))
+        lower.set_xlabel(f"contact position x [{symbol}]")
+        figure.align_ylabels([upper, lower])
     return figure
 
 
-def response_figure(
-    responses: Sequence[FrequencyResponse], labels: Sequence[str] = ()
+def plot_response(
+    responses: FrequencyResponse | Sequence[FrequencyResponse], labels: Sequence[str] = (), *,
+    path: str | Path | None = None,
 ) -> "Figure":
-    """Magnitude and phase of frequency responses over frequency; those of unstable states dashed.
+    """Plot magnitude and phase of frequency responses; those of unstable states are dashed.
 
     What is linearised about an unstable state is not what a measurement would show: the legend
     says so.
+
+    Parameters
+    ----------
+    responses : FrequencyResponse or sequence of them
+        What :func:`fecontact.analysis.frequency_response.frequency_response` found, all of one
+        kind.
+    labels : sequence of str
+        A name for each.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For nothing to draw, another suffix, or a file that cannot be written.
     """
+    require_kind("plot_response", (FrequencyResponse, Sequence), responses=responses)
+    if isinstance(responses, FrequencyResponse):
+        responses = [responses]
     if not responses:
         raise InputError("responses = [] holds nothing to draw; give at least one.")
     if not any(response.values.any() for response in responses):
         raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
                          f"{_place(responses[0].excitations[0])}; choose another point or "
                          f"direction.")
-    figure = new_figure(9.0, 6.0)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-    number = 0
-    many = len(responses) > 1 or responses[0].values[0].size > 1
-    colours = distinct_colours(sum(response.values[0].size for response in responses))
-    for index, response in enumerate(responses):
-        for r, seen in enumerate(response.responses):
-            for e, pushed in enumerate(response.excitations):
-                colour = colours[number]
-                number += 1
-                name = f"{_place(seen)} by {_place(pushed)}"
-                if index < len(labels):
-                    name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
-                        labels[index])
-                style = "-" if response.stable else DASHES
-                if not response.stable:
-                    name += f"\nUNSTABLE, not to be measured:\n{response.growth_in_words}"
-                f = response.frequency_hz
-                upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name,
+    with new_figure(9.0, 6.0, path) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+        number = 0
+        many = len(responses) > 1 or responses[0].values[0].size > 1
+        colours = distinct_colours(sum(response.values[0].size for response in responses))
+        for index, response in enumerate(responses):
+            for r, seen in enumerate(response.responses):
+                for e, pushed in enumerate(response.excitations):
+                    colour = colours[number]
+                    number += 1
+                    name = f"{_place(seen)} by {_place(pushed)}"
+                    if index < len(labels):
+                        name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
+                            labels[index])
+                    style = "-" if response.stable else DASHES
+                    if not response.stable:
+                        name += f"\nUNSTABLE, not to be measured:\n{response.growth_in_words}"
+                    f = response.frequency_hz
+                    upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name,
+                                   linestyle=style)
+                    lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0,
                                linestyle=style)
-                lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0,
-                           linestyle=style)
-    first = responses[0]
-    upper.set_ylabel(f"{first.kind} [{first.unit()}]")
-    if many or not first.stable:
-        upper.legend(loc="best")
-    else:
-        upper.set_title(f"{_place(first.responses[0])} by a force at "
-                        f"{_place(first.excitations[0])}")
-    lower.set_ylim(-190.0, 190.0)
-    lower.set_yticks([-180, -90, 0, 90, 180])
-    lower.set_ylabel("phase [°]")
-    lower.set_xlabel("frequency [Hz]")
-    _whole_width(lower, first)
-    figure.align_ylabels([upper, lower])
+        first = responses[0]
+        upper.set_ylabel(f"{first.kind} [{first.unit()}]")
+        if many or not first.stable:
+            upper.legend(loc="best")
+        else:
+            upper.set_title(f"{_place(first.responses[0])} by a force at "
+                            f"{_place(first.excitations[0])}")
+        lower.set_ylim(-190.0, 190.0)
+        lower.set_yticks([-180, -90, 0, 90, 180])
+        lower.set_ylabel("phase [°]")
+        lower.set_xlabel("frequency [Hz]")
+        _whole_width(lower, first)
+        figure.align_ylabels([upper, lower])
     return figure
 
 
@@ -257,139 +346,3 @@ def _envelope(frequency: Array, values: Array, end: float) -> tuple[Array, Array
     tops = np.arange(len(blocks)) * few + blocks.argmax(axis=1)
     return frequency[tops], values[tops]
 
-
-def plot_spectrum(
-    trajectory: Trajectory,
-    path: str | Path,
-    quantity: str = "velocity",
-    point: Point = "B",
-    axis: str = "x",
-    *,
-    density: bool = False,
-    highest_hz: float | None = None,
-) -> Path:
-    """Plot the spectrum of a quantity of a run at evenly spaced output times.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        The run, transients cut off by :meth:`Trajectory.between`.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-    quantity, point, axis
-        As for :func:`fecontact.analysis.histories.history`.
-    density : bool
-        Power spectral density by Welch's method in the place of amplitudes.
-    highest_hz : float, optional
-        End of the axis [Hz].
-
-    Raises
-    ------
-    InputError
-        For a quantity or a point that does not exist, uneven times, another suffix, or a file
-        that cannot be written.
-    """
-    return save_figure(path, lambda: spectrum_figure(
-        trajectory, quantity, point, axis, density=density, highest_hz=highest_hz))
-
-
-def plot_spectrogram(
-    trajectory: Trajectory,
-    path: str | Path,
-    quantity: str = "velocity",
-    point: Point = "B",
-    axis: str = "x",
-    *,
-    piece: float | None = None,
-    highest_hz: float | None = None,
-) -> Path:
-    """Plot the amplitudes of a quantity of a run over time and frequency.
-
-    Parameters
-    ----------
-    trajectory, path, quantity, point, axis, highest_hz
-        As for :func:`plot_spectrum`.
-    piece : float, optional
-        Length of the pieces that are transformed [s]; a thirty-second of the run by default.
-
-    Raises
-    ------
-    InputError
-        As :func:`plot_spectrum`.
-    """
-    return save_figure(path, lambda: spectrogram_figure(
-        trajectory, quantity, point, axis, piece=piece, highest_hz=highest_hz))
-
-
-def plot_poincare(
-    trajectory: Trajectory,
-    path: str | Path,
-    point: Point = "B",
-    axis: str = "x",
-    *,
-    period: float | None = None,
-    phase: float = 0.0,
-) -> Path:
-    """Plot a Poincare section: the state of a point once per period, over its motion.
-
-    Parameters
-    ----------
-    trajectory, path
-        As for :func:`plot_spectrum`.
-    point : str, int or (x, y)
-        As for :meth:`Trajectory.displacement`.
-    axis : "x" or "y"
-        Direction of the motion.
-    period, phase
-        As for :func:`fecontact.analysis.periodicity.strobed_states`.
-
-    Raises
-    ------
-    InputError
-        For a point or an axis that does not exist, a system without a period, another suffix, or
-        a file that cannot be written.
-    """
-    return save_figure(path, lambda: poincare_figure(
-        trajectory, point, axis, period=period, phase=phase))
-
-
-def plot_friction_work(trajectory: Trajectory, path: str | Path) -> Path:
-    """Plot where on the face friction works: energy per length [J/m] and slip [m] of each node.
-
-    Parameters
-    ----------
-    trajectory, path
-        As for :func:`plot_spectrum`.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    return save_figure(path, lambda: friction_work_figure(trajectory))
-
-
-def plot_response(
-    responses: FrequencyResponse | Sequence[FrequencyResponse],
-    path: str | Path,
-    labels: Sequence[str] = (),
-) -> Path:
-    """Plot magnitude and phase of frequency responses.
-
-    Parameters
-    ----------
-    responses : FrequencyResponse or sequence of them
-        What :func:`fecontact.analysis.frequency_response.frequency_response` found, all of one
-        kind.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-    labels : sequence of str
-        A name for each.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    several = [responses] if isinstance(responses, FrequencyResponse) else list(responses)
-    return save_figure(path, lambda: response_figure(several, labels))

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
-from fecontact.output.plots.style import distinct_colours, new_figure, save_figure
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import distinct_colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,71 +19,63 @@ _UNSETTLED = "#ffffff"
 
 
 def plot_basins(
-    found: "Basins", path: str | Path, *, x_label: str | None = None, y_label: str | None = None,
-    rows: ArrayLike | None = None,
-) -> Path:
+    found: "Basins", *, x_label: str | None = None, y_label: str | None = None,
+    rows: ArrayLike | None = None, path: str | Path | None = None,
+) -> "Figure":
     """Plot to which motion each start leads, with the share of each.
 
     Parameters
     ----------
     found : Basins
         Of :func:`fecontact.basins`; the first axis goes along x.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
     x_label, y_label : str, optional
         Labels of the axes, with units.
     rows : (2, size) array, optional
         Rows that give the two quantities of the plane from a state
         (:meth:`fecontact.bifurcation.attractors.basins.Axis.row`); with them the sections of the
         motions are marked.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
     InputError
         For another suffix, or a file that cannot be written.
     """
-    from fecontact.bifurcation.attractors.basins import Basins
-
-    require_kind("plot_basins", Basins, found=found)
-    return save_figure(path, lambda: basins_figure(found, x_label, y_label, rows))
-
-
-def basins_figure(
-    found: "Basins", x_label: str | None = None, y_label: str | None = None,
-    rows: ArrayLike | None = None,
-) -> "Figure":
-    """See :func:`plot_basins`."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    figure = new_figure(8.0, 5.2)
-    axis = figure.subplots()
-    count = len(found.attractors)
-    colours = [_UNSETTLED, *distinct_colours(count)]
-    axis.pcolormesh(found.first, found.second, found.label.T, shading="nearest", alpha=0.75,
-                    cmap=ListedColormap(colours), rasterized=True,
-                    norm=BoundaryNorm(np.arange(-1.5, count + 0.5), count + 1))
-    box = axis.get_xlim(), axis.get_ylim()
-    handles: list[Line2D | Patch] = [
-        Patch(color=colours[k + 1], alpha=0.75, label=f"{_described(one.kind, one.points)}, "
-                                                      f"{100.0 * one.share:.3g} %")
-        for k, one in enumerate(found.attractors)]
-    lost = float((found.label < 0).mean())
-    if lost:
-        handles.append(Patch(facecolor=_UNSETTLED, edgecolor="#8a8a8a",
-                             label=f"no end, {100.0 * lost:.3g} %"))
-    if rows is not None:
-        chosen = np.asarray(rows, dtype=float)
-        for k, one in enumerate(found.attractors):
-            places = one.points @ chosen.T
-            axis.plot(places[:, 0], places[:, 1], "o", color=colours[k + 1], markersize=6.0,
-                      markeredgecolor="#202020", linestyle="none")
-        handles.append(Line2D([], [], color="#ffffff", marker="o", markeredgecolor="#202020",
-                              linestyle="none", label="its section"))
-    axis.set(xlim=box[0], ylim=box[1], xlabel=x_label or "", ylabel=y_label or "")
-    axis.grid(False)
-    axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    from fecontact.bifurcation.attractors.basins import Basins
+
+    require_kind("plot_basins", Basins, found=found)
+    with new_figure(8.0, 5.2, path) as figure:
+        axis = figure.subplots()
+        count = len(found.attractors)
+        colours = [_UNSETTLED, *distinct_colours(count)]
+        axis.pcolormesh(found.first, found.second, found.label.T, shading="nearest", alpha=0.75,
+                        cmap=ListedColormap(colours), rasterized=True,
+                        norm=BoundaryNorm(np.arange(-1.5, count + 0.5), count + 1))
+        box = axis.get_xlim(), axis.get_ylim()
+        handles: list[Line2D | Patch] = [
+            Patch(color=colours[k + 1], alpha=0.75, label=f"{_described(one.kind, one.points)}, "
+                                                          f"{100.0 * one.share:.3g} %")
+            for k, one in enumerate(found.attractors)]
+        lost = float((found.label < 0).mean())
+        if lost:
+            handles.append(Patch(facecolor=_UNSETTLED, edgecolor="#8a8a8a",
+                                 label=f"no end, {100.0 * lost:.3g} %"))
+        if rows is not None:
+            chosen = np.asarray(rows, dtype=float)
+            for k, one in enumerate(found.attractors):
+                places = one.points @ chosen.T
+                axis.plot(places[:, 0], places[:, 1], "o", color=colours[k + 1], markersize=6.0,
+                          markeredgecolor="#202020", linestyle="none")
+            handles.append(Line2D([], [], color="#ffffff", marker="o", markeredgecolor="#202020",
+                                  linestyle="none", label="its section"))
+        axis.set(xlim=box[0], ylim=box[1], xlabel=x_label or "", ylabel=y_label or "")
+        axis.grid(False)
+        axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
 
 

@@ -12,7 +12,8 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.output.plots.diagram_insets import DOTS, draw_beneath, draw_insets, main_axis
-from fecontact.output.plots.style import DASHES, distinct_colours, new_figure, save_figure
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import DASHES, distinct_colours
 from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
@@ -36,19 +37,18 @@ _SPECIAL = {
 
 
 def plot_branches(
-    branches: "Branch | Sequence[Branch]", path: str | Path, y: Quantity = 0, *,
+    branches: "Branch | Sequence[Branch]", y: Quantity = 0, *,
     x: Quantity = "parameter", x_label: str | None = None, y_label: str | None = None,
     names: Sequence[str] = (), beneath: "BruteForce | None" = None,
     observe: tuple[str | int, str] = ("B", "x"), insets: "Sequence[Inset]" = (),
-) -> Path:
+    path: str | Path | None = None,
+) -> "Figure":
     """Plot branches: stable parts solid, unstable ones dashed, special points marked and labelled.
 
     Parameters
     ----------
     branches : Branch or sequence of Branch
         Each gets its own colour, those of one name the same.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
     y, x : str, int or callable
         What to draw: 'parameter', the name of a stored number, the number of a state counted from
         0, or a function of a :class:`fecontact.bifurcation.continuation.branch.BranchPoint`. For y
@@ -68,6 +68,8 @@ def plot_branches(
     insets : sequence of Inset
         Phase planes of chosen points, drawn above the diagram; see
         :func:`fecontact.output.plots.diagram_insets.phase_inset`.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
@@ -77,55 +79,44 @@ def plot_branches(
     from fecontact.bifurcation.continuation.branch import Branch
 
     require_kind("plot_branches", (Branch, Sequence), branches=branches)
-    several = [branches] if isinstance(branches, Branch) else list(branches)
-    for branch in several:
+    branches = [branches] if isinstance(branches, Branch) else list(branches)
+    for branch in branches:
         require_kind("plot_branches", Branch, branch=branch)
-    if not several:
+    if not branches:
         raise InputError("branches = [] holds nothing to draw; give at least one Branch.")
-    return save_figure(path, lambda: branches_figure(several, y, x, x_label, y_label, names,
-                                                     beneath, observe, insets))
-
-
-def branches_figure(
-    branches: "Sequence[Branch]", y: Quantity = 0, x: Quantity = "parameter",
-    x_label: str | None = None, y_label: str | None = None, names: Sequence[str] = (),
-    beneath: "BruteForce | None" = None, observe: tuple[str | int, str] = ("B", "x"),
-    insets: "Sequence[Inset]" = (),
-) -> "Figure":
-    """See :func:`plot_branches`."""
-    figure = new_figure(8.0, 7.2 if insets else 5.2)
-    axis = main_axis(figure, insets)
-    dots = draw_beneath(axis, beneath, observe)
-    known: dict[str, list[tuple[float, float]]] = {}
-    dashed = False
-    if len(branches) > 1:
-        names = [*names, *(f"branch {k + 1}" for k in range(len(names), len(branches)))]
-    groups = [*names[: len(branches)], *range(len(names), len(branches))]
-    # One more, as one of them is that of runs.
-    apart = [colour for colour in distinct_colours(len(set(groups)) + 1)
-             if colour not in DOTS.values()]
-    colours = dict(zip(dict.fromkeys(groups), apart, strict=False))
-    for group, branch in zip(groups, branches, strict=True):
-        places, curves = _values(branch, x), _values(branch, y, rows=True)
-        stable = _stable_pieces(branch)
-        dashed |= not stable.all()
-        colour = colours[group]
-        heights = curves if curves.ndim == 1 else curves[:, 0]
-        for first, last in _runs(stable):
-            axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
-                      linewidth=1.8 if stable[first] else 1.2,
-                      linestyle="-" if stable[first] else DASHES)
-        for index, point in enumerate(branch.points):
-            if point.kind is not None:
-                known.setdefault(point.kind, []).append((places[index], heights[index]))
-    axis.set_xlabel(x_label or _label(x, branches[0].name))
-    axis.set_ylabel(y_label or _label(y, branches[0].name))
-    axis.margins(x=0.02, y=0.06)
-    axis.autoscale_view()
-    axis.ticklabel_format(axis="y", scilimits=(-3, 5))
-    _mark(axis, known)
-    draw_insets(figure, axis, insets)
-    _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
+    with new_figure(8.0, 7.2 if insets else 5.2, path) as figure:
+        axis = main_axis(figure, insets)
+        dots = draw_beneath(axis, beneath, observe)
+        known: dict[str, list[tuple[float, float]]] = {}
+        dashed = False
+        if len(branches) > 1:
+            names = [*names, *(f"branch {k + 1}" for k in range(len(names), len(branches)))]
+        groups = [*names[: len(branches)], *range(len(names), len(branches))]
+        # One more, as one of them is that of runs.
+        apart = [colour for colour in distinct_colours(len(set(groups)) + 1)
+                 if colour not in DOTS.values()]
+        colours = dict(zip(dict.fromkeys(groups), apart, strict=False))
+        for group, branch in zip(groups, branches, strict=True):
+            places, curves = _values(branch, x), _values(branch, y, rows=True)
+            stable = _stable_pieces(branch)
+            dashed |= not stable.all()
+            colour = colours[group]
+            heights = curves if curves.ndim == 1 else curves[:, 0]
+            for first, last in _runs(stable):
+                axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
+                          linewidth=1.8 if stable[first] else 1.2,
+                          linestyle="-" if stable[first] else DASHES)
+            for index, point in enumerate(branch.points):
+                if point.kind is not None:
+                    known.setdefault(point.kind, []).append((places[index], heights[index]))
+        axis.set_xlabel(x_label or _label(x, branches[0].name))
+        axis.set_ylabel(y_label or _label(y, branches[0].name))
+        axis.margins(x=0.02, y=0.06)
+        axis.autoscale_view()
+        axis.ticklabel_format(axis="y", scilimits=(-3, 5))
+        _mark(axis, known)
+        draw_insets(figure, axis, insets)
+        _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
     return figure
 
 

@@ -1,11 +1,13 @@
 """Figures of the modes of a body: their shapes, and how they converge."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-from fecontact.output.plots.style import new_figure
+from fecontact.output.plots.figure import new_figure
 from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import Field, ModalBasis
 
@@ -18,8 +20,29 @@ _VISIBLE = 0.07  # largest displacement drawn, as a part of the body's extent
 _WIDTH = 10.0  # inches
 
 
-def modes_figure(basis: ModalBasis, count: int = 12) -> "Figure":
-    """The first modes: deformed body, coloured by amplitude, over its undeformed outline."""
+def plot_modes(
+    basis: ModalBasis, *, count: int = 12, path: str | Path | None = None
+) -> "Figure":
+    """Plot the first modes: deformed body, coloured by amplitude, over its undeformed outline.
+
+    Each is scaled to the same largest displacement.
+
+    Parameters
+    ----------
+    basis : ModalBasis
+        With shapes over the body.
+    count : int
+        Largest number of modes.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For a basis without shapes, a count below one, another suffix, or a file that cannot be
+        written.
+    """
+    require_kind("plot_modes", ModalBasis, basis=basis)
     if basis.field is None:
         raise InputError("These modes cannot be drawn: the modal basis holds no shapes over the "
                          "body; make it with ElasticBody.modal_basis.")
@@ -32,40 +55,55 @@ def modes_figure(basis: ModalBasis, count: int = 12) -> "Figure":
     columns = min(shown, 6, int(np.ceil(np.sqrt(1.8 * shown / aspect))))
     rows = -(-shown // columns)
     height = min(_WIDTH / columns / aspect, 3.5)
-    figure = new_figure(_WIDTH, rows * (height + 0.4) + 0.8)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for axis in grid.flat:
-        axis.set_axis_off()
-    for mode, axis in enumerate(grid.flat[:shown]):
-        drawn = _draw_mode(axis, field, mode, reach)
-        hertz = basis.frequencies_hz[mode]
-        axis.set_title(f"mode {mode}: " + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
-    figure.colorbar(drawn, ax=grid, location="bottom", label="amplitude, relative to the largest",
-                    aspect=50, shrink=0.5, pad=0.02)
+    with new_figure(_WIDTH, rows * (height + 0.4) + 0.8, path) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for axis in grid.flat:
+            axis.set_axis_off()
+        for mode, axis in enumerate(grid.flat[:shown]):
+            drawn = _draw_mode(axis, field, mode, reach)
+            hertz = basis.frequencies_hz[mode]
+            axis.set_title(f"mode {mode}: " + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
+        figure.colorbar(drawn, ax=grid, location="bottom", aspect=50, shrink=0.5, pad=0.02,
+                        label="amplitude, relative to the largest")
     return figure
 
 
-def convergence_figure(result: ModeConvergence) -> "Figure":
-    """Frequencies and contact compliance against unknowns, missing compliance against modes."""
-    figure = new_figure(1.2 * _WIDTH, 4.0)
-    meshes, modes = figure.subplots(1, 2)
-    sizes = result.unknowns[:-1]
-    change = np.abs(result.frequencies_hz[:-1] / result.frequencies_hz[-1] - 1.0)
-    for i, values in enumerate(change.T):
-        hertz = result.frequencies_hz[-1, i]
-        meshes.loglog(sizes, values, "o-", label=f"f{i + 1} = {hertz:.5g} Hz")
-    compliance = np.abs(result.compliance[:-1] / result.compliance[-1] - 1.0)
-    for values, axis, style in zip(compliance.T, "xy", ("s--", "^--"), strict=True):
-        meshes.loglog(sizes, values, style, color="#707070", label=f"contact compliance in {axis}")
-    meshes.set(xlabel="unknowns of the mesh", ylabel="relative distance from the finest mesh")
-    meshes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    for values, axis, style in zip(result.missing.T, "xy", ("s-", "^-"), strict=True):
-        modes.semilogx(result.modes, 100.0 * values, style, label=f"in {axis}")
-    modes.set(xlabel="modes", ylabel="missing contact compliance, worst node [%]")
-    modes.set_xticks(result.modes, [str(count) for count in result.modes])
-    modes.minorticks_off()
-    modes.set_ylim(bottom=0.0)
-    modes.legend()
+def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None) -> "Figure":
+    """Plot how frequencies and contact compliance change with the mesh and the modes.
+
+    Parameters
+    ----------
+    result : ModeConvergence
+        What :func:`fecontact.reduction.convergence.mode_convergence` found.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_convergence", ModeConvergence, result=result)
+    with new_figure(1.2 * _WIDTH, 4.0, path) as figure:
+        meshes, modes = figure.subplots(1, 2)
+        sizes = result.unknowns[:-1]
+        change = np.abs(result.frequencies_hz[:-1] / result.frequencies_hz[-1] - 1.0)
+        for i, values in enumerate(change.T):
+            hertz = result.frequencies_hz[-1, i]
+            meshes.loglog(sizes, values, "o-", label=f"f{i + 1} = {hertz:.5g} Hz")
+        compliance = np.abs(result.compliance[:-1] / result.compliance[-1] - 1.0)
+        for values, axis, style in zip(compliance.T, "xy", ("s--", "^--"), strict=True):
+            meshes.loglog(sizes, values, style, color="#707070",
+                          label=f"contact compliance in {axis}")
+        meshes.set(xlabel="unknowns of the mesh", ylabel="relative distance from the finest mesh")
+        meshes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        for values, axis, style in zip(result.missing.T, "xy", ("s-", "^-"), strict=True):
+            modes.semilogx(result.modes, 100.0 * values, style, label=f"in {axis}")
+        modes.set(xlabel="modes", ylabel="missing contact compliance, worst node [%]")
+        modes.set_xticks(result.modes, [str(count) for count in result.modes])
+        modes.minorticks_off()
+        modes.set_ylim(bottom=0.0)
+        modes.legend()
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Plots as files: PNG, PDF or SVG, written whole or not at all."""
+"""Plots of a run: histories, phase planes, contact along the face, energies."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,19 +14,15 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.modes import convergence_figure, modes_figure
+from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import (
     COLOURS,
     ENERGY_COLOURS,
     STATE_COLOURS,
     add_note,
     distinct_colours,
-    new_figure,
     state_names,
 )
-from fecontact.output.plots.style import save_figure as _save
-from fecontact.reduction.convergence import ModeConvergence
-from fecontact.reduction.modal_basis import ModalBasis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,37 +35,59 @@ _AXES = ("x", "y")
 _LINE_BINS = 2000  # each drawn by its lowest and highest value
 _MAP_COLUMNS = 1500
 
-def history_figure(trajectory: Trajectory, points: Sequence[Point] = ()) -> "Figure":
-    """Displacements and velocities of points, and the sums of the contact forces, over time."""
+
+def plot_history(
+    trajectory: Trajectory, points: Sequence[Point] = (), *, path: str | Path | None = None
+) -> "Figure":
+    """Plot displacements and velocities of points, and the total contact forces, over time.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    points : sequence of str, int or (x, y)
+        As for :meth:`Trajectory.displacement`; B and the contact node in the middle by default.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For a point that does not exist, another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_history", Trajectory, trajectory=trajectory)
     require_kind("plot_history", Sequence, points=points)
+    if isinstance(points, str):
+        raise InputError(f"plot_history: points = {points!r} must be several points, such as "
+                         f"['B', 0]; a file to write is given by path={points!r}.")
     points = tuple(points) or _usual_points(trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     colours = distinct_colours(len(points))
-    figure = new_figure(10.0, 7.5)
-    add_note(figure, drawn)
-    axes = figure.subplots(3, 2, sharex=True)
-    time = _time(axes[2], trajectory)
-    for column, (quantity, unit, values) in enumerate((
-        ("displacement", "m", [trajectory.displacement(point) for point in points]),
-        ("velocity", "m/s", [trajectory.velocity(point) for point in points]),
-    )):
-        values = _without_round_off(values)
-        for row, name in enumerate(_AXES):
-            factor = _labelled(axes[row, column], f"{quantity} {name}", unit,
-                               *(value[:, row] for value in values))
-            for number, (point, value) in enumerate(zip(points, values, strict=True)):
-                axes[row, column].plot(*thinned(time, value[:, row] / factor),
-                                       color=colours[number],
-                                       linewidth=1.2 if number else 2.0, label=point_name(point))
-    for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
-                               (axes[2, 1], "friction force", trajectory.friction_force)):
-        total = forces.sum(axis=1)
-        factor = _labelled(axis, f"total {name}", "N", total)
-        axis.plot(*thinned(time, total / factor), color="#303030")
-    figure.align_ylabels(axes)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center",
-                  ncols=max(1, min(len(points), 6)))
+    with new_figure(10.0, 7.5, path) as figure:
+        add_note(figure, drawn)
+        axes = figure.subplots(3, 2, sharex=True)
+        time = _time(axes[2], trajectory)
+        for column, (quantity, unit, values) in enumerate((
+            ("displacement", "m", [trajectory.displacement(point) for point in points]),
+            ("velocity", "m/s", [trajectory.velocity(point) for point in points]),
+        )):
+            values = _without_round_off(values)
+            for row, name in enumerate(_AXES):
+                factor = _labelled(axes[row, column], f"{quantity} {name}", unit,
+                                   *(value[:, row] for value in values))
+                for number, (point, value) in enumerate(zip(points, values, strict=True)):
+                    axes[row, column].plot(
+                        *thinned(time, value[:, row] / factor), color=colours[number],
+                        linewidth=1.2 if number else 2.0, label=point_name(point))
+        for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
+                                   (axes[2, 1], "friction force", trajectory.friction_force)):
+            total = forces.sum(axis=1)
+            factor = _labelled(axis, f"total {name}", "N", total)
+            axis.plot(*thinned(time, total / factor), color="#303030")
+        figure.align_ylabels(axes)
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center",
+                      ncols=max(1, min(len(points), 6)))
     return figure
 
 
@@ -79,111 +97,165 @@ def _without_round_off(values: list[Array]) -> list[Array]:
     return [np.where(np.abs(value).max(axis=0) > 1e-9 * largest, value, 0.0) for value in values]
 
 
-def phase_figure(trajectory: Trajectory, point: Point = "B", axis: str = "x") -> "Figure":
-    """Velocity of a point over its displacement, with the ground's speed."""
+def plot_phase(
+    trajectory: Trajectory, point: Point = "B", axis: str = "x", *,
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot the velocity of a point over its displacement, and the speed of the ground.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    point : str, int or (x, y)
+        As for :meth:`Trajectory.displacement`.
+    axis : "x" or "y"
+        Direction of the motion.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For a point or an axis that does not exist, another suffix, or a file that cannot be
+        written.
+    """
+    require_kind("plot_phase", Trajectory, trajectory=trajectory)
     if axis not in _AXES:
         raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
     row = _AXES.index(axis)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    figure = new_figure(6.4, 5.2)
-    add_note(figure, drawn)
-    plane = figure.subplots()
-    x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
-    unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
-    plane.set_xlabel(f"displacement {axis} [{symbol}]")
-    factor = _labelled(plane, f"velocity {axis}", "m/s", v)
-    plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
-    plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
-    ground = trajectory.system.ground
-    speed = ground.speed if ground.motion is None else 0.0
-    # A ground that is much faster would leave a line of the curve.
-    if row == 0 and 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
-        plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
-                      label="ground")
-    plane.legend(loc="best")
-    plane.set_title(point_name(point))
+    with new_figure(6.4, 5.2, path) as figure:
+        add_note(figure, drawn)
+        plane = figure.subplots()
+        x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
+        unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
+        plane.set_xlabel(f"displacement {axis} [{symbol}]")
+        factor = _labelled(plane, f"velocity {axis}", "m/s", v)
+        plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
+        plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
+        ground = trajectory.system.ground
+        speed = ground.speed if ground.motion is None else 0.0
+        # A ground that is much faster would leave a line of the curve.
+        if row == 0 and 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
+            plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
+                          label="ground")
+        plane.legend(loc="best")
+        plane.set_title(point_name(point))
     return figure
 
 
-def contact_map_figure(trajectory: Trajectory) -> "Figure":
-    """Pressure and state of the contact nodes over time and position.
+def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
+    """Plot pressure [N/m] and state of the contact nodes over time and position.
 
-    The band of a node is as wide as its tributary length; places without contact face stay blank.
-    In a run without any friction force the states are 'open' and 'contact'.
+    In runs with more output times than columns of the picture, a column shows the largest
+    pressure and the most frequent state of its times. The band of a node is as wide as its
+    tributary length; places without contact face stay blank. States are open, stick and slip, or
+    open and contact if all friction forces of the run are zero.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
+    require_kind("plot_contact_map", Trajectory, trajectory=trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    figure = new_figure(10.0, 6.2)
-    add_note(figure, drawn)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    columns = np.linspace(trajectory.time[0], trajectory.time[-1], _MAP_COLUMNS + 1)[:-1]
-    starts = np.unique(np.searchsorted(trajectory.time, columns))
-    edges = _time_edges(trajectory.time, starts)
-    time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
-    places, nodes, place_label = _place_edges(trajectory)
+    with new_figure(10.0, 6.2, path) as figure:
+        add_note(figure, drawn)
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        columns = np.linspace(trajectory.time[0], trajectory.time[-1], _MAP_COLUMNS + 1)[:-1]
+        starts = np.unique(np.searchsorted(trajectory.time, columns))
+        edges = _time_edges(trajectory.time, starts)
+        time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
+        places, nodes, place_label = _place_edges(trajectory)
 
-    pressure = np.maximum.reduceat(trajectory.pressure, starts, axis=0)
-    factor, pressure_symbol = suitable_unit(float(pressure.max()), "N/m")
-    image = upper.pcolormesh(edges / time_unit, places, _rows(pressure / factor, nodes),
-                             cmap="viridis", vmin=0.0, vmax=float(pressure.max()) / factor or 1.0)
-    figure.colorbar(image, ax=upper, label=f"contact pressure [{pressure_symbol}]", pad=0.01)
+        pressure = np.maximum.reduceat(trajectory.pressure, starts, axis=0)
+        factor, pressure_symbol = suitable_unit(float(pressure.max()), "N/m")
+        image = upper.pcolormesh(
+            edges / time_unit, places, _rows(pressure / factor, nodes), cmap="viridis", vmin=0.0,
+            vmax=float(pressure.max()) / factor or 1.0)
+        figure.colorbar(image, ax=upper, label=f"contact pressure [{pressure_symbol}]", pad=0.01)
 
-    states = state_names(trajectory)
-    state = np.minimum(trajectory.contact_state, len(states) - 1)
-    spans = _spans(trajectory.time)[:, None]
-    counts = np.stack([np.add.reduceat((state == k) * spans, starts, axis=0)
-                       for k in range(len(states))])
-    # A column of several times shows contact if there was any, as the pressure above it does.
-    counts[0] *= counts[1:].sum(axis=0) == 0
-    image = lower.pcolormesh(edges / time_unit, places, _rows(counts.argmax(axis=0), nodes),
-                             cmap=ListedColormap([_MAP_COLOURS[name] for name in states]),
-                             norm=BoundaryNorm(np.arange(len(states) + 1) - 0.5, len(states)))
-    bar = figure.colorbar(image, ax=lower, label="state", pad=0.01, ticks=range(len(states)))
-    bar.ax.set_yticklabels(states)
-    bar.ax.tick_params(length=0)
-    figure.align_ylabels([upper, lower])
-    lower.set_xlabel(f"time [{symbol}]")
-    for axis in (upper, lower):
-        axis.set_ylabel(place_label)
-        axis.grid(False)
-        if len(places) == 2:
-            axis.set_yticks([0.5 * (places[0] + places[1])], ["0"])
+        states = state_names(trajectory)
+        state = np.minimum(trajectory.contact_state, len(states) - 1)
+        spans = _spans(trajectory.time)[:, None]
+        counts = np.stack([np.add.reduceat((state == k) * spans, starts, axis=0)
+                           for k in range(len(states))])
+        # A column of several times shows contact if there was any, as the pressure above it does.
+        counts[0] *= counts[1:].sum(axis=0) == 0
+        image = lower.pcolormesh(edges / time_unit, places, _rows(counts.argmax(axis=0), nodes),
+                                 cmap=ListedColormap([_MAP_COLOURS[name] for name in states]),
+                                 norm=BoundaryNorm(np.arange(len(states) + 1) - 0.5, len(states)))
+        bar = figure.colorbar(image, ax=lower, label="state", pad=0.01, ticks=range(len(states)))
+        bar.ax.set_yticklabels(states)
+        bar.ax.tick_params(length=0)
+        figure.align_ylabels([upper, lower])
+        lower.set_xlabel(f"time [{symbol}]")
+        for axis in (upper, lower):
+            axis.set_ylabel(place_label)
+            axis.grid(False)
+            if len(places) == 2:
+                axis.set_yticks([0.5 * (places[0] + places[1])], ["0"])
     return figure
 
 
-def energies_figure(trajectory: Trajectory) -> "Figure":
-    """Stored energies, work put in and energy lost over time; terms that stay zero are left out."""
+def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
+    """Plot stored energies, work put in and energy lost [J] over time.
+
+    Terms that stay zero are left out.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_energies", Trajectory, trajectory=trajectory)
     imbalance = trajectory.energies.imbalance
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     energies = trajectory.energies
-    figure = new_figure(10.0, 8.0)
-    add_note(figure, drawn)
-    axes = figure.subplots(3, 1, sharex=True)
-    time = _time(axes[2:], trajectory)
-    panels = (
-        ("stored energy", energies.stored, ("kinetic", "elastic", "drive_spring", "contact")),
-        ("work put in", energies.work, ("drive_work", "ground_work", "belt_work", "load_work")),
-        ("energy lost", energies.lost,
-         ("modal_damping", "dashpots", "contact_damping", "friction")),
-    )
-    for axis, (title, total, names) in zip(axes, panels, strict=True):
-        terms = {name: getattr(energies, name) for name in names}
-        shown = {name: term for name, term in terms.items() if term.any()}
-        factor = _labelled(axis, title, "J", total, *shown.values())
-        for name, term in shown.items():
-            axis.plot(*thinned(time, term / factor), color=ENERGY_COLOURS[name],
-                      label=name.removesuffix("_work").replace("_", " "))
-        if not shown:
-            axis.set(ylim=(-1.0, 1.0), yticks=[0.0])
-        axis.plot(*thinned(time, total / factor), color="#303030", linewidth=1.8, label="total",
-                  zorder=1.5)
-        axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    figure.align_ylabels(axes)
-    axes[0].set_title(f"error of the energy balance: {imbalance:.1e} of the largest term")
+    with new_figure(10.0, 8.0, path) as figure:
+        add_note(figure, drawn)
+        axes = figure.subplots(3, 1, sharex=True)
+        time = _time(axes[2:], trajectory)
+        panels = (
+            ("stored energy", energies.stored, ("kinetic", "elastic", "drive_spring", "contact")),
+            ("work put in", energies.work, ("drive_work", "ground_work", "belt_work", "load_work")),
+            ("energy lost", energies.lost,
+             ("modal_damping", "dashpots", "contact_damping", "friction")),
+        )
+        for axis, (title, total, names) in zip(axes, panels, strict=True):
+            terms = {name: getattr(energies, name) for name in names}
+            shown = {name: term for name, term in terms.items() if term.any()}
+            factor = _labelled(axis, title, "J", total, *shown.values())
+            for name, term in shown.items():
+                axis.plot(*thinned(time, term / factor), color=ENERGY_COLOURS[name],
+                          label=name.removesuffix("_work").replace("_", " "))
+            if not shown:
+                axis.set(ylim=(-1.0, 1.0), yticks=[0.0])
+            axis.plot(*thinned(time, total / factor), color="#303030", linewidth=1.8, label="total",
+                      zorder=1.5)
+            axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        figure.align_ylabels(axes)
+        axes[0].set_title(f"error of the energy balance: {imbalance:.1e} of the largest term")
     return figure
 
 
@@ -309,132 +381,3 @@ def _rows(values: NDArray[Any], nodes: NDArray[np.intp]) -> "np.ma.MaskedArray[A
     return np.ma.masked_where(np.repeat(nodes[:, None] < 0, len(values), axis=1),
                               values.T[nodes])
 
-
-def plot_history(trajectory: Trajectory, path: str | Path, points: Sequence[Point] = ()) -> Path:
-    """Plot displacements and velocities of points, and the total contact forces, over time.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        The run.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-    points : sequence of str, int or (x, y)
-        As for :meth:`Trajectory.displacement`; B and the contact node in the middle by default.
-
-    Raises
-    ------
-    InputError
-        For a point that does not exist, another suffix, or a file that cannot be written.
-    """
-    require_kind("plot_history", Trajectory, trajectory=trajectory)
-    return _save(path, lambda: history_figure(trajectory, points))
-
-
-def plot_phase(
-    trajectory: Trajectory, path: str | Path, point: Point = "B", axis: str = "x"
-) -> Path:
-    """Plot the velocity of a point over its displacement, and the speed of the ground.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        The run.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-    point : str, int or (x, y)
-        As for :meth:`Trajectory.displacement`.
-    axis : "x" or "y"
-        Direction of the motion.
-
-    Raises
-    ------
-    InputError
-        For a point or an axis that does not exist, another suffix, or a file that cannot be
-        written.
-    """
-    require_kind("plot_phase", Trajectory, trajectory=trajectory)
-    return _save(path, lambda: phase_figure(trajectory, point, axis))
-
-
-def plot_contact_map(trajectory: Trajectory, path: str | Path) -> Path:
-    """Plot pressure [N/m] and state of the contact nodes over time and position.
-
-    In runs with more output times than columns of the picture, a column shows the largest
-    pressure and the most frequent state of its times. The band of a node is as wide as its
-    tributary length; places without contact face stay blank. States are open, stick and slip, or
-    open and contact if all friction forces of the run are zero.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        The run.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    require_kind("plot_contact_map", Trajectory, trajectory=trajectory)
-    return _save(path, lambda: contact_map_figure(trajectory))
-
-
-def plot_energies(trajectory: Trajectory, path: str | Path) -> Path:
-    """Plot stored energies, work put in and energy lost [J] over time.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        The run.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    require_kind("plot_energies", Trajectory, trajectory=trajectory)
-    return _save(path, lambda: energies_figure(trajectory))
-
-
-def plot_modes(basis: ModalBasis, path: str | Path, *, count: int = 12) -> Path:
-    """Plot the shapes of the first modes, each scaled to the same largest displacement.
-
-    Parameters
-    ----------
-    basis : ModalBasis
-        With shapes over the body.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-    count : int
-        Largest number of modes.
-
-    Raises
-    ------
-    InputError
-        For a basis without shapes, a count below one, another suffix, or a file that cannot be
-        written.
-    """
-    require_kind("plot_modes", ModalBasis, basis=basis)
-    return _save(path, lambda: modes_figure(basis, count))
-
-
-def plot_convergence(result: ModeConvergence, path: str | Path) -> Path:
-    """Plot how frequencies and contact compliance change with the mesh and the modes.
-
-    Parameters
-    ----------
-    result : ModeConvergence
-        What :func:`fecontact.reduction.convergence.mode_convergence` found.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    return _save(path, lambda: convergence_figure(result))

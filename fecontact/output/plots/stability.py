@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
-from fecontact.output.plots.style import DASHES, distinct_colours, new_figure, save_figure
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import DASHES, distinct_colours
 from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
@@ -18,9 +19,10 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.equilibria.stability_map import StabilityMap
 
 
-
-def plot_eigenvalues(branch: "Branch", path: str | Path, *, x_label: str | None = None,
-                     range_hz: tuple[float, float] = (0.0, np.inf)) -> Path:
+def plot_eigenvalues(
+    branch: "Branch", *, x_label: str | None = None,
+    range_hz: tuple[float, float] = (0.0, np.inf), path: str | Path | None = None,
+) -> "Figure":
     """Plot frequencies [Hz] and growth rates [1/s] of all modes over the parameter of a branch.
 
     As in the analysis of brake squeal: two frequencies that meet and a growth rate that becomes
@@ -30,38 +32,63 @@ def plot_eigenvalues(branch: "Branch", path: str | Path, *, x_label: str | None 
     ----------
     branch : Branch
         Of equilibria.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
     x_label : str, optional
         Label of the parameter, with its unit.
     range_hz : (float, float)
         Modes that are never in this range are left out.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
     InputError
         If the branch stores no eigenvalues, for another suffix, or a file that cannot be written.
     """
-    return save_figure(path, lambda: eigenvalues_figure(branch, x_label, range_hz))
+    values, followed = branch.parameter, _followed(branch.column("eigenvalues"))
+    with new_figure(8.0, 6.4, path) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        modes = []
+        for mode in followed.T:
+            hertz = mode.imag / (2.0 * np.pi)
+            inside = (hertz >= range_hz[0]) & (hertz <= range_hz[1])
+            if (hertz >= 0.0).all() and hertz.any() and inside.any():
+                modes.append(mode)
+        for mode, colour in zip(modes, distinct_colours(len(modes)), strict=True):
+            upper.plot(values, mode.imag / (2.0 * np.pi), color=colour)
+            lower.plot(values, mode.real, color=colour)
+        lower.axhline(0.0, color="#303030", linewidth=0.8)
+        for point in branch.of_kind("Hopf"):
+            for axis in (upper, lower):
+                axis.axvline(point.parameter, color="#6a6a6a", linestyle=DASHES, linewidth=0.9)
+            upper.annotate(f"{point.details['frequency_hz']:.4g} Hz",
+                           (point.parameter, point.details["frequency_hz"]), xytext=(6, 6),
+                           textcoords="offset points", fontsize=9.0)
+        upper.set_ylabel("frequency [Hz]")
+        lower.set_ylabel("growth rate [1/s]")
+        lower.set_xlabel(x_label or parameter_label(branch.name))
+        if values.min() < values.max():
+            lower.set_xlim(values.min(), values.max())
+        figure.align_ylabels([upper, lower])
+    return figure
 
 
 def plot_stability_map(
-    found: "StabilityMap", path: str | Path, *, borders: "Sequence[Branch]" = (),
-    x_label: str | None = None, y_label: str | None = None,
-) -> Path:
+    found: "StabilityMap", *, borders: "Sequence[Branch]" = (), x_label: str | None = None,
+    y_label: str | None = None, path: str | Path | None = None,
+) -> "Figure":
     """Plot where an equilibrium is unstable, with the frequency of the mode that grows fastest.
 
     Parameters
     ----------
     found : StabilityMap
         The first parameter goes along x.
-    path : str or Path
-        A .png, .pdf or .svg file; it is replaced if it exists.
     borders : sequence of Branch
         Curves of Hopf points or folds in the same parameters, drawn instead of the border that is
         interpolated from the map.
     x_label, y_label : str, optional
         Labels of the parameters, with their units.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
@@ -71,75 +98,36 @@ def plot_stability_map(
     from fecontact.bifurcation.equilibria.stability_map import StabilityMap
 
     require_kind("plot_stability_map", StabilityMap, found=found)
-    return save_figure(path, lambda: stability_map_figure(found, borders, x_label, y_label))
-
-
-def eigenvalues_figure(
-    branch: "Branch", x_label: str | None = None, range_hz: tuple[float, float] = (0.0, np.inf)
-) -> "Figure":
-    """See :func:`plot_eigenvalues`."""
-    values, followed = branch.parameter, _followed(branch.column("eigenvalues"))
-    figure = new_figure(8.0, 6.4)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    modes = []
-    for mode in followed.T:
-        hertz = mode.imag / (2.0 * np.pi)
-        inside = (hertz >= range_hz[0]) & (hertz <= range_hz[1])
-        if (hertz >= 0.0).all() and hertz.any() and inside.any():
-            modes.append(mode)
-    for mode, colour in zip(modes, distinct_colours(len(modes)), strict=True):
-        upper.plot(values, mode.imag / (2.0 * np.pi), color=colour)
-        lower.plot(values, mode.real, color=colour)
-    lower.axhline(0.0, color="#303030", linewidth=0.8)
-    for point in branch.of_kind("Hopf"):
-        for axis in (upper, lower):
-            axis.axvline(point.parameter, color="#6a6a6a", linestyle=DASHES, linewidth=0.9)
-        upper.annotate(f"{point.details['frequency_hz']:.4g} Hz",
-                       (point.parameter, point.details["frequency_hz"]), xytext=(6, 6),
-                       textcoords="offset points", fontsize=9.0)
-    upper.set_ylabel("frequency [Hz]")
-    lower.set_ylabel("growth rate [1/s]")
-    lower.set_xlabel(x_label or parameter_label(branch.name))
-    if values.min() < values.max():
-        lower.set_xlim(values.min(), values.max())
-    figure.align_ylabels([upper, lower])
+    with new_figure(7.4, 5.2, path) as figure:
+        axis = figure.subplots()
+        unstable = (found.unstable > 0).T
+        hertz = np.ma.masked_where(~unstable, found.frequency_hz.T)
+        axis.set_facecolor("#f4f2ee")
+        low, high = (float(hertz.min()), float(hertz.max())) if hertz.count() else (0.0, 1.0)
+        image = axis.pcolormesh(found.first, found.second, hertz, cmap="viridis", shading="nearest",
+                                vmin=low, vmax=high if high > low else low + 1e-3 * max(low, 1.0))
+        figure.colorbar(image, ax=axis, pad=0.02,
+                        label="frequency of the fastest growing mode [Hz]")
+        growth = found.growth_rate.T
+        for border in borders:
+            axis.plot(*(border.column(name) for name in found.names), color="#303030",
+                      linewidth=1.4)
+        if not borders and 0 < unstable.sum() < unstable.size and min(growth.shape) > 1:
+            axis.contour(found.first, found.second, growth, levels=[0.0], colors="#303030",
+                         linewidths=1.4)
+        if (found.unstable < 0).any():
+            axis.pcolormesh(found.first, found.second,
+                            np.ma.masked_where((found.unstable >= 0).T, np.ones(unstable.shape)),
+                            cmap="Greys", vmin=0.0, vmax=2.0, shading="nearest")
+        inside = np.argwhere(~unstable & (found.unstable >= 0).T)
+        if len(inside):
+            centre = inside[np.argmin(((inside - inside.mean(axis=0)) ** 2).sum(axis=1))]
+            axis.text(found.first[centre[1]], found.second[centre[0]], "stable", ha="center",
+                      va="center")
+        axis.set_xlabel(x_label or parameter_label(found.names[0]))
+        axis.set_ylabel(y_label or parameter_label(found.names[1]))
+        axis.grid(False)
     return figure
-
-
-def stability_map_figure(
-    found: "StabilityMap", borders: "Sequence[Branch]" = (), x_label: str | None = None,
-    y_label: str | None = None,
-) -> "Figure":
-    """See :func:`plot_stability_map`."""
-    figure = new_figure(7.4, 5.2)
-    axis = figure.subplots()
-    unstable = (found.unstable > 0).T
-    hertz = np.ma.masked_where(~unstable, found.frequency_hz.T)
-    axis.set_facecolor("#f4f2ee")
-    low, high = (float(hertz.min()), float(hertz.max())) if hertz.count() else (0.0, 1.0)
-    image = axis.pcolormesh(found.first, found.second, hertz, cmap="viridis", shading="nearest",
-                            vmin=low, vmax=high if high > low else low + 1e-3 * max(low, 1.0))
-    figure.colorbar(image, ax=axis, pad=0.02, label="frequency of the fastest growing mode [Hz]")
-    growth = found.growth_rate.T
-    for border in borders:
-        axis.plot(*(border.column(name) for name in found.names), color="#303030", linewidth=1.4)
-    if not borders and 0 < unstable.sum() < unstable.size and min(growth.shape) > 1:
-        axis.contour(found.first, found.second, growth, levels=[0.0], colors="#303030",
-                     linewidths=1.4)
-    if (found.unstable < 0).any():
-        axis.pcolormesh(found.first, found.second,
-                        np.ma.masked_where((found.unstable >= 0).T, np.ones(unstable.shape)),
-                        cmap="Greys", vmin=0.0, vmax=2.0, shading="nearest")
-    inside = np.argwhere(~unstable & (found.unstable >= 0).T)
-    if len(inside):
-        centre = inside[np.argmin(((inside - inside.mean(axis=0)) ** 2).sum(axis=1))]
-        axis.text(found.first[centre[1]], found.second[centre[0]], "stable", ha="center",
-                  va="center")
-    axis.set_xlabel(x_label or parameter_label(found.names[0]))
-    axis.set_ylabel(y_label or parameter_label(found.names[1]))
-    axis.grid(False)
-    return figure
-
 
 def _followed(eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Eigenvalues (N, d) in an order that follows each from point to point."""

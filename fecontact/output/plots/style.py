@@ -1,16 +1,11 @@
-"""The style of all figures: colours, sizes, notes, and how they are written to files."""
+"""The style of all figures: colours, sizes, notes."""
 
-from collections.abc import Callable
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecontact.analysis.resolved import Resolved
-from fecontact.core.atomic_write import replaced
-from fecontact.core.checks import as_path
-from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -30,7 +25,6 @@ ENERGY_COLOURS = {
 }
 # Colours that people with colour-blindness tell apart; 'open' takes that of the background.
 STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
-_SUFFIXES = (".png", ".pdf", ".svg")
 
 STYLE: Any = {
     "font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0,
@@ -38,18 +32,9 @@ STYLE: Any = {
     "axes.grid": True, "grid.color": "#e4e2de", "grid.linewidth": 0.7, "axes.axisbelow": True,
     "lines.linewidth": 1.2, "legend.frameon": False, "axes.titleweight": "normal",
     "xtick.color": "#303030", "ytick.color": "#303030", "axes.formatter.useoffset": False,
-    "agg.path.chunksize": 20000, "savefig.dpi": 150, "svg.fonttype": "none", "pdf.fonttype": 42,
+    "agg.path.chunksize": 20000, "figure.dpi": 150, "savefig.dpi": "figure",
+    "svg.fonttype": "none", "pdf.fonttype": 42,
 }
-
-
-def new_figure(width: float, height: float) -> "Figure":
-    """An empty figure [inches] that no plotting session knows of."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def distinct_colours(count: int) -> list[str]:
@@ -84,23 +69,3 @@ def add_note(figure: "Figure", drawn: Resolved) -> None:
 def state_names(trajectory: Trajectory) -> tuple[str, ...]:
     """Open, stick, slip by their numbers; open and contact in a run without friction forces."""
     return ("open", "stick", "slip") if trajectory.friction_force.any() else ("open", "contact")
-
-
-def save_figure(path: str | Path, figure: Callable[[], "Figure"]) -> Path:
-    """Draw a figure in the package's style and write it.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    path = as_path(path, "a plot")
-    if path.suffix.lower() not in _SUFFIXES:
-        raise InputError(f"{path} must end in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}.")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: folder {path.parent} does not exist.")
-    from matplotlib import rc_context
-
-    with replaced(path) as part, rc_context(STYLE):
-        figure().savefig(part, format=path.suffix[1:].lower())
-    return path
