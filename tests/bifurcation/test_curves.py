@@ -84,7 +84,7 @@ def test_a_curve_starts_with_the_parameters_of_its_point():
     start, = equilibrium_branch(field, find_equilibrium(field, {"c": 0.5}), "b",
                                 bounds=(-2.0, 2.0)).of_kind("Hopf")
     assert start.first_lyapunov == pytest.approx(1.0, rel=1e-8)
-    curve = hopf_curve(field, ("c", "b"), start, settings=Settings(points=3), both=False)
+    curve = hopf_curve(field, ("b", "c"), start, settings=Settings(points=3), both=False)
     assert curve.points[0].values["c"] == pytest.approx(0.5, abs=1e-12)
     with pytest.raises(InputError, match="is on no branch of equilibria or orbits"):
         hopf_curve(field, ("b", "c"), curve.points[0])
