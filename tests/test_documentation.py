@@ -128,8 +128,9 @@ def check_orbits(names, printed, folder):
     assert (folder / "diagram.png").stat().st_size > 10000
     second = names["doubled"].of_kind("period doubling")[0]
     assert second.parameter == pytest.approx(9.2619, abs=1e-3)
-    assert names["times"][-1] == pytest.approx(names["orbits"].points[40].values["period"])
-    assert names["states"][0] == pytest.approx(names["states"][-1], abs=1e-12)
+    motion = names["motion"]
+    assert motion.times[-1] == pytest.approx(names["orbits"].points[40].values["period"])
+    assert motion.states[0] == pytest.approx(motion.states[-1], abs=1e-12)
 
 
 def check_runs(names, printed, folder):

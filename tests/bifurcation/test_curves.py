@@ -5,9 +5,10 @@ import pytest
 from systems import friction_slope, lorenz_field, two_mass_field, two_mass_jacobian
 
 from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.codim2 import fold_curve, hopf_curve
-from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, find_equilibrium
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.core.errors import InputError
 
@@ -75,6 +76,18 @@ def test_bautin():
     assert [point.values["b"], point.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-9)
     assert curve.column("first_lyapunov") == pytest.approx(2.0 * curve.column("c"), rel=1e-8,
                                                            abs=1e-9)
+
+
+def test_a_curve_starts_with_the_parameters_of_its_point():
+    """Those of the branch, c = 0.5, not the base value of the field."""
+    field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
+    start, = equilibrium_branch(field, find_equilibrium(field, {"c": 0.5}), "b",
+                                bounds=(-2.0, 2.0)).of_kind("Hopf")
+    assert start.first_lyapunov == pytest.approx(1.0, rel=1e-8)
+    curve = hopf_curve(field, ("b", "c"), start, settings=Settings(points=3), both=False)
+    assert curve.points[0].values["c"] == pytest.approx(0.5, abs=1e-12)
+    with pytest.raises(InputError, match="is on no branch of equilibria or orbits"):
+        hopf_curve(field, ("b", "c"), curve.points[0])
 
 
 def zero_hopf(t, x, p, out):

@@ -20,6 +20,7 @@ from fecontact.bifurcation.equilibria.codim2_problems import (
 )
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.equilibria.normal_forms import critical_pair, null_vectors
+from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -31,7 +32,7 @@ _GROWTH = 1e4
 def fold_curve(
     field: VectorField, parameters: tuple[str, str], point: BranchPoint | Equilibrium, *,
     bounds: Mapping[str, tuple[float, float]] | None = None, settings: Settings | None = None,
-    scales: ArrayLike | None = None, values: ArrayLike | None = None, both: bool = True,
+    scales: ArrayLike | None = None, both: bool = True,
 ) -> Branch:
     """Curve of folds of equilibria in two parameters.
 
@@ -44,27 +45,25 @@ def fold_curve(
     field : VectorField
         Its rates must not depend on time.
     parameters : (str, str)
-        The first is the one of the branch on which the fold was found.
+        Those that change; the others stay as they are at the point.
     point : BranchPoint or Equilibrium
-        The fold.
+        The fold, on a branch of equilibria.
     bounds : mapping, optional
         Range of each parameter; the curve ends there. They also set the width of the diagram.
     settings : Settings, optional
         How the curve is followed.
     scales : sequence, optional
         Sizes (d,) of the states in the diagram; by default they grow with the states.
-    values : sequence, optional
-        Parameter values (k,) of the branch; the field's base values by default.
     both : bool
         Go to both sides.
 
     Raises
     ------
     InputError
-        If a parameter is unknown, or there is no fold near the point.
+        If a parameter is unknown, or there is no fold near the point, or it is none of a branch of
+        equilibria.
     """
-    begin, active, sizes, limits, widths = _beginning(field, parameters, point, bounds, scales,
-                                                       values)
+    begin, active, sizes, limits, widths = _beginning(field, parameters, point, bounds, scales)
     v, w = null_vectors(scaled(begin.jacobian, sizes))
     problem = FoldCurve(field, begin.values, active, np.concatenate([sizes, widths]),
                         np.concatenate([limits, widths]), w, v)
@@ -75,7 +74,7 @@ def fold_curve(
 def hopf_curve(
     field: VectorField, parameters: tuple[str, str], point: BranchPoint | Equilibrium, *,
     bounds: Mapping[str, tuple[float, float]] | None = None, settings: Settings | None = None,
-    scales: ArrayLike | None = None, values: ArrayLike | None = None, both: bool = True,
+    scales: ArrayLike | None = None, both: bool = True,
 ) -> Branch:
     """Curve of Hopf points in two parameters, such as the border of flutter or stick-slip.
 
@@ -91,8 +90,7 @@ def hopf_curve(
     InputError
         If a parameter is unknown, or there is no Hopf point near the point.
     """
-    begin, active, sizes, limits, widths = _beginning(field, parameters, point, bounds, scales,
-                                                       values)
+    begin, active, sizes, limits, widths = _beginning(field, parameters, point, bounds, scales)
     if not (begin.eigenvalues.imag > 0.0).any():
         raise InputError(f"There is no Hopf point near {parameters[0]} = "
                          f"{begin.values[active[0]]:.6g}: all eigenvalues are real.")
@@ -107,7 +105,6 @@ def hopf_curve(
 def _beginning(
     field: VectorField, parameters: tuple[str, str], point: BranchPoint | Equilibrium,
     bounds: Mapping[str, tuple[float, float]] | None, scales: ArrayLike | None,
-    values: ArrayLike | None,
 ) -> tuple[Equilibrium, tuple[int, int], Array, Array, list[float]]:
     """Start, indices of the parameters, sizes of the states, their limits, widths."""
     require_field(field)
@@ -122,12 +119,7 @@ def _beginning(
         if name not in parameters:
             raise InputError(f"bounds are given for {name!r}, which is none of the parameters of "
                              f"the curve: {parameters[0]!r}, {parameters[1]!r}.")
-    if isinstance(point, Equilibrium):
-        begin = point
-    else:
-        given = field.values if values is None else np.array(values, dtype=float)
-        given[active[0]] = point.parameter
-        begin = Equilibrium(field, given, np.ascontiguousarray(point.u[:-1]))
+    begin = point if isinstance(point, Equilibrium) else equilibrium_at(field, point)
     if scales is None:
         sizes = np.maximum(default_scales(begin), np.abs(begin.state))
         limits = _GROWTH * sizes
