@@ -7,6 +7,7 @@ from fecontact.analysis.periodicity import count_periods, drive_period, periodic
 from fecontact.core.errors import InputError
 from fecontact.integrate.simulate import simulate
 from fecontact.laws.excitation import Drive
+from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.normal.rough_surface import RoughSurface
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
@@ -103,8 +104,9 @@ def linear_oscillator(w, damping=0.4):
     T = np.zeros((3, 3, 1))
     T[0, 0] = T[2, 0] = 1.0
     basis = ModalBasis([0.0], [[0.0]], T, np.zeros((3, 2)), [1.0])
-    return ContactSystem(basis, normal=RoughSurface(1e6, 1e-5, 0.0), gap=1.0, drive=Drive(
-        stiffness_x=1.0, damping_x=damping, amplitude_x=1.0, angular_frequency=w))
+    return ContactSystem(basis, RoughSurface(1e6, 1e-5, 0.0), ConstantFriction(0.0), gap=1.0,
+                         drive=Drive(stiffness_x=1.0, damping_x=damping, amplitude_x=1.0,
+                                     angular_frequency=w))
 
 
 @pytest.mark.parametrize("outputs", [2001, 2344])
