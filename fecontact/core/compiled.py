@@ -36,7 +36,7 @@ integers = types.Array(i8, 1, "C")
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
 
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+(fecontact[\w.]*)"
                      r"(?:\s+import\s+(\([^)]*\)|[^\n]*))?", re.MULTILINE)
 
