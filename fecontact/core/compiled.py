@@ -158,9 +158,9 @@ def borrowed(typingctx: Any, array: Any) -> Any:
 
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     if isinstance(kind, types.BaseTuple):
-        items = [_without_owner(context, builder, item,  # type: ignore[var-annotated]
+        items = [_without_owner(context, builder, item,
                                 builder.extract_value(value, index))
-                 for index, item in enumerate(kind)]  # type: ignore[arg-type]
+                 for index, item in enumerate(kind)]
         return context.make_tuple(builder, kind, items)
     if not isinstance(kind, types.Array):
         return value

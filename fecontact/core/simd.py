@@ -121,7 +121,7 @@ def _provide(operation: Any, instruction: str) -> None:
         return lanes(lanes, lanes), codegen
 
     # numba compares the annotations of this one with those of what it returns.
-    def typed(a, b):  # type: ignore[no-untyped-def]
+    def typed(a, b):
         if isinstance(a, _Lanes) and isinstance(b, _Lanes):
             return lambda a, b: combined(a, b)
         return None

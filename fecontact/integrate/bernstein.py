@@ -28,7 +28,7 @@ NOWHERE = 2.0
 
 
 @helper
-def times_s(b, degree):  # type: ignore[no-untyped-def]
+def times_s(b, degree):
     """Multiply p by s: b[: degree + 2] becomes that of the degree one higher."""
     up = 1.0 / (degree + 1)
     for i in range(degree + 1, 0, -1):
@@ -37,7 +37,7 @@ def times_s(b, degree):  # type: ignore[no-untyped-def]
 
 
 @helper
-def times_rest(b, degree):  # type: ignore[no-untyped-def]
+def times_rest(b, degree):
     """Multiply p by 1 - s: b[: degree + 2] becomes that of the degree one higher."""
     up = 1.0 / (degree + 1)
     for i in range(degree + 1):
@@ -46,7 +46,7 @@ def times_rest(b, degree):  # type: ignore[no-untyped-def]
 
 
 @helper
-def smallest(b):  # type: ignore[no-untyped-def]
+def smallest(b):
     """A bound below p, that of its coefficients."""
     least = b[0]
     for i in range(1, len(b)):
@@ -55,7 +55,7 @@ def smallest(b):  # type: ignore[no-untyped-def]
 
 
 @helper
-def value(b, s, row):  # type: ignore[no-untyped-def]
+def value(b, s, row):
     """p(s) by de Casteljau's algorithm; ``row`` (n + 1,) is room to work in."""
     n = len(b)
     for i in range(n):
@@ -67,7 +67,7 @@ def value(b, s, row):  # type: ignore[no-untyped-def]
 
 
 @helper
-def split(b, left):  # type: ignore[no-untyped-def]
+def split(b, left):
     """Put the coefficients of p over [0, 1/2] into ``left``, and those over [1/2, 1] into b."""
     n = len(b)
     for k in range(n):
@@ -77,7 +77,7 @@ def split(b, left):  # type: ignore[no-untyped-def]
 
 
 @helper
-def first_below(b, room):  # type: ignore[no-untyped-def]
+def first_below(b, room):
     """Where p first falls below zero, to the part FINEST of the step; NOWHERE if it does not.
 
     Zero itself is not below, and a dip that lasts less than FINEST may be left out. ``room``
@@ -112,7 +112,7 @@ def first_below(b, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def variations(b):  # type: ignore[no-untyped-def]
+def variations(b):
     """Changes of sign along the coefficients: at least as many as p has within the step."""
     count, last = 0, 0.0
     for i in range(len(b)):
@@ -124,7 +124,7 @@ def variations(b):  # type: ignore[no-untyped-def]
 
 
 @helper
-def sign_changes(b, room, row, places):  # type: ignore[no-untyped-def]
+def sign_changes(b, room, row, places):
     """Fill ``places`` with where p changes its sign, ascending; how many there are.
 
     Those that lie nearer to each other than FINEST may be left out, and those that find no place.
@@ -169,7 +169,7 @@ def sign_changes(b, room, row, places):  # type: ignore[no-untyped-def]
 
 
 @helper
-def from_nested(c, b):  # type: ignore[no-untyped-def]
+def from_nested(c, b):
     """Coefficients b (n + 1,) of c_0 + s (c_1 + (1 - s) (c_2 + s (c_3 + ...))), c (n + 1,)."""
     degree = len(c) - 1
     b[:] = 0.0
@@ -185,7 +185,7 @@ def from_nested(c, b):  # type: ignore[no-untyped-def]
 
 
 @helper
-def largest(b):  # type: ignore[no-untyped-def]
+def largest(b):
     """A bound above p, that of its coefficients."""
     most = b[0]
     for i in range(1, len(b)):
@@ -193,7 +193,7 @@ def largest(b):  # type: ignore[no-untyped-def]
     return most
 
 
-def fit(places):  # type: ignore[no-untyped-def]
+def fit(places):
     """Matrix that makes Bernstein coefficients of the values at n + 1 different places."""
     degree = len(places) - 1
     return np.ascontiguousarray(np.linalg.inv(np.array(

@@ -36,7 +36,7 @@ MOST = 8
 
 
 @helper
-def _project(shapes, v, columns, out):  # type: ignore[no-untyped-def]
+def _project(shapes, v, columns, out):
     """Fill out with velocities along and displacements away from the ground, then along it."""
     m, rows = shapes.shape
     n = rows // 2
@@ -65,7 +65,7 @@ def _project(shapes, v, columns, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def set_courses(s, shapes, bounds, before, after, room):  # type: ignore[no-untyped-def]
+def set_courses(s, shapes, bounds, before, after, room):
     """Fill ``room.courses`` (6, 2 n or 3 n) with the coefficients over a step.
 
     Velocities of the nodes along the ground, heights with their gap, and where the ground is not
@@ -90,7 +90,7 @@ def set_courses(s, shapes, bounds, before, after, room):  # type: ignore[no-unty
 
 
 @helper
-def set_ends(t, y, s, shapes, bounds, ends):  # type: ignore[no-untyped-def]
+def set_ends(t, y, s, shapes, bounds, ends):
     """Fill ``ends`` (3, 2 n) with displacements and velocities of the nodes, and heights below."""
     n = len(s.gap)
     motion.project(shapes, y, ends[0], ends[1])
@@ -99,7 +99,7 @@ def set_ends(t, y, s, shapes, bounds, ends):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _set_heights(travel, s, bounds, places, heights):  # type: ignore[no-untyped-def]
+def _set_heights(travel, s, bounds, places, heights):
     """Fill ``heights`` (n,) with those of the ground under the nodes."""
     for j in range(len(heights)):
         heights[j] = bounds[HIGHEST]
@@ -109,7 +109,7 @@ def _set_heights(travel, s, bounds, places, heights):  # type: ignore[no-untyped
 
 
 @helper
-def keep_ends(n, room):  # type: ignore[no-untyped-def]
+def keep_ends(n, room):
     """Take the end of the step for the start of the next."""
     for k in range(2):
         for j in range(2 * n):
@@ -119,7 +119,7 @@ def keep_ends(n, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def restless(speed, h, s, shapes, control, room):  # type: ignore[no-untyped-def]
+def restless(speed, h, s, shapes, control, room):
     """Whether :func:`doubtful` may find something that matters.
 
     ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
@@ -131,7 +131,7 @@ def restless(speed, h, s, shapes, control, room):  # type: ignore[no-untyped-def
 
 
 @helper
-def _range(first, last, k1, k2, k3):  # type: ignore[no-untyped-def]
+def _range(first, last, k1, k2, k3):
     """Smallest and largest coefficient of an interpolant, and whether they rise or fall only."""
     a, c = 0.75 * first + 0.25 * (last + k1), 0.25 * (first + k1 + k2 + k3) + 0.75 * last
     b = 0.5 * (first + last) + k1 / 3.0 + k2 / 6.0
@@ -141,7 +141,7 @@ def _range(first, last, k1, k2, k3):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _restless_nodes(speed, h, s, shapes, control, room):  # type: ignore[no-untyped-def]
+def _restless_nodes(speed, h, s, shapes, control, room):
     """The answer of :func:`doubtful`, but for slip velocities of nodes clear of the ground."""
     levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
     n, m = len(s.gap), len(control.largest)
@@ -176,7 +176,7 @@ def _restless_nodes(speed, h, s, shapes, control, room):  # type: ignore[no-unty
 
 
 @helper
-def _restless_modes(speed, h, s, control, room):  # type: ignore[no-untyped-def]
+def _restless_modes(speed, h, s, control, room):
     """The same for many nodes, by the modes alone."""
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
@@ -216,13 +216,13 @@ def _restless_modes(speed, h, s, control, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _departure(k1, k2, k3):  # type: ignore[no-untyped-def]
+def _departure(k1, k2, k3):
     """Bound on the distance of the interpolant from the straight line between its ends."""
     return max(max(0.25 * abs(k1), abs(2.0 * k1 + k2) / 6.0), 0.25 * abs(k1 + k2 + k3))
 
 
 @helper
-def doubtful(speed, h, bounds, levels, slip_scale, room):  # type: ignore[no-untyped-def]
+def doubtful(speed, h, bounds, levels, slip_scale, room):
     """Whether forces within the step may be others than those at its ends let expect.
 
     A gap or slip velocity may change its sign other than once on its way from start to end, or
@@ -268,7 +268,7 @@ def doubtful(speed, h, bounds, levels, slip_scale, room):  # type: ignore[no-unt
 
 
 @helper
-def ground_part(what, part, j, t, h, latest, s, bounds, courses, row):  # type: ignore[no-untyped-def]
+def ground_part(what, part, j, t, h, latest, s, bounds, courses, row):
     """What the ground adds at a part of the step: its height under node j, or its speed."""
     now = min(t + part * h, latest)
     if what == SLIP:
@@ -286,7 +286,7 @@ def ground_part(what, part, j, t, h, latest, s, bounds, courses, row):  # type: 
 
 
 @helper
-def at(what, part, j, t, h, latest, s, bounds, courses, shift, b, row):  # type: ignore[no-untyped-def]
+def at(what, part, j, t, h, latest, s, bounds, courses, shift, b, row):
     """Slip velocity, or gap, of node j at a part of the step, plus ``shift``.
 
     ``b`` (5,) are the coefficients of the node's own motion.
@@ -296,7 +296,7 @@ def at(what, part, j, t, h, latest, s, bounds, courses, shift, b, row):  # type:
 
 
 @helper
-def changes(what, j, t, h, latest, s, bounds, courses, shift, b, room, row, places):  # type: ignore[no-untyped-def]
+def changes(what, j, t, h, latest, s, bounds, courses, shift, b, room, row, places):
     """Fill ``places`` with the parts of the step at which a quantity of node j changes its sign.
 
     Slip velocity or gap, plus ``shift``; returns how many there are. Sets ``b`` (5,) to the

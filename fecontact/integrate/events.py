@@ -111,7 +111,7 @@ class Event:
 
 
 @event
-def _plane(t, y, p):  # type: ignore[no-untyped-def]
+def _plane(t, y, p):
     value = -p[0]
     for i in range(len(y)):
         value += p[1 + i] * y[i]

@@ -40,7 +40,7 @@ _SEARCHED = np.geomspace(1e-6, 1e12, 4001)
 
 
 @kernel(types.void(i8, vector, f8, vector, matrix))
-def _sample(address, v, F, p, out):  # type: ignore[no-untyped-def]
+def _sample(address, v, F, p, out):
     """Fill out (len(v), 2) with R/F and d(R/F)/dv."""
     for i in range(len(v)):
         R, slope, _ = friction_at(address)(v[i], F, p)

@@ -9,7 +9,7 @@ from fecontact.core.types import Array
 
 
 @helper
-def piecewise(x, p, first):  # type: ignore[no-untyped-def]
+def piecewise(x, p, first):
     """Value and two derivatives at x of what :func:`piecewise_parameters` put into p[first:].
 
     Outside knots that are not repeated the end values hold; on a knot derivatives are those of

@@ -9,19 +9,19 @@ from fecontact.laws.signatures import friction_at, memory_at, normal_at
 
 
 @kernel(types.void(i8, vector, vector, vector, matrix))
-def _normal(address, u, v, p, out):  # type: ignore[no-untyped-def]
+def _normal(address, u, v, p, out):
     for k in range(len(u)):
         out[k, 0], out[k, 1], out[k, 2] = normal_at(address)(u[k], v[k], p)
 
 
 @kernel(types.void(i8, vector, vector, vector, matrix))
-def _friction(address, v, F, p, out):  # type: ignore[no-untyped-def]
+def _friction(address, v, F, p, out):
     for k in range(len(v)):
         out[k, 0], out[k, 1], out[k, 2] = friction_at(address)(v[k], F[k], p)
 
 
 @kernel(types.void(i8, vector, vector, matrix, vector, block))
-def _memory(address, v, F, z, p, out):  # type: ignore[no-untyped-def]
+def _memory(address, v, F, z, p, out):
     for k in range(len(v)):
         memory_at(address)(v[k], F[k], z[k], p, out[k, 0], out[k, 1:])
 
@@ -84,7 +84,7 @@ def stored_energy(
 
 
 @kernel(types.void(i8, matrix, matrix, f8, matrix))
-def _energy(address, penetration, p, scale, out):  # type: ignore[no-untyped-def]
+def _energy(address, penetration, p, scale, out):
     """Fill out (N, n) from penetrations (N, n) and parameters (n, k)."""
     force = normal_at(address)
     for i in range(penetration.shape[0]):
@@ -105,7 +105,7 @@ _CYCLES, _STEPS = 6, 1000
 
 
 @kernel(types.void(i8, vector, f8, vector, vector, f8, vector))
-def _cycles(address, p, F, travel, z, step, work):  # type: ignore[no-untyped-def]
+def _cycles(address, p, F, travel, z, step, work):
     """Fill work with R v dt of every step: z by implicit Euler, forces at the middle of it."""
     s = len(z)
     force, rates = np.empty(3 + s), np.empty((s, 3 + s))

@@ -200,7 +200,7 @@ def strain_energies(body: ElasticBody, shapes: Array) -> Array:
 
 
 @kernel(types.void(block, matrix, types.Array(types.int64, 2, "C"), matrix, vector, vector))
-def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):  # type: ignore[no-untyped-def]
+def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):
     """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions to x and to y."""
     elements, points = dx.shape
     corners, modes = nodes.shape[1], len(energies)

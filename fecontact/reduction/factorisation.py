@@ -100,7 +100,7 @@ _BLOCK = 32
 
 
 @kernel(types.void(_index, _index, vector, matrix, _flags), nogil=True)
-def _forward(indptr, indices, data, x, active):  # type: ignore[no-untyped-def]
+def _forward(indptr, indices, data, x, active):
     """Solve L x = b in place, L unit lower triangular by columns; zero rows are passed over."""
     n, width = x.shape
     for j in range(n):
@@ -115,7 +115,7 @@ def _forward(indptr, indices, data, x, active):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(_index, _index, vector, matrix), nogil=True)
-def _backward(indptr, indices, data, x):  # type: ignore[no-untyped-def]
+def _backward(indptr, indices, data, x):
     """Solve L^T x = b in place."""
     n, width = x.shape
     for j in range(n - 1, -1, -1):

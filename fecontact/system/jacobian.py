@@ -23,7 +23,7 @@ from fecontact.system.parameter_derivatives import (
 
 
 @kernel(types.i8(f8, vector, SYSTEM, block, matrix, matrix))
-def contact_gradients(t, y, s, gradients, active, out):  # type: ignore[no-untyped-def]
+def contact_gradients(t, y, s, gradients, active, out):
     """Rows of the Jacobian's contact part, for the nodes whose normal force is not zero.
 
     Fills ``active`` (n, 2 m) with the rows Tx, Ty of these nodes and ``gradients`` (4, n, m) with
@@ -68,7 +68,7 @@ def contact_gradients(t, y, s, gradients, active, out):  # type: ignore[no-untyp
 
 
 @kernel(types.void(f8, vector, SYSTEM, matrix))
-def jacobian(t, y, s, out):  # type: ignore[no-untyped-def]
+def jacobian(t, y, s, out):
     """Fill out (2 m + n s, 2 m + n s) with dy'/dy."""
     y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
@@ -89,7 +89,7 @@ def jacobian(t, y, s, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _fill_rates(t, x, s, load, force, rates, f):  # type: ignore[no-untyped-def]
+def _fill_rates(t, x, s, load, force, rates, f):
     t, x, s, f = borrowed(t), borrowed(x), borrowed(s), borrowed(f)
     load, force, rates = borrowed(load), borrowed(force), borrowed(rates)
     travel, speed = 0.0, 0.0
@@ -100,7 +100,7 @@ def _fill_rates(t, x, s, load, force, rates, f):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix))
-def batch_rates(t, x, s, f):  # type: ignore[no-untyped-def]
+def batch_rates(t, x, s, f):
     """Fill f (N, 2 m + n s) with y' at times t (N,) and states x (N, 2 m + n s)."""
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
@@ -109,7 +109,7 @@ def batch_rates(t, x, s, f):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):  # type: ignore[no-untyped-def]
+def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):
     # What is made in this call is borrowed too: counting references costs as much as the laws.
     t, x, s, f, J = borrowed(t), borrowed(x), borrowed(s), borrowed(f), borrowed(J)
     r, P, laws = borrowed(r), borrowed(P), borrowed(laws)
@@ -193,7 +193,7 @@ def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):  # type:
 
 
 @kernel(types.void(vector, matrix, SYSTEM, SYSTEM, f8, matrix, block, matrix))
-def batch_derivatives(t, x, s, r, h, f, J, P):  # type: ignore[no-untyped-def]
+def batch_derivatives(t, x, s, r, h, f, J, P):
     """As :func:`batch_rates`, and fill J (N, d, d), d = 2 m + n s, with dy'/dy and P with dy'/dp.
 
     r holds the derivatives of all arrays to the parameter p, h is the step of differences in it,

@@ -73,7 +73,7 @@ STATE_COLUMNS = 6
 
 
 @helper
-def node_motion(j, y, s):  # type: ignore[no-untyped-def]
+def node_motion(j, y, s):
     """Displacement along and away from the ground of node j, and their rates."""
     m = s.Tx.shape[1]
     x, height, x_rate, height_rate = 0.0, 0.0, 0.0, 0.0
@@ -86,7 +86,7 @@ def node_motion(j, y, s):  # type: ignore[no-untyped-def]
 
 
 @helper
-def memory_of(j, y, s):  # type: ignore[no-untyped-def]
+def memory_of(j, y, s):
     """Internal variables of node j: a view of the state y."""
     n, m = s.Tx.shape
     first = 2 * m + j * ((len(y) - 2 * m) // n)
@@ -94,7 +94,7 @@ def memory_of(j, y, s):  # type: ignore[no-untyped-def]
 
 
 @helper
-def node_forces(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates):  # type: ignore[no-untyped-def]
+def node_forces(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates):
     """F, R, u, v, slip velocity and rate y_R' of the ground at node j.
 
     ``force`` (3 + s,) and ``rates`` (s, 3 + s) are filled by laws with memory; see the contract.
@@ -118,7 +118,7 @@ def node_forces(j, x, height, x_rate, height_rate, z, travel, speed, s, force, r
 
 
 @helper
-def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates, out):  # type: ignore[no-untyped-def]
+def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates, out):
     """F and R of node j; fills out (3, 4) with derivatives to x, y, x', y' of F, R and pressing.
 
     The pressing force is the one the friction law sees; ``force`` and ``rates`` as above, but
@@ -157,7 +157,7 @@ def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force
 
 
 @kernel(types.void(f8, vector, SYSTEM, matrix))
-def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
+def contact_state(t, y, s, out):
     """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node."""
     y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)
@@ -171,7 +171,7 @@ def contact_state(t, y, s, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def given_at(t, s, load):  # type: ignore[no-untyped-def]
+def given_at(t, s, load):
     """Fill load (m,) with modal forces given in time; returns the ground's travel and speed."""
     m = len(load)
     drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
@@ -188,7 +188,7 @@ def given_at(t, s, load):  # type: ignore[no-untyped-def]
 
 
 @helper
-def body_rates(load, y, s, out):  # type: ignore[no-untyped-def]
+def body_rates(load, y, s, out):
     """Fill out (2 m + n s,) with y' as it is without contact, under modal forces ``load``."""
     m = len(load)
     for i in range(m):
@@ -202,7 +202,7 @@ def body_rates(load, y, s, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def rates_under(load, travel, speed, y, s, force, rates, out):  # type: ignore[no-untyped-def]
+def rates_under(load, travel, speed, y, s, force, rates, out):
     """Fill out (2 m + n s,) with y'; ``force`` (3 + s,) and ``rates`` (s, 3 + s) are room."""
     n, m = s.Tx.shape
     states = len(rates)
@@ -219,7 +219,7 @@ def rates_under(load, travel, speed, y, s, force, rates, out):  # type: ignore[n
 
 
 @kernel(types.void(f8, vector, SYSTEM, vector))
-def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
+def right_hand_side(t, y, s, out):
     """Fill out (2 m + n s,) with y'."""
     y, s = borrowed(y), borrowed(s)
     states = s.memory.max()
@@ -230,14 +230,14 @@ def right_hand_side(t, y, s, out):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(vector, matrix, SYSTEM, block))
-def contact_history(times, states, s, out):  # type: ignore[no-untyped-def]
+def contact_history(times, states, s, out):
     """Fill out (N, n, 6) with `contact_state` at N times."""
     for k in range(len(times)):
         contact_state(times[k], states[k], s, out[k])
 
 
 @kernel(types.void(integers, vector, vector, matrix, vector, vector))
-def normal_values(addresses, u, v, p, force, slope):  # type: ignore[no-untyped-def]
+def normal_values(addresses, u, v, p, force, slope):
     """Fill force and dF/du (k,) of the normal laws of k nodes at their penetrations and rates."""
     for j in range(len(u)):
         force[j], slope[j], _ = normal_at(addresses[j])(u[j], v[j], p[j])
@@ -250,7 +250,7 @@ POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "conta
 
 
 @helper
-def body_powers(t, y, s, out):  # type: ignore[no-untyped-def]
+def body_powers(t, y, s, out):
     """Fill out (8,) with the powers outside the contact, the others with zero."""
     m = s.Tx.shape[1]
     out[:8] = 0.0
@@ -273,7 +273,7 @@ def body_powers(t, y, s, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def drive_jump(before, after, y, s):  # type: ignore[no-untyped-def]
+def drive_jump(before, after, y, s):
     """Work that the drive puts in where its motions jump, between two times on both sides [J]."""
     work = 0.0
     for axis in range(2):
@@ -287,7 +287,7 @@ def drive_jump(before, after, y, s):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(f8, vector, SYSTEM, vector, vector))
-def powers(t, y, s, out, friction):  # type: ignore[no-untyped-def]
+def powers(t, y, s, out, friction):
     """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
     n = len(s.Tx)
     speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]

@@ -16,7 +16,7 @@ _WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0])
 
 
 @helper
-def _beside(parameters, rates, h):  # type: ignore[no-untyped-def]
+def _beside(parameters, rates, h):
     """Laws' parameters (4, k, p) at the places of the differences; (0, k, p) if none moves."""
     k, p = parameters.shape
     count = 4 if h > 0.0 and moves(rates) else 0
@@ -29,7 +29,7 @@ def _beside(parameters, rates, h):  # type: ignore[no-untyped-def]
 
 
 @helper
-def moves(rates):  # type: ignore[no-untyped-def]
+def moves(rates):
     """Whether any entry of an array (k, p) of rates is not zero."""
     for row in rates:
         for rate in row:
@@ -39,7 +39,7 @@ def moves(rates):  # type: ignore[no-untyped-def]
 
 
 @helper
-def laws_beside(s, r, h):  # type: ignore[no-untyped-def]
+def laws_beside(s, r, h):
     """Parameters of all laws at the places of the differences, each (4, k, p) or (0, k, p).
 
     Those of normal laws, friction, profile, friction along the ground, its motion, drive, loads.
@@ -56,7 +56,7 @@ def laws_beside(s, r, h):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _signal_rates(address, t, beside, row, h):  # type: ignore[no-untyped-def]
+def _signal_rates(address, t, beside, row, h):
     """Derivatives of a signal's value and rate."""
     value, slope = 0.0, 0.0
     for k in range(len(beside)):
@@ -67,7 +67,7 @@ def _signal_rates(address, t, beside, row, h):  # type: ignore[no-untyped-def]
 
 
 @helper
-def given_rates(t, s, r, h, laws, load):  # type: ignore[no-untyped-def]
+def given_rates(t, s, r, h, laws, load):
     """Fill load (m,) with derivatives of the modal forces; returns those of travel and speed."""
     m = len(load)
     for i in range(m):
@@ -86,7 +86,7 @@ def given_rates(t, s, r, h, laws, load):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _ground_rates(address, xi, beside, h):  # type: ignore[no-untyped-def]
+def _ground_rates(address, xi, beside, h):
     """Derivatives of a ground law's value and slope at one place."""
     value, slope = 0.0, 0.0
     for k in range(len(beside)):
@@ -97,7 +97,8 @@ def _ground_rates(address, xi, beside, h):  # type: ignore[no-untyped-def]
 
 
 @helper
-def node_rates(j, xi, slip, height, height_rate, z, F, shifts, s, r, h, laws, force, partial, room, room_rates, memory):  # type: ignore[no-untyped-def] # noqa: E501
+def node_rates(j, xi, slip, height, height_rate, z, F, shifts, s, r, h, laws, force, partial,
+               room, room_rates, memory):
     """Derivatives of F, R, slip velocity and pressing force at node j.
 
     ``shifts`` holds those of xi, height, slip velocity and rate of the height by themselves;

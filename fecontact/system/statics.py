@@ -18,12 +18,12 @@ _UNBALANCED = 1e-6
 
 
 @friction_law
-def _frictionless(v, F, p):  # type: ignore[no-untyped-def]
+def _frictionless(v, F, p):
     return 0.0, 0.0, 0.0
 
 
 @signal
-def _still(t, p):  # type: ignore[no-untyped-def]
+def _still(t, p):
     return p[0], 0.0
 
 

@@ -10,7 +10,7 @@ from fecontact.system.kernels import SYSTEM, SystemArrays, memory_of, node_force
 
 
 @kernel(types.void(f8, vector, SYSTEM))
-def _settle(t, y, s):  # type: ignore[no-untyped-def]
+def _settle(t, y, s):
     """Move the z of each node to where z' = 0, by implicit Euler steps that grow without end."""
     n = len(s.Tx)
     states = s.memory.max()

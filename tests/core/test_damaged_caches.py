@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+import fecontact
+from fecontact.core import compiled
+
 MODULE = '''
 from fecontact.core.compiled import compile_law, f8, kernel
 
@@ -89,3 +92,10 @@ def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path):
         path.unlink()
         path.mkdir()
     assert hits(tmp_path) == ["0", "0"]
+
+
+def test_compiled_code_is_known_by_all_sources_that_it_calls():
+    """Else a changed law or helper would leave the code of kernels in other files as it was."""
+    package = Path(fecontact.__file__).parent
+    reached = compiled._imported(package / "system" / "kernels.py")
+    assert {package / "laws" / "signatures.py", package / "core" / "compiled.py"} <= reached

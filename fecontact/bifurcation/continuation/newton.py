@@ -15,7 +15,7 @@ from fecontact.core.types import Array
 
 
 @helper
-def _product(weights, a, b):  # type: ignore[no-untyped-def]
+def _product(weights, a, b):
     total = 0.0
     for k in range(len(a)):
         total += weights[k] * a[k] * b[k]
@@ -23,19 +23,19 @@ def _product(weights, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel(f8(vector, vector, vector))
-def weighted_product(weights, a, b):  # type: ignore[no-untyped-def]
+def weighted_product(weights, a, b):
     """Sum w a b."""
     return _product(weights, a, b)
 
 
 @kernel(f8(vector, vector))
-def weighted_norm(weights, x):  # type: ignore[no-untyped-def]
+def weighted_norm(weights, x):
     """Square root of sum w x x."""
     return math.sqrt(_product(weights, x, x))
 
 
 @kernel(types.void(vector, vector, vector, vector, vector))
-def right_side(residual, row, u, guess, rhs):  # type: ignore[no-untyped-def]
+def right_side(residual, row, u, guess, rhs):
     """Fill rhs (N + 1,) with the negative residual (N,) and the negative row (u - guess)."""
     total = 0.0
     for k in range(len(u)):
@@ -46,7 +46,7 @@ def right_side(residual, row, u, guess, rhs):  # type: ignore[no-untyped-def]
 
 
 @kernel(f8(vector, matrix, i8))
-def improve(weights, steps, count):  # type: ignore[no-untyped-def]
+def improve(weights, steps, count):
     """Correct steps[count], made with the matrix of steps[0], by what those before it taught.
 
     Broyden's update of the matrix, applied as sums over the steps. Returns the step's length.

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.parametrised_system import SystemFamily
-from fecontact.bifurcation.fields.vector_field import Array, VectorField
+from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period

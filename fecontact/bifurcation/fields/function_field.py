@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fecontact.bifurcation.fields import function_kernels as kernels
-from fecontact.bifurcation.fields.vector_field import Array, VectorField
+from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
+from fecontact.core.types import Array
 
 _FORM = "f(t, x, p, out)"
 _WAYS = ("automatic", "complex", "differences")

@@ -46,7 +46,7 @@ _EPS = 2.220446049250313e-16
 
 
 @helper
-def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, best, error):  # type: ignore[no-untyped-def]
+def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, best, error):
     """Fill best (d,) with the derivative to ``moved[at]``, an entry of y or q, and its error (d,).
 
     Central differences over steps h that are halved again and again, extrapolated to order six.
@@ -96,7 +96,7 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
 
 
 @helper
-def _roughness(function, t, y, q, moved, at, size, above, below, orders):  # type: ignore[no-untyped-def]
+def _roughness(function, t, y, q, moved, at, size, above, below, orders):
     """Fill orders[0] with how much the rates jump beside x: their rounding, cancellation included.
 
     It shows in second differences over steps, 1e-6 and less, over which the function is straight.
@@ -123,7 +123,7 @@ def _roughness(function, t, y, q, moved, at, size, above, below, orders):  # typ
 
 
 @helper
-def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, error, column):  # type: ignore[no-untyped-def]
+def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, error, column):
     """Put differences where the derivatives (d,) by the complex step are wrong; True if any are."""
     value, h = moved[at], _CHECK * size
     moved[at] = value + h
@@ -164,7 +164,7 @@ def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, 
 
 
 @kernel(types.void(i8, vector, matrix, vector, matrix))
-def batch_rates(address, t, x, p, f):  # type: ignore[no-untyped-def]
+def batch_rates(address, t, x, p, f):
     """Fill f (N, d)."""
     function = _rates_at(address)
     for k in range(len(t)):
@@ -172,7 +172,7 @@ def batch_rates(address, t, x, p, f):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(i8, vector, matrix, vector, block))
-def batch_jacobians(address, t, x, p, J):  # type: ignore[no-untyped-def]
+def batch_jacobians(address, t, x, p, J):
     """Fill J (N, d, d) by the function that gives one."""
     function = _jacobian_at(address)
     for k in range(len(t)):
@@ -181,7 +181,7 @@ def batch_jacobians(address, t, x, p, J):  # type: ignore[no-untyped-def]
 
 @kernel(types.void(i8, i8, vector, matrix, vector, vector, vector, matrix, integers,
                    types.boolean, matrix, complex_matrix, block, block, integers))
-def complex_steps(  # type: ignore[no-untyped-def]
+def complex_steps(
     address, complex_address, t, x, p, scales, sizes, f, active, states, room, complex_room, J, P,
     wrong,
 ):
@@ -235,7 +235,7 @@ def complex_steps(  # type: ignore[no-untyped-def]
 
 @kernel(types.void(i8, vector, matrix, vector, vector, vector, matrix, integers, types.boolean,
                    matrix, block, block))
-def differences(  # type: ignore[no-untyped-def]
+def differences(
     address, t, x, p, scales, sizes, f, active, states, room, J, P,
 ):
     """Fill J (N, d, d) if ``states``, and P (N, d, a), by extrapolated central differences."""

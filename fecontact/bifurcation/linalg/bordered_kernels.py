@@ -22,7 +22,7 @@ from fecontact.core.simd import LANES, gather, read, spread, write
 
 
 @helper
-def _parts(factors, pivots):  # type: ignore[no-untyped-def]
+def _parts(factors, pivots):
     """The three parts of a vector over the pivot rows."""
     groups, size, _, _ = factors.inner.shape
     d = len(factors.end)
@@ -35,7 +35,7 @@ def _parts(factors, pivots):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _take(given, first, group, groups, N, size, count, places, out):  # type: ignore[no-untyped-def]
+def _take(given, first, group, groups, N, size, count, places, out):
     """Fill out (count, 8) with given[j size + first ...] of a group's intervals, zero beyond N."""
     for lane in range(LANES):
         places[lane] = min(lane * groups + group, N - 1) * size + first
@@ -48,7 +48,7 @@ def _take(given, first, group, groups, N, size, count, places, out):  # type: ig
 
 
 @kernel(types.void(FACTORS, vector, vector, vector))
-def reduce_border(factors, given, weights, small):  # type: ignore[no-untyped-def]
+def reduce_border(factors, given, weights, small):
     """Reduce a border ``given`` (N m d + e,) to x_0, x_N and the common unknowns.
 
     Fills ``small`` (2 d + e,), and ``weights`` over the pivot rows with what its right side loses
@@ -114,7 +114,7 @@ def reduce_border(factors, given, weights, small):  # type: ignore[no-untyped-de
 
 
 @kernel(types.void(FACTORS, vector, vector, vector))
-def reduce_side(factors, rhs, reduced, side):  # type: ignore[no-untyped-def]
+def reduce_side(factors, rhs, reduced, side):
     """Reduce the right side of the collocation rows, the first N m d entries of ``rhs``.
 
     Fills ``reduced`` over the pivot rows, and ``side`` (d,), that of the rows of ``factors.end``.
@@ -166,7 +166,7 @@ def reduce_side(factors, rhs, reduced, side):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(FACTORS, vector, vector, vector, vector, vector))
-def expand(factors, reduced, start, end, common, out):  # type: ignore[no-untyped-def]
+def expand(factors, reduced, start, end, common, out):
     """Fill ``out`` (N m d,) with all nodes from x_0, x_N and the common unknowns."""
     factors, out, reduced = borrowed(factors), borrowed(out), borrowed(reduced)
     of_inner, of_chain, of_top = _parts(factors, reduced)
@@ -221,7 +221,7 @@ def expand(factors, reduced, start, end, common, out):  # type: ignore[no-untype
 
 
 @kernel(types.void(FACTORS, vector, matrix, matrix, f8, vector))
-def solve(factors, rhs, weights, small, closing, out):  # type: ignore[no-untyped-def]
+def solve(factors, rhs, weights, small, closing, out):
     """Fill ``out`` (N m d + e,) with the solution for a right side of all rows.
 
     ``small`` (d + b, 2 d + e) are the reduced rows, those of ``factors.end`` first, ``weights``

@@ -85,7 +85,7 @@ def _aligned(groups: int, rows: int, columns: int) -> Array:
 
 
 @helper
-def _take_links(local, group, groups, places, links):  # type: ignore[no-untyped-def]
+def _take_links(local, group, groups, places, links):
     """Fill links (d, 2 d + e, 8) with the equations of a group; x_j = x_(j+1) beyond the last."""
     N, d, columns = local.shape
     for lane in range(LANES):
@@ -102,7 +102,7 @@ def _take_links(local, group, groups, places, links):  # type: ignore[no-untyped
 
 
 @helper
-def _chain_segments(local, chain, order, end):  # type: ignore[no-untyped-def]
+def _chain_segments(local, chain, order, end):
     """Eliminate all but the ends of each segment; ``end`` (d, 2 d + e, 8) links these."""
     d, columns, _ = end.shape
     e = columns - 2 * d
@@ -131,7 +131,7 @@ def _chain_segments(local, chain, order, end):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(FACTORS))
-def chain_intervals(factors):  # type: ignore[no-untyped-def]
+def chain_intervals(factors):
     """Eliminate x_1, x_2, ... from the equations ``local`` of the intervals."""
     factors = borrowed(factors)
     top, end = factors.top, factors.end
@@ -162,7 +162,7 @@ def chain_intervals(factors):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(block, matrix, block, vector, f8, matrix, matrix, i8, FACTORS))
-def condense(J, f, P, widths, T, values, slopes, with_period, factors):  # type: ignore[no-untyped-def]
+def condense(J, f, P, widths, T, values, slopes, with_period, factors):
     """Factorise the system of x' = T f on intervals.
 
     J (N m, d, d), f (N m, d) and P (N m, d, q) at the collocation points; values and slopes

@@ -9,7 +9,7 @@ from fecontact.core.simd import LANES, magnitude, read, spread, where_larger, wr
 
 
 @helper
-def eliminate(a, count, pivots):  # type: ignore[no-untyped-def]
+def eliminate(a, count, pivots):
     """Eliminate the first columns of a (rows, columns) in place, with row interchanges."""
     rows, columns = a.shape
     for k in range(count):
@@ -44,7 +44,7 @@ def eliminate(a, count, pivots):  # type: ignore[no-untyped-def]
 
 
 @helper
-def forward(a, count, pivots, r):  # type: ignore[no-untyped-def]
+def forward(a, count, pivots, r):
     """Apply to a right side r (rows,) what :func:`eliminate` did to the rows."""
     for k in range(count):
         row = pivots[k]
@@ -57,7 +57,7 @@ def forward(a, count, pivots, r):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _with_pivot(a, k, order, room):  # type: ignore[no-untyped-def]
+def _with_pivot(a, k, order, room):
     """Bring the largest entry of column k to row k in each lane; its inverse, kept there."""
     rows, columns, _ = a.shape
     largest, place = magnitude(read(a[k, k])), spread(float(k))
@@ -87,7 +87,7 @@ def _with_pivot(a, k, order, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def eliminate_lanes(a, count, order, room):  # type: ignore[no-untyped-def]
+def eliminate_lanes(a, count, order, room):
     """As :func:`eliminate` for a (rows, columns, 8); ``order`` (rows, 8) is filled.
 
     Four columns are eliminated from the rows below at once: less is read and written.
@@ -132,7 +132,7 @@ def eliminate_lanes(a, count, order, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def reduce_row(a, count, row, weights):  # type: ignore[no-untyped-def]
+def reduce_row(a, count, row, weights):
     """Eliminate the first entries of a further row (columns,); ``weights`` (count,) says how."""
     columns = len(row)
     for k in range(count):
@@ -143,7 +143,7 @@ def reduce_row(a, count, row, weights):  # type: ignore[no-untyped-def]
 
 
 @helper
-def reduce_row_lanes(a, count, row, weights):  # type: ignore[no-untyped-def]
+def reduce_row_lanes(a, count, row, weights):
     """As :func:`reduce_row`, for a row (columns, 8)."""
     columns = len(row)
     for k in range(count):
@@ -154,7 +154,7 @@ def reduce_row_lanes(a, count, row, weights):  # type: ignore[no-untyped-def]
 
 
 @helper
-def forward_lanes(a, count, r):  # type: ignore[no-untyped-def]
+def forward_lanes(a, count, r):
     """As :func:`forward`, for r (rows, 8) whose rows are in their order already."""
     rows = len(r)
     for k in range(count):
@@ -164,7 +164,7 @@ def forward_lanes(a, count, r):  # type: ignore[no-untyped-def]
 
 
 @helper
-def back_lanes(a, count, r, known):  # type: ignore[no-untyped-def]
+def back_lanes(a, count, r, known):
     """Fill known[:count] (.., 8), the rest given, from the reduced right side r (count, 8)."""
     width = len(known)
     for i in range(count):

@@ -26,7 +26,7 @@ _STEPS = 60  # shifted steps for one eigenvalue before it is given up
 
 
 @helper
-def _rotation(x, y):  # type: ignore[no-untyped-def]
+def _rotation(x, y):
     """Real c and complex s with [[c, s], [-s', c]] [x, y] = [r, 0]."""
     size = math.hypot(abs(x), abs(y))
     if size == 0.0 or abs(y) == 0.0:
@@ -38,7 +38,7 @@ def _rotation(x, y):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _rows(a, k, c, s, first, last):  # type: ignore[no-untyped-def]
+def _rows(a, k, c, s, first, last):
     """Rotate rows k, k + 1 from the left, columns first .. last - 1."""
     for i in range(first, last):
         x, y = a[k, i], a[k + 1, i]
@@ -47,7 +47,7 @@ def _rows(a, k, c, s, first, last):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _columns(a, k, c, s, last):  # type: ignore[no-untyped-def]
+def _columns(a, k, c, s, last):
     """Multiply from the right by the inverse of the same rotation, rows 0 .. last - 1."""
     for i in range(last):
         x, y = a[i, k], a[i, k + 1]
@@ -56,7 +56,7 @@ def _columns(a, k, c, s, last):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _upward(H, k, c, s):  # type: ignore[no-untyped-def]
+def _upward(H, k, c, s):
     """Carry a rotation of rows k, k + 1 of H[0] through the triangular factors, back to H[0].
 
     It changes the basis between H[0] and H[1]; the last rotation acts on the columns of H[0].
@@ -72,7 +72,7 @@ def _upward(H, k, c, s):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _to_hessenberg(H):  # type: ignore[no-untyped-def]
+def _to_hessenberg(H):
     """Make H[1:] upper triangular and H[0] upper Hessenberg by changes of basis."""
     K, d, _ = H.shape
     for j in range(1, K):
@@ -92,7 +92,7 @@ def _to_hessenberg(H):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _corner(H, k):  # type: ignore[no-untyped-def]
+def _corner(H, k):
     """Product of the blocks k, k + 1 of H[1:], upper triangular, scaled by 2^-exponent."""
     a, b, c = 1.0 + 0.0j, 0.0 + 0.0j, 1.0 + 0.0j
     exponent = 0
@@ -112,7 +112,7 @@ def _corner(H, k):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _shift(H, last):  # type: ignore[no-untyped-def]
+def _shift(H, last):
     """Eigenvalue of the last block of the product nearest its corner, and its exponent."""
     a, b, c, exponent = _corner(H, last - 1)
     h = H[0]
@@ -129,7 +129,7 @@ def _shift(H, last):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _step(H, first, last, exceptional):  # type: ignore[no-untyped-def]
+def _step(H, first, last, exceptional):
     """One shifted step on the block first .. last."""
     K, d, _ = H.shape
     sigma, power = _shift(H, last)
@@ -170,7 +170,7 @@ def _step(H, first, last, exceptional):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _plain_step(H, first, last, cosines, sines):  # type: ignore[no-untyped-def]
+def _plain_step(H, first, last, cosines, sines):
     """One step without a shift; it parts eigenvalues that are decades apart."""
     d = H.shape[1]
     for k in range(first, last):
@@ -183,7 +183,7 @@ def _plain_step(H, first, last, cosines, sines):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.boolean(block, _complex_vector))
-def product_eigenvalues(M, values):  # type: ignore[no-untyped-def]
+def product_eigenvalues(M, values):
     """Fill the d eigenvalues of M[N - 1] ... M[0] (N, d, d), used up; the largest first.
 
     Returns whether they were found.

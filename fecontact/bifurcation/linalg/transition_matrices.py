@@ -10,7 +10,7 @@ from fecontact.core.compiled import block, borrowed, helper, kernel
 
 
 @helper
-def _solve(a, b, size):  # type: ignore[no-untyped-def]
+def _solve(a, b, size):
     """Replace b by a^-1 b, with row interchanges; a is used up."""
     for k in range(size):
         row = k
@@ -38,7 +38,7 @@ def _solve(a, b, size):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(FACTORS, block))
-def transitions(factors, out):  # type: ignore[no-untyped-def]
+def transitions(factors, out):
     """Fill out (N, d, d) with M_j, x_(j+1) = M_j x_j, of the condensed intervals."""
     factors, out = borrowed(factors), borrowed(out)
     local = factors.local
@@ -53,7 +53,7 @@ def transitions(factors, out):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.i8(block))
-def merge(M):  # type: ignore[no-untyped-def]
+def merge(M):
     """Multiply neighbours of M (N, d, d) in place as long as no digits are lost.
 
     A product is closed before the bound of its condition number passes 100. Returns the number of

@@ -10,7 +10,7 @@ from fecontact.core.compiled import borrowed, f8, kernel, matrix, vector
 
 
 @kernel(types.void(vector, vector, vector, vector, vector, vector))
-def fill_mesh(mesh, points, scales, widths, times, weights):  # type: ignore[no-untyped-def]
+def fill_mesh(mesh, points, scales, widths, times, weights):
     """Fill widths (N,), times (N m,) of the Gauss points, and weights of the inner product.
 
     scales are those of the states, the first d, and of the unknowns at the end of the weights.
@@ -31,7 +31,7 @@ def fill_mesh(mesh, points, scales, widths, times, weights):  # type: ignore[no-
 
 
 @kernel(types.void(matrix, vector, matrix, matrix, vector))
-def fill_phase_row(nodes, gauss_weights, values, slopes, row):  # type: ignore[no-untyped-def]
+def fill_phase_row(nodes, gauss_weights, values, slopes, row):
     """Fill row with the nodes' weights (N m d,) in int <x, y'>, y with these nodes, then zeros."""
     nodes, row = borrowed(nodes), borrowed(row)
     values, slopes = borrowed(values), borrowed(slopes)
@@ -52,7 +52,7 @@ def fill_phase_row(nodes, gauss_weights, values, slopes, row):  # type: ignore[n
 
 
 @kernel(types.void(matrix, matrix, matrix, matrix, matrix))
-def at_points(nodes, values, slopes, x, rates):  # type: ignore[no-untyped-def]
+def at_points(nodes, values, slopes, x, rates):
     """Fill x and rates (N m, d), values and interval-scaled slopes, from nodes (N m, d)."""
     nodes, x, rates = borrowed(nodes), borrowed(x), borrowed(rates)
     m = len(values)
@@ -74,7 +74,7 @@ def at_points(nodes, values, slopes, x, rates):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(matrix, matrix, vector, f8, vector, vector, vector))
-def fill_residual(slopes, f, widths, T, phase_row, u, out):  # type: ignore[no-untyped-def]
+def fill_residual(slopes, f, widths, T, phase_row, u, out):
     """Fill out with slopes - h T f (N m d,) and, where there is room, the phase condition."""
     slopes, f, out = borrowed(slopes), borrowed(f), borrowed(out)
     phase_row, u = borrowed(phase_row), borrowed(u)
@@ -93,7 +93,7 @@ def fill_residual(slopes, f, widths, T, phase_row, u, out):  # type: ignore[no-u
 
 
 @kernel(types.void(matrix, matrix, vector, matrix))
-def to_nodes(at_points, values, widths, out):  # type: ignore[no-untyped-def]
+def to_nodes(at_points, values, widths, out):
     """Fill out (N m, d), the nodes' weights in sum_j h_j sum_c values_ck at_points_jc x_jk."""
     at_points, out = borrowed(at_points), borrowed(out)
     m = len(values)

@@ -149,7 +149,7 @@ _complex_vector = types.Array(types.complex128, 1, "C")
 
 
 @kernel(types.void(_complex_vector, i8, vector))
-def multiplier_tests(mu, trivial, out):  # type: ignore[no-untyped-def]
+def multiplier_tests(mu, trivial, out):
     """Fill out (3,) with the products of mu + 1, mu - 1 and, over pairs, mu_i mu_k - 1, scaled.
 
     Without the multiplier ``trivial``, if it is not negative. They change sign where a multiplier

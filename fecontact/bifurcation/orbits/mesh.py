@@ -59,7 +59,7 @@ def rule(degree: int) -> Rule:
 
 
 @helper
-def _scales_of_basis(m):  # type: ignore[no-untyped-def]
+def _scales_of_basis(m):
     """What each basis polynomial is divided by to be one at its own node."""
     scales = np.ones(m + 1)
     for k in range(m + 1):
@@ -70,7 +70,7 @@ def _scales_of_basis(m):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _basis_at(mesh, t, j, scales, weights):  # type: ignore[no-untyped-def]
+def _basis_at(mesh, t, j, scales, weights):
     """Fill weights (m + 1,) of the nodes of the interval of t; its index, looked for from j on."""
     N, m = len(mesh) - 1, len(weights) - 1
     while j > 0 and t < mesh[j]:
@@ -88,7 +88,7 @@ def _basis_at(mesh, t, j, scales, weights):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _combined(nodes, j, weights, out):  # type: ignore[no-untyped-def]
+def _combined(nodes, j, weights, out):
     """Fill out (d,) with the weighted nodes of interval j."""
     total, d = nodes.shape
     m = len(weights) - 1
@@ -103,7 +103,7 @@ def _combined(nodes, j, weights, out):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(vector, matrix, vector, matrix))
-def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
+def _interpolate(mesh, nodes, times, out):
     """Fill out (k, d); the times need not be in order."""
     mesh, nodes, times, out = borrowed(mesh), borrowed(nodes), borrowed(times), borrowed(out)
     m = len(nodes) // (len(mesh) - 1)
@@ -115,7 +115,7 @@ def _interpolate(mesh, nodes, times, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _fill_other_mesh(mesh, renewed, given, weights, scales, out):  # type: ignore[no-untyped-def]
+def _fill_other_mesh(mesh, renewed, given, weights, scales, out):
     mesh, renewed, given, out = borrowed(mesh), borrowed(renewed), borrowed(given), borrowed(out)
     weights, scales = borrowed(weights), borrowed(scales)
     m = len(weights) - 1
@@ -141,7 +141,7 @@ def _fill_other_mesh(mesh, renewed, given, weights, scales, out):  # type: ignor
 
 
 @kernel(types.void(vector, vector, i8, matrix, matrix))
-def carry_over(mesh, renewed, m, given, out):  # type: ignore[no-untyped-def]
+def carry_over(mesh, renewed, m, given, out):
     """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
 
     The e last entries of each, which are no nodes, are copied.
@@ -157,7 +157,7 @@ def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
 
 
 @kernel(types.void(matrix, matrix, vector, vector))
-def _extremes(nodes, fine, low, high):  # type: ignore[no-untyped-def]
+def _extremes(nodes, fine, low, high):
     """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k places."""
     nodes, fine = borrowed(nodes), borrowed(fine)
     total, d = nodes.shape
@@ -208,7 +208,7 @@ def node_times(mesh: Array, degree: int) -> Array:
 
 
 @helper
-def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
+def _monitor(mesh, nodes, top, share):
     """Fill share (N,) with h |x^(m+1)|^(1/(m+1)) of each interval."""
     N = len(share)
     total, d = nodes.shape
@@ -240,7 +240,7 @@ def _monitor(mesh, nodes, top, share):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(vector, matrix, vector, vector))
-def _equidistribute(mesh, nodes, top, renewed):  # type: ignore[no-untyped-def]
+def _equidistribute(mesh, nodes, top, renewed):
     """Fill a mesh, see :func:`equidistributed`."""
     mesh, nodes, top, renewed = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(renewed)
     N, intervals = len(mesh) - 1, len(renewed) - 1

@@ -24,7 +24,7 @@ PARTS = 3 + len(DENSE)
 
 
 @helper
-def step(t, latest, h, Y, p, status, closed, w, slopes, new):  # type: ignore[no-untyped-def]
+def step(t, latest, h, Y, p, status, closed, w, slopes, new):
     """Put the state after h into ``new``; slopes[0] is Y' at t, slopes[12] becomes that at t + h.
 
     ``slopes`` is (SLOPES, size). What is given in time counts as it is at ``latest`` or before.
@@ -45,7 +45,7 @@ def step(t, latest, h, Y, p, status, closed, w, slopes, new):  # type: ignore[no
 
 
 @helper
-def error(h, Y, new, slopes, rtol, floor):  # type: ignore[no-untyped-def]
+def error(h, Y, new, slopes, rtol, floor):
     """Error of a step in units of what is allowed, ``rtol (floor + |Y|)``, the largest of all."""
     fifth, third = 0.0, 0.0
     for i in range(len(Y)):
@@ -64,7 +64,7 @@ def error(h, Y, new, slopes, rtol, floor):  # type: ignore[no-untyped-def]
 
 
 @helper
-def prepare_dense(t, h, Y, new, p, status, closed, w, slopes, room, parts):  # type: ignore[no-untyped-def]
+def prepare_dense(t, h, Y, new, p, status, closed, w, slopes, room, parts):
     """Fill ``parts`` (PARTS, size) for `interpolate`; needs three more slopes."""
     size = len(Y)
     for extra in range(len(A_DENSE)):
@@ -88,7 +88,7 @@ def prepare_dense(t, h, Y, new, p, status, closed, w, slopes, room, parts):  # t
 
 
 @helper
-def interpolate(theta, Y, parts, out):  # type: ignore[no-untyped-def]
+def interpolate(theta, Y, parts, out):
     """State at the part theta of the step."""
     for i in range(len(Y)):
         total = 0.0

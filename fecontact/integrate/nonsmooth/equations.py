@@ -48,13 +48,13 @@ _derivative_at = function_at(DERIVATIVE)
 
 
 @helper
-def derivative(t, Y, p, status, closed, w, out):  # type: ignore[no-untyped-def]
+def derivative(t, Y, p, status, closed, w, out):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
     _derivative_at(p.derivative)(t, Y, p, status, closed, w, out)
 
 
 @helper
-def solve(A, b, size):  # type: ignore[no-untyped-def]
+def solve(A, b, size):
     """Solve A x = b of the given size in place, with row exchanges; x is in b."""
     for k in range(size):
         pivot = k
@@ -78,7 +78,7 @@ def solve(A, b, size):  # type: ignore[no-untyped-def]
 
 
 @helper
-def speed_rate(t, p):  # type: ignore[no-untyped-def]
+def speed_rate(t, p):
     """Acceleration of the ground, from its speed."""
     s, d = p.system, p.tick
     near = (signal_at(s.ground_motion)(t + d, s.ground_motion_parameters)[1]
@@ -89,7 +89,7 @@ def speed_rate(t, p):  # type: ignore[no-untyped-def]
 
 
 @helper
-def free_acceleration(t, Y, s, out):  # type: ignore[no-untyped-def]
+def free_acceleration(t, Y, s, out):
     """Fill out (m,) with q'' without contact."""
     m = s.Tx.shape[1]
     drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
@@ -107,7 +107,7 @@ def free_acceleration(t, Y, s, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def contact_powers(t, s, nodes, friction, elastic, out):  # type: ignore[no-untyped-def]
+def contact_powers(t, s, nodes, friction, elastic, out):
     """Add the powers at the nodes to out (8,) and put those of friction behind them (n,).
 
     ``elastic`` says whether the normal forces come from the normal laws.
@@ -125,7 +125,7 @@ def contact_powers(t, s, nodes, friction, elastic, out):  # type: ignore[no-unty
 
 
 @helper
-def observe(t, Y, p, nodes):  # type: ignore[no-untyped-def]
+def observe(t, Y, p, nodes):
     """Fill ``nodes`` from the positions and velocities in Y; rigid stops have no force yet."""
     s = p.system
     travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
@@ -154,14 +154,14 @@ def observe(t, Y, p, nodes):  # type: ignore[no-untyped-def]
 
 
 @helper
-def slipping_force(j, slip, sign, pressing, s):  # type: ignore[no-untyped-def]
+def slipping_force(j, slip, sign, pressing, s):
     """R of node j that slips with the given sign, also where its slip velocity is still zero."""
     v = sign * max(sign * slip, CREEP)
     return friction_at(s.friction[j])(v, pressing, s.friction_parameters[j])[0]
 
 
 @helper
-def hold_stops(t, p, closed, w, acceleration):  # type: ignore[no-untyped-def]
+def hold_stops(t, p, closed, w, acceleration):
     """Normal forces of closed rigid stops, from u'' = 0, put into w.nodes and ``acceleration``."""
     s = p.system
     n, m = s.Tx.shape
@@ -193,7 +193,7 @@ def hold_stops(t, p, closed, w, acceleration):  # type: ignore[no-untyped-def]
 
 
 @helper
-def hold_clusters(t, p, status, w, acceleration):  # type: ignore[no-untyped-def]
+def hold_clusters(t, p, status, w, acceleration):
     """Friction forces of sticking clusters, from a = 0, put into w.total and ``acceleration``."""
     clusters, m = p.rows.shape
     count = 0
@@ -222,7 +222,7 @@ def hold_clusters(t, p, status, w, acceleration):  # type: ignore[no-untyped-def
             acceleration[i] -= p.rows[c, i] * w.right[a]
 
 
-def _derivative(  # type: ignore[no-untyped-def]
+def _derivative(
     t, held_Y, held_p, held_status, held_closed, held_w, held_out,
 ):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""

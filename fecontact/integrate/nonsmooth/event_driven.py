@@ -47,7 +47,7 @@ EARLY = 0.25
 
 @kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
                  integers, vector, i8, matrix, matrix, matrix, WORKSPACE, ROOM))
-def run_events(  # type: ignore[no-untyped-def]
+def run_events(
     clock, held_times, stops, held_p, rtol, longest, held_floor, held_Y, held_status, held_closed,
     counts, largest, limit, held_states, held_friction, held_normal, held_w, held_room,
 ):

@@ -110,7 +110,7 @@ def room_for(problem: Problem, size: int) -> Room:
 
 
 @helper
-def _along(rows, j, first, Y, parts, c, b):  # type: ignore[no-untyped-def]
+def _along(rows, j, first, Y, parts, c, b):
     """Coefficients b of ``rows[j] Y[first:]`` over the step; returns the size of its terms."""
     size = 0.0
     c[:] = 0.0
@@ -125,7 +125,7 @@ def _along(rows, j, first, Y, parts, c, b):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _through(values, b):  # type: ignore[no-untyped-def]
+def _through(values, b):
     """Add to b the polynomial through values at the places."""
     for k in range(len(b)):
         for i in range(len(values)):
@@ -133,7 +133,7 @@ def _through(values, b):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _slip(k, sign, t, h, Y, parts, p, c, b, values):  # type: ignore[no-untyped-def]
+def _slip(k, sign, t, h, Y, parts, p, c, b, values):
     """Coefficients b of ``sign`` times the slip velocity of cluster k, raised by its rounding."""
     s = p.system
     size = _along(p.rows, k, s.Tx.shape[1], Y, parts, c, b)
@@ -152,7 +152,7 @@ def _slip(k, sign, t, h, Y, parts, p, c, b, values):  # type: ignore[no-untyped-
 
 
 @helper
-def _add_ground(j, t, h, Y, parts, p, c, b, x, values):  # type: ignore[no-untyped-def]
+def _add_ground(j, t, h, Y, parts, p, c, b, x, values):
     """Add the ground under node j to b; returns the part of the step that resolves its waves."""
     s = p.system
     if p.relief[2] == np.inf:
@@ -171,13 +171,13 @@ def _add_ground(j, t, h, Y, parts, p, c, b, x, values):  # type: ignore[no-untyp
 
 
 @helper
-def pressed(u, j, s):  # type: ignore[no-untyped-def]
+def pressed(u, j, s):
     """Magnitude of the elastic normal force of node j at penetration u."""
     return abs(normal_at(s.normal[j])(u, 0.0, s.normal_parameters[j])[0])
 
 
 @helper
-def first_pressed(b, above, finest, j, s, room):  # type: ignore[no-untyped-def]
+def first_pressed(b, above, finest, j, s, room):
     """Where the penetration with coefficients b first makes a force above a bound.
 
     To a part ``finest`` of the step, the later end of it; the law's force must not fall while
@@ -207,7 +207,7 @@ def first_pressed(b, above, finest, j, s, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _forces(t, latest, h, part, Y, parts, p, status, closed, w, state, rate, out):  # type: ignore[no-untyped-def]
+def _forces(t, latest, h, part, Y, parts, p, status, closed, w, state, rate, out):
     """Fill out (2 k + n,) with what sticking clusters and closed stops have left, both ways."""
     interpolate(part, Y, parts, state)
     derivative(min(t + part * h, latest), state, p, status, closed, w, rate)
@@ -226,7 +226,7 @@ def _forces(t, latest, h, part, Y, parts, p, status, closed, w, state, rate, out
 
 
 @helper
-def _past(out, size):  # type: ignore[no-untyped-def]
+def _past(out, size):
     past = False
     for r in range(len(out)):
         past = past or out[r] < -_FORCE_ROUNDING * size[r]
@@ -234,7 +234,7 @@ def _past(out, size):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _first_let_go(t, latest, h, end, Y, p, status, closed, w, room):  # type: ignore[no-untyped-def]
+def _first_let_go(t, latest, h, end, Y, p, status, closed, w, room):
     """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
     clusters, count = len(p.rows), 2 * len(p.rows) + len(closed)
     parts, state, rate, left, size = room.parts, room.state, room.rate, room.left, room.scale
@@ -285,7 +285,7 @@ def _first_let_go(t, latest, h, end, Y, p, status, closed, w, room):  # type: ig
 
 
 @kernel(types.f8(f8, f8, f8, vector, PROBLEM, integers, integers, WORKSPACE, vector, f8, ROOM))
-def first_changes(  # type: ignore[no-untyped-def]
+def first_changes(
     t, latest, h, held_Y, held_p, held_status, held_closed, held_w, held_floor, rtol, held_room,
 ):
     """Fill ``room.place`` with the part of a step at which each cluster and stop first changes.

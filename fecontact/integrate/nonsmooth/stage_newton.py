@@ -39,7 +39,7 @@ KEPT, HESITANT, FREE = range(3)
 
 
 @helper
-def _linearise(  # type: ignore[no-untyped-def]
+def _linearise(
         t, Y, g, p, grip, multiplier, side, turning, force, gradients, active, balance):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
@@ -109,7 +109,7 @@ def _linearise(  # type: ignore[no-untyped-def]
 
 
 @helper
-def _residual(  # type: ignore[no-untyped-def]
+def _residual(
         t, g, start, known, Y, p, grip, multiplier, side, turning, force, room, balance,
         residual):
     """What is left of the equations of a stage, with places and contact at the velocities in Y."""
@@ -125,7 +125,7 @@ def _residual(  # type: ignore[no-untyped-def]
 
 
 @helper
-def solve_stage(  # type: ignore[no-untyped-def]
+def solve_stage(
         t, g, start, known, Y, p, grip, multiplier, side, force, room, linear,
         system_matrix, floor, rtol, finest):
     """Solve one stage for the velocities, Y[m : 2 m]; returns whether that succeeded.

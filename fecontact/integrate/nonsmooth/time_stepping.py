@@ -16,7 +16,7 @@ from numba import types
 
 from fecontact.core.compiled import borrowed, f8, helper, i8, integers, kernel, matrix, vector
 from fecontact.integrate.bernstein import DEPTH, NOWHERE, first_below, fit
-from fecontact.integrate.nonsmooth.equations import body_powers, contact_powers, observe
+from fecontact.integrate.nonsmooth.equations import contact_powers, observe
 from fecontact.integrate.nonsmooth.event_search import ROUGHLY, UNFELT, first_pressed, pressed
 from fecontact.integrate.nonsmooth.problem import (
     DIVERGED,
@@ -38,7 +38,7 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, solve_stage
 from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import drive_jump
+from fecontact.system.kernels import body_powers, drive_jump
 
 GAMMA = 0.43586652150845899942
 A21 = 0.5 * (1.0 - GAMMA)
@@ -52,7 +52,7 @@ CUTS = 3
 
 
 @helper
-def _passed_over(t, h, before, after, old, p, tolerance, floor, rtol, nodes, b, speed, room):  # type: ignore[no-untyped-def]
+def _passed_over(t, h, before, after, old, p, tolerance, floor, rtol, nodes, b, speed, room):
     """Part of a step at which a node slips back, or touches, between ends that show neither; or 1.
 
     ``old`` and ``nodes`` are what `observe` fills at both ends, ``before`` and ``after`` the
@@ -96,7 +96,7 @@ def _passed_over(t, h, before, after, old, p, tolerance, floor, rtol, nodes, b, 
 
 
 @helper
-def _output(  # type: ignore[no-untyped-def]
+def _output(
         row, time, t, h, Y, before, after, new, p, old_force, force, w, states, friction,
         normal):
     """State at an output time within a step, by cubics through both ends."""
@@ -120,7 +120,7 @@ def _output(  # type: ignore[no-untyped-def]
 
 @kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
                  integers, vector, i8, matrix, matrix, matrix, WORKSPACE))
-def run_steps(  # type: ignore[no-untyped-def]
+def run_steps(
     clock, held_times, stops, held_p, rtol, longest, held_floor, held_Y, status, closed, counts,
     held_carried, limit, held_states, held_friction, held_normal, held_w,
 ):

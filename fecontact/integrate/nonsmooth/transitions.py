@@ -30,7 +30,7 @@ SWEEPS = 20000
 
 
 @helper
-def hold_velocity(p, held, w, Y):  # type: ignore[no-untyped-def]
+def hold_velocity(p, held, w, Y):
     """Change q' so that the held clusters have no slip velocity; w.slip must be theirs."""
     clusters, m = p.rows.shape
     count = 0
@@ -54,7 +54,7 @@ def hold_velocity(p, held, w, Y):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _least_friction(p, candidate, relative, w):  # type: ignore[no-untyped-def]
+def _least_friction(p, candidate, relative, w):
     """Forces of the candidates put into w.right, and what remains of a into ``relative``."""
     clusters, m = p.rows.shape
     for c in range(clusters):
@@ -81,7 +81,7 @@ def _least_friction(p, candidate, relative, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def decide_clusters(  # type: ignore[no-untyped-def]
+def decide_clusters(
         t, Y, p, released, arrived, near, status, fresh, closed, w, out):
     """Set the status of all clusters at a moment at which some may change.
 
@@ -139,7 +139,7 @@ def decide_clusters(  # type: ignore[no-untyped-def]
 
 
 @helper
-def _stop_matrix(p, w):  # type: ignore[no-untyped-def]
+def _stop_matrix(p, w):
     """Fill w.matrix (n, n) with the change of -u' of each node by unit impulses at the others."""
     s = p.system
     n, m = s.Tx.shape
@@ -152,7 +152,7 @@ def _stop_matrix(p, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _impulses(touching, wanted, w):  # type: ignore[no-untyped-def]
+def _impulses(touching, wanted, w):
     """Impulses (n,) of the touching nodes, put into w.right, that bring ``wanted`` to zero."""
     n = len(touching)
     w.right[:] = 0.0
@@ -172,7 +172,7 @@ def _impulses(touching, wanted, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _push(p, touching, w, Y, first):  # type: ignore[no-untyped-def]
+def _push(p, touching, w, Y, first):
     """Bring the quantity in w.right of the touching nodes to zero: u (first 0) or u' (first m)."""
     s = p.system
     n, m = s.Tx.shape
@@ -195,7 +195,7 @@ def _push(p, touching, w, Y, first):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _pack(touching, w, column):  # type: ignore[no-untyped-def]
+def _pack(touching, w, column):
     count = 0
     for j in range(len(touching)):
         if touching[j]:
@@ -205,7 +205,7 @@ def _pack(touching, w, column):  # type: ignore[no-untyped-def]
 
 
 @helper
-def decide_stops(t, Y, p, touched, parting, slow, height, brief, status, closed, fresh, w, out):  # type: ignore[no-untyped-def]
+def decide_stops(t, Y, p, touched, parting, slow, height, brief, status, closed, fresh, w, out):
     """Impacts of the ``touched`` nodes, then which stops stay closed.
 
     ``parting`` nodes were closed and lift off. After the impact, stops whose penetration rate is

@@ -35,7 +35,7 @@ GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
 
 
 @helper
-def set_given(t, s, given, pull):  # type: ignore[no-untyped-def]
+def set_given(t, s, given, pull):
     """Fill ``given`` (6,) with what is given at time t, and ``pull`` (m,) with its modal force."""
     for axis in range(2):
         if s.drive_stiffness[axis] != 0.0:
@@ -53,7 +53,7 @@ def set_given(t, s, given, pull):  # type: ignore[no-untyped-def]
 
 
 @helper
-def project(shapes, y, places, speeds):  # type: ignore[no-untyped-def]
+def project(shapes, y, places, speeds):
     """Fill displacements and velocities (2 n,), all x, then all y, of the contact nodes."""
     m, rows = shapes.shape
     for j in range(rows):
@@ -74,7 +74,7 @@ def project(shapes, y, places, speeds):  # type: ignore[no-untyped-def]
 
 
 @helper
-def gather(y, s, shapes, pull, forces, rate):  # type: ignore[no-untyped-def]
+def gather(y, s, shapes, pull, forces, rate):
     """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -R, then all F."""
     m, rows = shapes.shape
     for i in range(m):
@@ -88,7 +88,7 @@ def gather(y, s, shapes, pull, forces, rate):  # type: ignore[no-untyped-def]
 
 
 @helper
-def set_rate(y, s, shapes, given, pull, w, small, rate):  # type: ignore[no-untyped-def]
+def set_rate(y, s, shapes, given, pull, w, small, rate):
     """Fill ``rate`` (size,) with y'. ``w`` (3, 2 n) and ``small`` are room to work in."""
     m, rows = shapes.shape
     n = rows // 2
@@ -109,7 +109,7 @@ def set_rate(y, s, shapes, given, pull, w, small, rate):  # type: ignore[no-unty
 
 
 @helper
-def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):  # type: ignore[no-untyped-def]
+def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):
     """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
     m, rows = shapes.shape
     n = rows // 2
@@ -130,7 +130,7 @@ def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):  # type: ig
 
 
 @helper
-def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):  # type: ignore[no-untyped-def]
+def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):
     """Fill ``out`` (size,) with df/dt at a fixed state.
 
     The ground that moves on under a node acts as the node moving back: travel enters with x,
@@ -160,7 +160,7 @@ def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):  # 
 
 
 @helper
-def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):  # type: ignore[no-untyped-def]
+def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):
     """Time until the forces of a node change their character, or ``within`` if later.
 
     By the velocity and acceleration of the nodes: touch-down and lift-off on level ground, the
@@ -194,7 +194,7 @@ def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):  # type: ig
 
 
 @helper
-def _crossing(u, v, a, within):  # type: ignore[no-untyped-def]
+def _crossing(u, v, a, within):
     """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
     if u * v > 0.0 and u * a >= 0.0:
         return within

@@ -9,7 +9,7 @@ from fecontact.system.kernels import powers
 
 
 @helper
-def state_error(control, progress, room):  # type: ignore[no-untyped-def]
+def state_error(control, progress, room):
     """Error of a step as a multiple of what is allowed, of modes and internal variables."""
     m = len(control.largest)
     difference = room.stages[tableau.STAGES - 1]
@@ -29,7 +29,7 @@ def state_error(control, progress, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def slip_error(error, s, shapes, control, progress, room):  # type: ignore[no-untyped-def]
+def slip_error(error, s, shapes, control, progress, room):
     """The larger of the error and that of the slip velocities at the end of the step.
 
     Only where friction has no memory: there the force follows the slip velocity alone.
@@ -51,7 +51,7 @@ def slip_error(error, s, shapes, control, progress, room):  # type: ignore[no-un
 
 
 @helper
-def energy_scale(control, progress, room):  # type: ignore[no-untyped-def]
+def energy_scale(control, progress, room):
     """The largest of kinetic energy, work of a power and the energy scale so far [J]."""
     m = len(control.largest)
     kinetic = 0.0
@@ -65,7 +65,7 @@ def energy_scale(control, progress, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def set_scale(control, progress, room):  # type: ignore[no-untyped-def]
+def set_scale(control, progress, room):
     """Fill ``room.right`` with the sizes of the state: what its errors count relative to."""
     m = len(control.largest)
     speed_scale = max(progress.numbers[SPEED_SCALE], control.speed_scale)
@@ -103,7 +103,7 @@ _DIFFERENCE = _third_difference()
 
 
 @helper
-def work_error(h, power):  # type: ignore[no-untyped-def]
+def work_error(h, power):
     """Estimated error of the work of the system's powers in a step, the largest of them [J]."""
     largest = 0.0
     for k in range(8):
@@ -115,7 +115,7 @@ def work_error(h, power):  # type: ignore[no-untyped-def]
 
 
 @helper
-def add_up(t, h, latest, s, progress, room):  # type: ignore[no-untyped-def]
+def add_up(t, h, latest, s, progress, room):
     """Fill ``room.power`` with the powers at the points of a step."""
     for k in range(len(progress.power)):
         room.power[0, k] = progress.power[k]
@@ -130,7 +130,7 @@ def add_up(t, h, latest, s, progress, room):  # type: ignore[no-untyped-def]
 
 
 @helper
-def work_until(part, h, before, power, out):  # type: ignore[no-untyped-def]
+def work_until(part, h, before, power, out):
     """Out = work ``before`` the step and in its part, by the cubic through the powers."""
     w0, w1, w2, w3 = _weight(0, part), _weight(1, part), _weight(2, part), _weight(3, part)
     for k in range(len(out)):
@@ -139,6 +139,6 @@ def work_until(part, h, before, power, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _weight(k, part):  # type: ignore[no-untyped-def]
+def _weight(k, part):
     c = _INTEGRALS[k]
     return part * (c[0] + part * (c[1] + part * (c[2] + part * c[3])))

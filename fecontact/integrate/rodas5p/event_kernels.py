@@ -109,7 +109,7 @@ note_events_at = function_at(NOTE)
 
 
 @helper
-def _between(x, places, values):  # type: ignore[no-untyped-def]
+def _between(x, places, values):
     """Linear interpolation, constant outside."""
     right = np.searchsorted(places, x)
     if right == 0 or right == len(places):
@@ -119,7 +119,7 @@ def _between(x, places, values):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _zone(j, t, y, s, watch, depth, force, rates):  # type: ignore[no-untyped-def]
+def _zone(j, t, y, s, watch, depth, force, rates):
     """State of node j, and whether it is past the depth of its normal law."""
     travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     x, height, x_rate, height_rate = kernels.node_motion(j, y, s)
@@ -137,7 +137,7 @@ def _zone(j, t, y, s, watch, depth, force, rates):  # type: ignore[no-untyped-de
 
 
 @helper
-def _note(watch, t, kind, node, y):  # type: ignore[no-untyped-def]
+def _note(watch, t, kind, node, y):
     row = watch.counts[FOUND]
     watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
     watch.states[row, :] = y
@@ -145,20 +145,20 @@ def _note(watch, t, kind, node, y):  # type: ignore[no-untyped-def]
 
 
 @helper
-def full(watch):  # type: ignore[no-untyped-def]
+def full(watch):
     """Whether the events of one more step may find no place."""
     most = (_MORE_LOOKS + PLACES) * (_MOST_A_NODE * len(watch.zones) + len(watch.own))
     return watch.counts[FOUND] + most > len(watch.found)
 
 
 @helper
-def _normal_zone(zone):  # type: ignore[no-untyped-def]
+def _normal_zone(zone):
     """What of a zone belongs to the normal force alone."""
     return (0 if zone % DEEP == OPEN else 1) + (2 if zone >= DEEP else 0)
 
 
 @helper
-def _state_at(part, before, after, dense, y):  # type: ignore[no-untyped-def]
+def _state_at(part, before, after, dense, y):
     if part == 1.0:
         y[:] = after
     else:
@@ -166,7 +166,7 @@ def _state_at(part, before, after, dense, y):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _changed(j, t, h, latest, low, high, s, watch, depth, force, rates, before, after, dense, y):  # type: ignore[no-untyped-def]
+def _changed(j, t, h, latest, low, high, s, watch, depth, force, rates, before, after, dense, y):
     """Where node j leaves its state between two parts of a step, and for which; y is set there."""
     old = watch.zones[j] % DEEP
     for _ in range(_HALVINGS):
@@ -182,7 +182,7 @@ def _changed(j, t, h, latest, low, high, s, watch, depth, force, rates, before, 
 
 
 @helper
-def _own(k, t, h, latest, left, right, before, after, dense, watch, y):  # type: ignore[no-untyped-def]
+def _own(k, t, h, latest, left, right, before, after, dense, watch, y):
     """Value of a user's function at the right end, after its change of sign has been noted."""
     g, p = event_at(watch.own[k]), watch.own_parameters[k]
     old = watch.own_values[k]
@@ -207,7 +207,7 @@ def _own(k, t, h, latest, left, right, before, after, dense, watch, y):  # type:
 
 
 @helper
-def _end(t, h, begun, watch):  # type: ignore[no-untyped-def]
+def _end(t, h, begun, watch):
     """Drop the events after the first at which the run stops; its part of the step, or 2."""
     stop = np.inf
     for row in range(begun, watch.counts[FOUND]):
@@ -226,7 +226,7 @@ def _end(t, h, begun, watch):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(f8, vector, SYSTEM, vector, WATCH, dynamics.GRADIENTS))
-def begin(t, y, held_s, depth, held_watch, scratch):  # type: ignore[no-untyped-def]
+def begin(t, y, held_s, depth, held_watch, scratch):
     """Take the state at the start of a run for that from which things change."""
     s, watch = borrowed(held_s), borrowed(held_watch)
     for j in range(len(watch.zones)):
@@ -237,7 +237,7 @@ def begin(t, y, held_s, depth, held_watch, scratch):  # type: ignore[no-untyped-
 
 @kernel(types.f8(f8, f8, f8, SYSTEM, vector, WATCH, dynamics.GRADIENTS, vector, vector, matrix,
                  vector))
-def next_switch(  # type: ignore[no-untyped-def]
+def next_switch(
     t, h, latest, held_s, held_depth, held_watch, held_scratch, held_before, held_after,
     held_dense, held_y,
 ):
@@ -266,7 +266,7 @@ def next_switch(  # type: ignore[no-untyped-def]
 
 
 @helper
-def _keep_between(count, row, watch):  # type: ignore[no-untyped-def]
+def _keep_between(count, row, watch):
     """Put the middles between changes of sign, of which there are so many, into a row of places."""
     found = watch.changed
     for i in range(1, count):
@@ -281,7 +281,7 @@ def _keep_between(count, row, watch):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _set_places(t, h, latest, s, control, before, room, watch):  # type: ignore[no-untyped-def]
+def _set_places(t, h, latest, s, control, before, room, watch):
     """Fill ``watch.places`` for a step."""
     n = len(watch.zones)
     b, row = room.bound[0], room.bound[2]
@@ -318,7 +318,7 @@ def _set_places(t, h, latest, s, control, before, room, watch):  # type: ignore[
 
 
 @helper
-def _note_changes(  # type: ignore[no-untyped-def]
+def _note_changes(
     j, zone, t, h, latest, left, right, s, watch, depth, force, rates, before, after, dense, y,
 ):
     """Note what node j does between two parts of a step, at whose right end it is in a zone."""
@@ -341,7 +341,7 @@ def _note_changes(  # type: ignore[no-untyped-def]
     watch.zones[j] = zone
 
 
-def _note_events(t, h, latest, held_s, held_control, held_before, held_room, held_watch):  # type: ignore[no-untyped-def]
+def _note_events(t, h, latest, held_s, held_control, held_before, held_room, held_watch):
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
     s, watch, room = borrowed(held_s), borrowed(held_watch), borrowed(held_room)
     control, before = borrowed(held_control), borrowed(held_before)

@@ -54,7 +54,7 @@ def reduced_for(modes: int, nodes: int, states: int) -> Reduced:
 
 
 @helper
-def factorise(a, pivots):  # type: ignore[no-untyped-def]
+def factorise(a, pivots):
     """LU factors of a (k, k) in place, with row interchanges; the diagonal is inverted."""
     size = len(pivots)
     for k in range(size):
@@ -75,7 +75,7 @@ def factorise(a, pivots):  # type: ignore[no-untyped-def]
 
 
 @helper
-def back_substitute(a, pivots, x):  # type: ignore[no-untyped-def]
+def back_substitute(a, pivots, x):
     """Solve in place with the factors of :func:`factorise`."""
     size = len(pivots)
     for k in range(size):
@@ -94,7 +94,7 @@ def back_substitute(a, pivots, x):  # type: ignore[no-untyped-def]
 
 
 @helper
-def eliminate_memory(G, s, g, w):  # type: ignore[no-untyped-def]
+def eliminate_memory(G, s, g, w):
     """Fill the inverse and the weights of the nodes, by Gauss-Jordan elimination."""
     n, states = w.weights.shape
     for j in range(n):
@@ -123,7 +123,7 @@ def eliminate_memory(G, s, g, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def products(a, b, out):  # type: ignore[no-untyped-def]
+def products(a, b, out):
     """Fill out[i, k] with the products of the rows a_i and b_k, two by two at a time."""
     rows, length = a.shape
     columns = len(b)
@@ -153,7 +153,7 @@ def products(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def set_answers(shapes, g, w):  # type: ignore[no-untyped-def]
+def set_answers(shapes, g, w):
     """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n)."""
     m, rows = shapes.shape
     n = rows // 2
@@ -181,7 +181,7 @@ def set_answers(shapes, g, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
+def assemble(s, shapes, g, w):
     """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
     m = len(shapes)
     set_answers(shapes, g, w)
@@ -193,7 +193,7 @@ def assemble(s, shapes, g, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def factorise_step(G, w):  # type: ignore[no-untyped-def]
+def factorise_step(G, w):
     """Factorise G^2 - G Jv - Jq."""
     m = len(w.pivots)
     for i in range(m):
@@ -204,7 +204,7 @@ def factorise_step(G, w):  # type: ignore[no-untyped-def]
 
 
 @helper
-def solve_stage(G, s, shapes, g, w, r, motion, out):  # type: ignore[no-untyped-def]
+def solve_stage(G, s, shapes, g, w, r, motion, out):
     """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, 2 n) is room to work in."""
     m, rows = shapes.shape
     n = rows // 2

@@ -52,7 +52,7 @@ _MOST_AGAIN = 20
 
 
 @helper
-def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):  # type: ignore[no-untyped-def]
+def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):
     """What a step needs of the derivatives at its start besides the matrices."""
     m = len(control.largest)
     later = min(t + 1e-4 * h, latest)
@@ -75,7 +75,7 @@ def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):  # ty
 
 
 @helper
-def _stages(t, h, latest, G, s, shapes, progress, room):  # type: ignore[no-untyped-def]
+def _stages(t, h, latest, G, s, shapes, progress, room):
     """All stages of a step, and its end in ``room.after``."""
     size = len(progress.state)
     m = len(room.pull)
@@ -104,7 +104,7 @@ def _stages(t, h, latest, G, s, shapes, progress, room):  # type: ignore[no-unty
 
 
 @helper
-def _go_on(progress, room):  # type: ignore[no-untyped-def]
+def _go_on(progress, room):
     """Make the end of the step the state of the run."""
     for k in range(len(progress.state)):
         progress.state[k] = room.after[k]
@@ -124,7 +124,7 @@ def _go_on(progress, room):  # type: ignore[no-untyped-def]
 @kernel(types.i8(SYSTEM, matrix, vector, state.CONTROL, state.PROGRESS, state.ROOM,
                  i8, matrix, matrix, SYSTEM, SYSTEM, f8, VARIATION, block, WATCH),
         nogil=True)
-def advance(  # type: ignore[no-untyped-def]
+def advance(
     held_system, held_shapes, held_times, held_control, held_progress, held_room, most, held_out,
     held_work, held_above, held_below, width, held_variation, held_transitions, held_watch,
 ):

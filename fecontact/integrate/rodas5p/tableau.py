@@ -69,7 +69,7 @@ DENSE = np.array([
 
 
 @helper
-def combined(row, factor, base, stages, out):  # type: ignore[no-untyped-def]
+def combined(row, factor, base, stages, out):
     """Out = base + factor * sum_j row_j stages_j over the seven stages that may precede one."""
     a0, a1, a2, a3 = factor * row[0], factor * row[1], factor * row[2], factor * row[3]
     a4, a5, a6 = factor * row[4], factor * row[5], factor * row[6]
@@ -79,7 +79,7 @@ def combined(row, factor, base, stages, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def dense_coefficients(stages, out):  # type: ignore[no-untyped-def]
+def dense_coefficients(stages, out):
     """Fill out (3, size) with the coefficients k_1, k_2, k_3 of the interpolant."""
     for row in range(3):
         a0, a1, a2, a3 = DENSE[row, 0], DENSE[row, 1], DENSE[row, 2], DENSE[row, 3]
@@ -91,7 +91,7 @@ def dense_coefficients(stages, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def interpolated(s, before, after, dense, out):  # type: ignore[no-untyped-def]
+def interpolated(s, before, after, dense, out):
     """Fill out with the state at the part s of the step."""
     for i in range(len(out)):
         out[i] = (1.0 - s) * before[i] + s * (after[i] + (1.0 - s) * (
@@ -99,7 +99,7 @@ def interpolated(s, before, after, dense, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def inner_coefficients(before, after, dense, out):  # type: ignore[no-untyped-def]
+def inner_coefficients(before, after, dense, out):
     """Fill out (3, size) with the Bernstein coefficients of the interpolant but the outer ones.
 
     It is of degree four; the first of its five coefficients is the state before the step, the

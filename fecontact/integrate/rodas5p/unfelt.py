@@ -35,7 +35,7 @@ _LOOKS = 8
 
 
 @helper
-def _matters(impulse, column, h, shapes, control, progress):  # type: ignore[no-untyped-def]
+def _matters(impulse, column, h, shapes, control, progress):
     """Whether an impulse on a node would be an error beyond the tolerance of the step."""
     speed_scale = max(progress.numbers[run_arrays.SPEED_SCALE], control.speed_scale)
     allowed = _PART * control.rtol
@@ -48,13 +48,13 @@ def _matters(impulse, column, h, shapes, control, progress):  # type: ignore[no-
 
 
 @helper
-def _push(j, u, v, s):  # type: ignore[no-untyped-def]
+def _push(j, u, v, s):
     """Normal force of node j."""
     return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
 
 
 @helper
-def _unfelt_push(j, inside, level, value, ends, brief, s):  # type: ignore[no-untyped-def]
+def _unfelt_push(j, inside, level, value, ends, brief, s):
     """Normal force that a stretch of ``brief`` s hides, where the gap over a level is ``value``.
 
     ``ends`` is the largest gap over the level, of either sign, at ends of the step that belong to
@@ -68,7 +68,7 @@ def _unfelt_push(j, inside, level, value, ends, brief, s):  # type: ignore[no-un
 
 
 @helper
-def _unfelt_rub(j, inside, F, slip, ends, s):  # type: ignore[no-untyped-def]
+def _unfelt_rub(j, inside, F, slip, ends, s):
     """The same of friction, for a slip velocity under the normal force F."""
     rub, p = friction_at(s.friction[j]), s.friction_parameters[j]
     force = abs(rub(slip, F, p)[0])
@@ -77,7 +77,7 @@ def _unfelt_rub(j, inside, F, slip, ends, s):  # type: ignore[no-untyped-def]
     return force if force > 2.0 * abs(rub(ends, F, p)[0]) else 0.0
 
 
-def _first_unfelt(  # type: ignore[no-untyped-def]
+def _first_unfelt(
     t, h, latest, again, held_s, held_shapes, held_control, held_progress, held_room,
 ):
     """Part of the step at which to end it because of what it did not feel; 2 if there is nothing.

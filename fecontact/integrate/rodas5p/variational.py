@@ -32,7 +32,7 @@ _JUMP = 3.0 * _PART
 
 
 @helper
-def probing_distance(u, shapes, slip_scale, depth, memory_scale, w):  # type: ignore[no-untyped-def]
+def probing_distance(u, shapes, slip_scale, depth, memory_scale, w):
     """Multiple e of the stage u that is small against the scales of all laws."""
     m, rows = shapes.shape
     n = rows // 2
@@ -47,7 +47,7 @@ def probing_distance(u, shapes, slip_scale, depth, memory_scale, w):  # type: ig
 
 
 @helper
-def _difference(ahead, here, behind, factor, forward, usual):  # type: ignore[no-untyped-def]
+def _difference(ahead, here, behind, factor, forward, usual):
     """Difference quotient, that of one side where a kink or a jump lies within reach.
 
     A difference that is not small against the ``usual`` size has met a jump. Of two sides that
@@ -65,7 +65,7 @@ def _difference(ahead, here, behind, factor, forward, usual):  # type: ignore[no
 
 
 @helper
-def learn(here, usual):  # type: ignore[no-untyped-def]
+def learn(here, usual):
     """Let the usual sizes be the largest seen."""
     n, states, width = here.rates.shape
     for j in range(n):
@@ -80,7 +80,7 @@ def learn(here, usual):  # type: ignore[no-untyped-def]
 
 
 @helper
-def set_sinking(t, y, s, shapes, v, out):  # type: ignore[no-untyped-def]
+def set_sinking(t, y, s, shapes, v, out):
     """Fill out (2, n): slope of the ground under each node, and rate of its penetration."""
     n = len(s.abscissa)
     travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
@@ -93,7 +93,7 @@ def set_sinking(t, y, s, shapes, v, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def differences(ahead, here, behind, usual, factor, u, travelled, sinking, shapes, w):  # type: ignore[no-untyped-def]
+def differences(ahead, here, behind, usual, factor, u, travelled, sinking, shapes, w):
     """Put the difference quotients of gradients along the stage u into those ahead.
 
     A stage that moves a node as the step does shows with its forward side what is within the
@@ -209,7 +209,7 @@ def variation_for(
 
 
 @helper
-def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # type: ignore[no-untyped-def]
+def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):
     """Fill out = factor (f of the system above less f of that below)."""
     dynamics.set_given(t, above, v.given, v.pull)
     dynamics.set_rate(Y, above, shapes, v.given, v.pull, v.nodes, v.behind, rate)
@@ -220,7 +220,7 @@ def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):  # 
 
 
 @helper
-def _largest_error(scale, v):  # type: ignore[no-untyped-def]
+def _largest_error(scale, v):
     largest = 0.0
     for c in range(len(v.columns)):
         before, after, error = 0.0, 0.0, 0.0
@@ -238,7 +238,7 @@ def _largest_error(scale, v):  # type: ignore[no-untyped-def]
 
 @kernel(types.f8(f8, f8, f8, f8, SYSTEM, SYSTEM, SYSTEM, f8, matrix, vector, vector, vector,
                  vector, dynamics.GRADIENTS, stage_solver.REDUCED, matrix, vector, VARIATION))
-def propagate(  # type: ignore[no-untyped-def]
+def propagate(
     t, h, latest, G, held_s, held_above, held_below, width, held_shapes, held_slip, held_depth,
     held_memory, held_state, held_gradients, held_reduced, held_stages, held_scale, held_v,
 ):
@@ -302,14 +302,14 @@ def propagate(  # type: ignore[no-untyped-def]
 
 
 @helper
-def keep(v):  # type: ignore[no-untyped-def]
+def keep(v):
     """Take the columns at the end of the step for those of the next."""
     v.columns[:] = v.after
     v.norms[0] = v.norms[1]
 
 
 @helper
-def begin_anew(v):  # type: ignore[no-untyped-def]
+def begin_anew(v):
     """Let the columns be the unit matrix again."""
     v.columns[:] = 0.0
     v.norms[0], v.norms[1] = v.least, v.least

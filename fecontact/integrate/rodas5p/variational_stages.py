@@ -15,7 +15,7 @@ _LARGE = 2000
 
 
 @helper
-def set_solver(G, reduced, v):  # type: ignore[no-untyped-def]
+def set_solver(G, reduced, v):
     """Fill v.solver (m, 2 m), which makes u_v of a right side: the factors' F^-1 [Jq, G I]."""
     m = len(reduced.pivots)
     x = reduced.room
@@ -30,7 +30,7 @@ def set_solver(G, reduced, v):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _products(a, b, out):  # type: ignore[no-untyped-def]
+def _products(a, b, out):
     """As :func:`stage_solver.products`; by BLAS where that is worth its call."""
     if len(a) * len(b) * a.shape[1] > _LARGE:
         np.dot(a, b.T, out)
@@ -39,7 +39,7 @@ def _products(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def all_at_once(i, h, G, s, shapes, reduced, forced, varies, v):  # type: ignore[no-untyped-def]
+def all_at_once(i, h, G, s, shapes, reduced, forced, varies, v):
     """Solve stage i of all columns; systems without internal variables."""
     count, size = v.columns.shape
     m = len(v.none)
@@ -77,7 +77,7 @@ def all_at_once(i, h, G, s, shapes, reduced, forced, varies, v):  # type: ignore
 
 
 @helper
-def _push(g, s, shapes, x, w, rate):  # type: ignore[no-untyped-def]
+def _push(g, s, shapes, x, w, rate):
     """Add to w[2] (2 n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
     m, rows = shapes.shape
     n = rows // 2
@@ -100,7 +100,7 @@ def _push(g, s, shapes, x, w, rate):  # type: ignore[no-untyped-def]
 
 
 @helper
-def one_by_one(i, h, G, s, shapes, gradients, reduced, forced, varies, v):  # type: ignore[no-untyped-def]
+def one_by_one(i, h, G, s, shapes, gradients, reduced, forced, varies, v):
     """Solve stage i of all columns; ``gradients`` are those at the start of the step."""
     count, size = v.columns.shape
     m = len(v.none)

@@ -17,7 +17,7 @@ _FADING = 1e-7
 
 
 @helper
-def _fade(z, rates):  # type: ignore[no-untyped-def]
+def _fade(z, rates):
     """The rate of one internal variable without normal force, when nothing drives it."""
     rates[0, 0] = -z[0] / _FADING
     rates[0, 1] = 0.0
@@ -26,7 +26,7 @@ def _fade(z, rates):  # type: ignore[no-untyped-def]
 
 
 @memory_friction_law
-def dahl(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
+def dahl(v, F, z, p, force, rates):
     """R = F sigma z."""
     mu, stiffness, exponent = p[0], p[1], p[2]
     force[0] = F * stiffness * z[0]
@@ -46,7 +46,7 @@ def dahl(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
 
 
 @memory_friction_law
-def lugre(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
+def lugre(v, F, z, p, force, rates):
     """R = F [sigma_0 z + sigma_1(v) z' + sigma_2 v]."""
     static, kinetic, stribeck, exponent = p[0], p[1], p[2], p[3]
     stiffness, damping, viscous, decay = p[4], p[5], p[6], p[7]
@@ -77,7 +77,7 @@ def lugre(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
 
 
 @memory_friction_law
-def bouc_wen(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
+def bouc_wen(v, F, z, p, force, rates):
     """R = mu F z."""
     mu, yielding, beta, exponent = p[0], p[1], p[2], p[3]
     force[0] = mu * F * z[0]

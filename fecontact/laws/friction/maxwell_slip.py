@@ -13,7 +13,7 @@ from fecontact.laws.signatures import memory_friction_law
 
 
 @memory_friction_law
-def _maxwell_slip(v, F, z, p, force, rates):  # type: ignore[no-untyped-def]
+def _maxwell_slip(v, F, z, p, force, rates):
     count = len(z)
     spring, mu, relaxation = p[0] / count, p[1], p[2]
     force[0] = 0.0

@@ -18,7 +18,7 @@ from fecontact.laws.signatures import friction_law
 
 
 @helper
-def _smoothed_sign(v, slope, smoothing):  # type: ignore[no-untyped-def]
+def _smoothed_sign(v, slope, smoothing):
     """s(v) and s'(v); the smoothing is its index among the choices."""
     rise = 2.0 / math.pi * slope
     if smoothing == 0.0:
@@ -33,7 +33,7 @@ def _smoothed_sign(v, slope, smoothing):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _force(v, F, coefficient, change, viscous, slope, smoothing):  # type: ignore[no-untyped-def]
+def _force(v, F, coefficient, change, viscous, slope, smoothing):
     """R, dR/dv, dR/dF from mu and its derivative ``change`` to the speed."""
     s, rate = _smoothed_sign(v, slope, smoothing)
     sign = 1.0 if v >= 0.0 else -1.0
@@ -42,7 +42,7 @@ def _force(v, F, coefficient, change, viscous, slope, smoothing):  # type: ignor
 
 
 @friction_law
-def exponential(v, F, p):  # type: ignore[no-untyped-def]
+def exponential(v, F, p):
     """Coefficient mu_inf + (mu_0 - mu_inf) exp(-lambda |v|)."""
     static, kinetic, decay = p[0], p[1], p[2]
     excess = (static - kinetic) * math.exp(-decay * abs(v))
@@ -50,7 +50,7 @@ def exponential(v, F, p):  # type: ignore[no-untyped-def]
 
 
 @friction_law
-def gaussian(v, F, p):  # type: ignore[no-untyped-def]
+def gaussian(v, F, p):
     """Coefficient mu_inf + (mu_0 - mu_inf) exp(-(v/v_s)^2)."""
     static, kinetic, stribeck = p[0], p[1], p[2]
     x = abs(v) / stribeck
@@ -59,7 +59,7 @@ def gaussian(v, F, p):  # type: ignore[no-untyped-def]
 
 
 @friction_law
-def hyperbolic(v, F, p):  # type: ignore[no-untyped-def]
+def hyperbolic(v, F, p):
     """Coefficient mu_inf + (mu_0 - mu_inf) / (1 + |v|/v_s)."""
     static, kinetic, stribeck = p[0], p[1], p[2]
     ratio = stribeck / (stribeck + abs(v))
@@ -68,13 +68,13 @@ def hyperbolic(v, F, p):  # type: ignore[no-untyped-def]
 
 
 @friction_law
-def constant(v, F, p):  # type: ignore[no-untyped-def]
+def constant(v, F, p):
     """Coefficient mu."""
     return _force(v, F, p[0], 0.0, p[2], p[1], p[3])
 
 
 @friction_law
-def galvanetto(v, F, p):  # type: ignore[no-untyped-def]
+def galvanetto(v, F, p):
     """Coefficient mu_k + (mu_s - mu_k) / (1 + gamma |v|) + eta v^2."""
     static, kinetic, decay, growth = p[0], p[1], p[2], p[3]
     speed = abs(v)
@@ -85,7 +85,7 @@ def galvanetto(v, F, p):  # type: ignore[no-untyped-def]
 
 
 @friction_law
-def cubic(v, F, p):  # type: ignore[no-untyped-def]
+def cubic(v, F, p):
     """Coefficient mu_s - 3/2 (mu_s - mu_m) (x - x^3/3) with x = |v|/v_m."""
     static, least, velocity = p[0], p[1], p[2]
     x = abs(v) / velocity
@@ -95,7 +95,7 @@ def cubic(v, F, p):  # type: ignore[no-untyped-def]
 
 
 @friction_law
-def product(v, F, p):  # type: ignore[no-untyped-def]
+def product(v, F, p):
     """R/F a_1 (1 + a_2 exp(-b_1 |v|)) arctan(b_2 v)."""
     factor, excess, decay, slope = p[0], p[1], p[2], p[3]
     fall = excess * math.exp(-decay * abs(v))

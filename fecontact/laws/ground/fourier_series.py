@@ -16,7 +16,7 @@ from fecontact.laws.signatures import ground_profile
 
 
 @ground_profile
-def fourier(xi, p):  # type: ignore[no-untyped-def]
+def fourier(xi, p):
     """Level, n, lambda, then the factors of sine and cosine of each wave."""
     # Harmonic k is the k-th power of the first one as a complex number.
     wavelength = p[2]

@@ -20,7 +20,7 @@ from fecontact.laws.signatures import ground_profile
 
 
 @ground_profile
-def _trace(xi, p):  # type: ignore[no-untyped-def]
+def _trace(xi, p):
     height, slope, curvature = piecewise(xi, p, 1)
     return p[0] + height, slope, curvature
 

@@ -57,13 +57,13 @@ class GroundMotion:
 
 
 @signal
-def constant_speed(t, p):  # type: ignore[no-untyped-def]
+def constant_speed(t, p):
     """Travel and speed for p = [speed]."""
     return p[0] * t, p[0]
 
 
 @signal
-def _harmonic_speed(t, p):  # type: ignore[no-untyped-def]
+def _harmonic_speed(t, p):
     speed, amplitude, w, phase = p[0], p[1], p[2], p[3]
     # cos(phase) - cos(w t + phase), without their cancellation.
     travel = 2.0 * math.sin(0.5 * w * t + phase) * math.sin(0.5 * w * t)
@@ -126,7 +126,7 @@ class HarmonicSpeed(GroundMotion):
 
 
 @signal
-def _ramp(t, p):  # type: ignore[no-untyped-def]
+def _ramp(t, p):
     speed, change, start, duration = p[0], p[1], p[2], p[3]
     s = min(max((t - start) / duration, 0.0), 1.0)
     after = max(t - start - duration, 0.0)

@@ -15,7 +15,7 @@ from fecontact.laws.signatures import ground_at, ground_profile
 
 
 @kernel(types.void(i8, vector, vector, matrix))
-def _shape(address, xi, p, out):  # type: ignore[no-untyped-def]
+def _shape(address, xi, p, out):
     for k in range(len(xi)):
         out[k, 0], out[k, 1], out[k, 2] = ground_at(address)(xi[k], p)
 
@@ -68,7 +68,7 @@ class Profile:
 
 
 @ground_profile
-def _flat(xi, p):  # type: ignore[no-untyped-def]
+def _flat(xi, p):
     return p[0], 0.0, 0.0
 
 
@@ -95,7 +95,7 @@ class Flat(Profile):
 
 
 @ground_profile
-def _sine(xi, p):  # type: ignore[no-untyped-def]
+def _sine(xi, p):
     amplitude, wavelength = p[1], p[2]
     wave_number = 2.0 * math.pi / wavelength
     angle = wave_number * np.fmod(xi, wavelength) + p[3]

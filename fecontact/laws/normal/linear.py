@@ -11,7 +11,7 @@ from fecontact.laws.signatures import normal_law
 
 
 @normal_law
-def _linear(u, v, p):  # type: ignore[no-untyped-def]
+def _linear(u, v, p):
     stiffness, damping = p[0], p[1]
     force = stiffness * u + damping * v
     if u <= 0.0 or force <= 0.0:
@@ -61,7 +61,7 @@ class LinearContact(NormalLaw):
 
 
 @normal_law
-def _two_sided(u, v, p):  # type: ignore[no-untyped-def]
+def _two_sided(u, v, p):
     stiffness, clearance, exponent, factor = p[0], p[1], p[2], p[3]
     if u > 0.0:
         side, depth = 1.0, u
@@ -135,7 +135,7 @@ class TwoSidedStop(NormalLaw):
 
 
 @normal_law
-def _prescribed(u, v, p):  # type: ignore[no-untyped-def]
+def _prescribed(u, v, p):
     return p[0], 0.0, 0.0
 
 

@@ -23,7 +23,7 @@ _UNIFORM = (0.0, 0.5, 1.0)
 
 
 @normal_law
-def _measured(u, v, p):  # type: ignore[no-untyped-def]
+def _measured(u, v, p):
     s = u / p[1]
     if s <= 0.0:
         return 0.0, 0.0, 0.0

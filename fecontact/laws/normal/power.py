@@ -11,7 +11,7 @@ from fecontact.laws.signatures import normal_law
 
 
 @normal_law
-def _power(u, v, p):  # type: ignore[no-untyped-def]
+def _power(u, v, p):
     scale, length, exponent, factor = p[0], p[1], p[2], p[3]
     damped = 1.0 + factor * v
     if u <= 0.0 or damped <= 0.0:

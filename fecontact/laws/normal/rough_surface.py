@@ -17,7 +17,7 @@ _DENSITY = 1.0 / math.sqrt(_TAU)
 
 
 @helper
-def bed_of_asperities(v, p, compression, bearing, density):  # type: ignore[no-untyped-def]
+def bed_of_asperities(v, p, compression, bearing, density):
     """F, dF/du, dF/dv from f(s), h = f' and h'; p begins with c, R_Z and beta c."""
     stiffness, height, damping = p[0], p[1], p[2]
     force = stiffness * height * compression + damping * bearing * v
@@ -27,7 +27,7 @@ def bed_of_asperities(v, p, compression, bearing, density):  # type: ignore[no-u
 
 
 @normal_law
-def uniform(u, v, p):  # type: ignore[no-untyped-def]
+def uniform(u, v, p):
     """Density 1."""
     s = u / p[1]
     if s <= 0.0:
@@ -38,7 +38,7 @@ def uniform(u, v, p):  # type: ignore[no-untyped-def]
 
 
 @normal_law
-def parabolic(u, v, p):  # type: ignore[no-untyped-def]
+def parabolic(u, v, p):
     """Density 6 s (1 - s)."""
     s = u / p[1]
     if s <= 0.0:
@@ -52,7 +52,7 @@ def parabolic(u, v, p):  # type: ignore[no-untyped-def]
 
 
 @normal_law
-def cosine(u, v, p):  # type: ignore[no-untyped-def]
+def cosine(u, v, p):
     """Density 1 - cos(2 pi s)."""
     s = u / p[1]
     if s <= 0.0:
@@ -77,7 +77,7 @@ def cosine(u, v, p):  # type: ignore[no-untyped-def]
 
 
 @normal_law
-def gaussian(u, v, p):  # type: ignore[no-untyped-def]
+def gaussian(u, v, p):
     """Density of a normal distribution within 0 <= s <= 1."""
     deviation, highest, first_moment, norm = p[3], p[4], p[5], p[6]
     s = u / p[1]

@@ -14,7 +14,7 @@ _FARTHEST, _DEEPEST = -50.0, 60.0
 
 
 @normal_law
-def _exponential(u, v, p):  # type: ignore[no-untyped-def]
+def _exponential(u, v, p):
     scale, length, factor = p[0], p[1], p[2]
     s = u / length
     damped = 1.0 + factor * v
@@ -109,7 +109,7 @@ _LOADS = _logarithm_of_loads()
 
 
 @normal_law
-def _greenwood(u, v, p):  # type: ignore[no-untyped-def]
+def _greenwood(u, v, p):
     scale, deviation, separation, factor = p[0], p[1], p[2], p[3]
     h = separation - u / deviation
     damped = 1.0 + factor * v

@@ -14,7 +14,7 @@ from fecontact.laws.signatures import signal_at
 
 
 @kernel(types.void(i8, vector, vector, matrix))
-def _history(address, t, p, out):  # type: ignore[no-untyped-def]
+def _history(address, t, p, out):
     for k in range(len(t)):
         out[k, 0], out[k, 1] = signal_at(address)(t[k], p)
 

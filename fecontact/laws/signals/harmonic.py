@@ -18,7 +18,7 @@ __all__ = ["Constant", "Harmonic", "Harmonics", "Pulse", "Signal", "Step", "Swee
 
 
 @signal
-def _constant(t, p):  # type: ignore[no-untyped-def]
+def _constant(t, p):
     return p[0], 0.0
 
 
@@ -51,7 +51,7 @@ class Constant(Signal):
 
 
 @signal
-def _harmonic(t, p):  # type: ignore[no-untyped-def]
+def _harmonic(t, p):
     amplitude, w, phase = p[0], p[1], p[2]
     angle = w * t + phase
     return amplitude * math.sin(angle), amplitude * w * math.cos(angle)
@@ -106,7 +106,7 @@ class Harmonic(Signal):
 
 
 @signal
-def _harmonics(t, p):  # type: ignore[no-untyped-def]
+def _harmonics(t, p):
     value, rate = 0.0, 0.0
     for k in range(int(p[0])):
         amplitude, w = p[3 * k + 1], p[3 * k + 2]
@@ -187,7 +187,7 @@ class Harmonics(Signal):
 
 
 @signal
-def _sweep(t, p):  # type: ignore[no-untyped-def]
+def _sweep(t, p):
     amplitude, w0, w1, duration = p[0], p[1], p[2], p[3]
     inside = min(max(t, 0.0), duration)
     if p[4] == 0.0:

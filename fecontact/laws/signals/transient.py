@@ -25,7 +25,7 @@ _RISE = 0.01
 
 
 @signal
-def _step(t, p):  # type: ignore[no-untyped-def]
+def _step(t, p):
     return (p[1] if t >= p[0] else 0.0), 0.0
 
 
@@ -68,7 +68,7 @@ class Step(Signal):
 
 
 @signal
-def _pulse(t, p):  # type: ignore[no-untyped-def]
+def _pulse(t, p):
     amplitude, duration, rise = p[0], p[2], p[3]
     s = t - p[1]
     if s <= 0.0 or s >= duration:
@@ -162,7 +162,7 @@ class Pulse(Signal):
 
 
 @signal
-def _tabulated(t, p):  # type: ignore[no-untyped-def]
+def _tabulated(t, p):
     value, rate, _ = piecewise(t, p, 0)
     return value, rate
 
