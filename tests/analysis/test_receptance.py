@@ -30,7 +30,7 @@ def mass(**parts):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **{"normal": SURFACE, **parts})
+    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": SURFACE, **parts})
 
 
 F = np.array([0.3, 1.0, 4.0, 4.5, 5.0, 20.0, 300.0])
@@ -160,7 +160,8 @@ def test_inverse_of_the_dynamic_stiffness_of_all_degrees_of_freedom():
     C = 3.0 * M + 2e-6 * K
     basis = basis_from_matrices(M, K, rows, damping=C)
     system = ContactSystem(basis, SURFACE,
-                           drive=Drive(stiffness_x=1e7, stiffness_y=3e6, damping_x=400.0))
+                           drive=Drive(stiffness_x=1e7, stiffness_y=3e6, damping_x=400.0),
+                           friction=ExponentialFriction())
     K[d - 2, d - 2] += 1e7
     K[d - 1, d - 1] += 3e6
     C[d - 2, d - 2] += 400.0

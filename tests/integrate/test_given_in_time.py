@@ -17,7 +17,7 @@ def point(**parts):
                             "C": [[1.0], [0.0], [0.0]]})
     options = {"normal": fc.PrescribedForce(1e-12), "drive": fc.Drive(
         stiffness_x=STIFFNESS, damping_x=DASHPOT)} | parts
-    return fc.ContactSystem(basis, **options)
+    return fc.ContactSystem(basis, **{"friction": fc.ExponentialFriction(), **options})
 
 
 def oscillator(force, times, dashpot=DASHPOT):
@@ -116,7 +116,7 @@ def test_moment_and_constant_loads_at_points():
     system = fc.ContactSystem(basis, normal=fc.RoughSurface(1e6, 1e-5, 500.0), load=fc.Load(
         normal=20.0, forces=(
             fc.PointLoad("tip", "moment", signal=fc.Constant(0.5)),
-            fc.PointLoad("tip", "y", signal=fc.Constant(-3.0)))))
+            fc.PointLoad("tip", "y", signal=fc.Constant(-3.0)))), friction=fc.ExponentialFriction())
     start = fc.simulate(system, 1e-3, outputs=2)
     turn = (0.5 - 3.0 * 0.1) / 50.0
     assert start.displacement("C")[0, 2] == pytest.approx(turn, rel=1e-8)

@@ -45,7 +45,7 @@ def body(nodes=3, modes=4, **parts):
         "friction": ExponentialFriction(0.6, 0.4, 20.0, 50.0),
         "drive": Drive(2e3, 3e3, 1.0, 2.0, 1e-4, 2e-4, 70.0),
         "load": Load(40.0, (PointLoad("B", "x", signal=Harmonic(2.0, 110.0, 0.3)),))}
-    return ContactSystem(basis, **{**given, **parts})
+    return ContactSystem(basis, **{"friction": ExponentialFriction(), **given, **parts})
 
 
 def reference(system, state, times, rtol=1e-12):

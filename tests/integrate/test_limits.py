@@ -9,6 +9,7 @@ from fecontact import (
     CVODE,
     ConstantFriction,
     ContactSystem,
+    ExponentialFriction,
     InputError,
     Load,
     ModelWarning,
@@ -148,7 +149,7 @@ def test_runs_warn_where_they_leave_the_limits_of_the_model():
     rows[:, 1, 0] = 1.0
     basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows, "C": rows[0]},
                                 contact_x=[0.0, 0.02])
-    system = ContactSystem(basis, RoughSurface(1e6, 1e-5))
+    system = ContactSystem(basis, RoughSurface(1e6, 1e-5), friction=ExponentialFriction())
     with pytest.warns(ModelWarning, match=r"In this run points of the body move by 0\.021 m, more "
                                           r"than its own size of 0\.02 m"):
         run = simulate(system, 0.21, initial=np.array([0.0, 0.1]))

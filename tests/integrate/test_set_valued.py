@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from fecontact import ExponentialFriction
 from fecontact.core.errors import InputError
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.integrate.simulate import simulate
@@ -37,7 +38,10 @@ def block(mass=1.0, spring=1.0, nodes=1, **parts):
     basis = basis_from_matrices(
         mass * np.eye(2), np.diag([spring, 0.0]),
         {"contact": np.repeat(row[None], nodes, axis=0), "B": row, "C": row})
-    return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-4, 0.0), **parts})
+    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": RoughSurface(1e5,
+                                                                                             1e-4,
+                                                                                             0.0),
+                                                                                             **parts})
 
 
 def start(system, x, x_rate=0.0):
@@ -222,7 +226,7 @@ def ball(**parts):
     row = np.array([[0.0], [1.0], [0.0]])
     return ContactSystem(basis_from_matrices([[1.0]], [[0.0]],
                                              {"contact": row[None], "C": row}),
-                         RoughSurface(1e5, 1e-4), **parts)
+                         RoughSurface(1e5, 1e-4), **{"friction": ExponentialFriction(), **parts})
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.6, 0.9])
@@ -253,7 +257,7 @@ def test_mass_lifted_off_a_rigid_stop():
     row = np.array([[0.0], [1.0], [0.0]])
     basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
     system = ContactSystem(basis, RoughSurface(1e5, 1e-4), load=Load(1.0), drive=Drive(
-        stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5))
+        stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5), friction=ExponentialFriction())
     times = np.linspace(0.0, 2.0, 201)
     run = integrate_set_valued(system, np.zeros(2), times, rtol=1e-10, restitution=0.5)
     leaving = np.pi / 3.0
@@ -326,11 +330,11 @@ def test_from_rest_under_point_loads():
     parts = {"normal": LinearContact(1e8), "friction": ConstantFriction(0.3)}
     system = ContactSystem(basis, load=Load(0.0, (
         PointLoad("C", "y", signal=Constant(-14.0)), PointLoad("B", "x", signal=Constant(20.0)))),
-        **parts)
+        **{"friction": ExponentialFriction(), **parts})
     # The same forces through springs so soft that they stay as they are.
     springs = ContactSystem(basis, drive=Drive(
         stiffness_x=1e-6, motion_x=Constant(2e7), stiffness_y=1e-6, motion_y=Constant(-1.4e7)),
-        **parts)
+        **{"friction": ExponentialFriction(), **parts})
     times = np.linspace(0.0, 10.0, 101)
     run, other = (integrate_set_valued(each, np.zeros(4), times, scheme="stepping")
                   for each in (system, springs))

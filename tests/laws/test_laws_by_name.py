@@ -394,4 +394,5 @@ def test_lists_per_node_are_counted_rightly():
         fc.RoughSurface((1e6,) * 3, (1e-6,) * 2).node_count()
     basis = Study.from_toml(HEAD).basis()
     with pytest.raises(fc.FecontactError, match="3 values for 5 contact nodes"):
-        fc.ContactSystem(basis, normal=fc.RoughSurface((1e6,) * 3, 1e-6))
+        fc.ContactSystem(basis, normal=fc.RoughSurface((1e6,) * 3, 1e-6),
+                         friction=fc.ExponentialFriction())

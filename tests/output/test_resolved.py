@@ -22,7 +22,8 @@ def point_mass(axis, **parts):
     rows["xy".index(axis)] = 1.0
     basis = fc.basis_from_matrices(
         [[MASS]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
-    return fc.ContactSystem(basis, **{"normal": fc.RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
+    return fc.ContactSystem(basis, **{"friction": fc.ExponentialFriction(),
+                                      "normal": fc.RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 
 def hit(outputs, t_end=0.05, height=1e-3, **options):

@@ -26,11 +26,13 @@ def basis():
 ])
 def test_what_could_do_no_work_is_refused(parts, message):
     with pytest.raises(fc.InputError, match=message):
-        fc.ContactSystem(basis(), normal=fc.PrescribedForce((1.0, 1.0)), **parts)
+        fc.ContactSystem(basis(), normal=fc.PrescribedForce((1.0, 1.0)),
+                         **{"friction": fc.ExponentialFriction(), **parts})
 
 
 def test_what_moves_is_driven_and_loaded():
     system = fc.ContactSystem(
         basis(), normal=fc.PrescribedForce((1.0, 1.0)), drive=fc.Drive(stiffness_x=3.0),
-        load=fc.Load(forces=[fc.PointLoad(1, "x", signal=fc.Constant(1.0))]))
+        load=fc.Load(forces=[fc.PointLoad(1, "x", signal=fc.Constant(1.0))]),
+        friction=fc.ExponentialFriction())
     assert system.rhs(0.0, np.zeros(4))[2:] @ system.basis.contact_T[1, 0] == pytest.approx(1.0)

@@ -31,7 +31,8 @@ def mass_point(**parts):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **{"normal": NORMAL, "load": Load(14.0), **parts})
+    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": NORMAL,
+                                   "load": Load(14.0), **parts})
 
 
 def beam(contact_nodes=8, modes=12, B=(0.0, 0.01), C=(0.1, 0.02), fixed=None, **parts):
@@ -39,7 +40,8 @@ def beam(contact_nodes=8, modes=12, B=(0.0, 0.01), C=(0.1, 0.02), fixed=None, **
     body = ElasticBody(mesh, Material(), THICKNESS, fixed=fixed or {})
     basis = modal_basis(body, modes, contact="bottom", contact_nodes=contact_nodes, B=B, C=C,
                         damping=0.01)
-    return ContactSystem(basis, **{"normal": NORMAL, "load": Load(14.0), **parts})
+    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": NORMAL,
+                                   "load": Load(14.0), **parts})
 
 
 def contact(system, q, t=0.0):
@@ -171,7 +173,8 @@ def test_stiff_body_pressed_off_its_middle():
     basis = modal_basis(
         ElasticBody(rectangle(LENGTH, 0.1, 16, 8), Material(), THICKNESS), 3, contact="bottom",
         contact_nodes=8, C=(0.12, 0.1))
-    system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0))
+    system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0),
+                           friction=ExponentialFriction())
     q = static_equilibrium(system)
     force = contact(system, q)[0]
     s = basis.contact_x - 0.1
@@ -186,7 +189,8 @@ def test_stiff_body_lifts_off_on_one_side():
     mesh = rectangle(LENGTH, 0.1, 40, 4)
     basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 3, contact="bottom",
                         contact_nodes=n, C=(0.15, 0.1))
-    system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0))
+    system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0),
+                           friction=ExponentialFriction())
     q = static_equilibrium(system)
     force = contact(system, q)[0]
     reach = 3.0 * 0.05
@@ -204,7 +208,8 @@ def test_number_of_nodes_does_not_matter_for_a_uniformly_pressed_body():
         mesh = rectangle(LENGTH, HEIGHT, 16, 2)
         basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 3, contact="bottom",
                             contact_nodes=n, C=(0.1, 0.02))
-        system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, R, 0.0), load=Load(14.0))
+        system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, R, 0.0), load=Load(14.0),
+                               friction=ExponentialFriction())
         depth = contact(system, static_equilibrium(system))[2]
         assert depth == pytest.approx(np.full(len(depth), penetration_of(14.0)), rel=1e-8)
 
@@ -285,7 +290,8 @@ def test_load_beside_the_face_tips_the_body():
     basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 8, contact="feet",
                         contact_nodes=4, C=(0.15, 0.02))
     with pytest.raises(AnalysisError, match="tips over"):
-        static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0)))
+        static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
+                                         friction=ExponentialFriction()))
 
 
 def test_sliding_block_tips_over_its_short_face():
@@ -326,7 +332,8 @@ def test_point_pushed_across_names_both():
     basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": slanted})
     with pytest.raises(AnalysisError, match=r"translation along the ground \(x\)"):
-        static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0)))
+        static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
+                                         friction=ExponentialFriction()))
 
 
 @pytest.mark.parametrize("height", [-3e-3, -1e-4, 1e-4, 3e-3])
@@ -338,7 +345,8 @@ def test_ground_far_from_the_reference_place(height):
     basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": rows},
                                 contact_x=[np.sign(height) * 0.02])
-    q = static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0), ground=ground))
+    q = static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0), ground=ground,
+                                         friction=ExponentialFriction()))
     assert q[1] == pytest.approx(height - penetration_of(14.0), rel=1e-9)
 
 
@@ -355,7 +363,7 @@ def test_light_bodies_on_waves_and_gaps(seed):
         system = ContactSystem(
             basis, normal=RoughSurface(10.0 ** rng.uniform(6.0, 9.0), 1e-7, 0.0), load=Load(load),
             ground=Ground(amplitude=2e-4, wavelength=10.0 ** rng.uniform(-1.5, 0.0)),
-            gap=tuple(rng.uniform(0.0, 1e-5, n)))
+            gap=tuple(rng.uniform(0.0, 1e-5, n)), friction=ExponentialFriction())
         F, _, u = contact(system, static_equilibrium(system))
         assert F.sum() == pytest.approx(load, rel=1e-6)
         assert F @ (basis.contact_x - at) == pytest.approx(0.0, abs=1e-6 * load * LENGTH)
@@ -369,7 +377,10 @@ def bracket(reduction="residual", B=(LENGTH, HEIGHT), **parts):
     mesh = rectangle(LENGTH, HEIGHT, 16, 2, split=((0.0, 0.1),))
     basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 8, reduction=reduction,
                         contact="feet", contact_nodes=4, C=(0.19, HEIGHT), B=B)
-    return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-6, 0.0), "load": Load(100.0),
+    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": RoughSurface(1e5,
+                                                                                             1e-6,
+                                                                                             0.0),
+                                                                                             "load": Load(100.0),
                                    "drive": Drive(stiffness_x=1e5), **parts})
 
 

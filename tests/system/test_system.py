@@ -41,7 +41,7 @@ def random_system(n=3, m=10, seed=0, **parts):
         "drive": Drive(5610.0, 99.0, 0.768, 0.02, 0.5e-3, -0.47e-3, 13.8),
         "load": Load(14.0), "gap": 1e-6, **parts,
     }
-    return ContactSystem(random_basis(n, m, seed), **parts)
+    return ContactSystem(random_basis(n, m, seed), **{"friction": ExponentialFriction(), **parts})
 
 
 def state_with(system, t, penetration, rate, slip, seed=1):
@@ -195,7 +195,8 @@ def mass_point(mass=2.0, **parts):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(mass * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **{"normal": RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
+    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": RoughSurface(0.3e6,
+                                                                                             5.2e-6, 6.0), **parts})
 
 
 def acceleration(system, t=0.0, place=(0.0, 0.0), velocity=(0.0, 0.0)):
@@ -251,7 +252,8 @@ def test_node_places_enter_the_phase():
     basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows},
                                 contact_x=[0.0125, 0.0375])
     system = ContactSystem(basis, normal=RoughSurface(2e6, 1e-5, 0.0),
-                           ground=Ground(amplitude=1e-4, wavelength=0.05))
+                           ground=Ground(amplitude=1e-4, wavelength=0.05),
+                           friction=ExponentialFriction())
     history = system.contact_history(np.zeros(1), np.zeros((1, 4)))[0]
     assert history[:, kernels.PENETRATION] == pytest.approx([1e-4, -1e-4], rel=1e-12)
     assert history[:, kernels.NORMAL_FORCE] == pytest.approx([1e6 * 95e-6, 0.0], rel=1e-12)
@@ -290,7 +292,7 @@ def test_rigid_translation_is_the_same_for_any_number_of_nodes(n):
         start = RigidStart((1e-3, -depth, 0.0), (0.004, -rate, 0.0))
         results = []
         for nodes in (1, n):
-            system = ContactSystem(beam(nodes), **parts)
+            system = ContactSystem(beam(nodes), **{"friction": ExponentialFriction(), **parts})
             y = initial_state(system, start, 0.0)
             state = system.contact_history(np.zeros(1), y[None])[0]
             results.append((state[:, :2].sum(axis=0), system.rhs(0.0, y)))
@@ -323,7 +325,8 @@ def test_rigid_modes_feel_the_resultant():
 
 
 def test_share_follows_tributary_length():
-    system = ContactSystem(beam("all"), normal=RoughSurface(3e6, R, 40.0))
+    system = ContactSystem(beam("all"), normal=RoughSurface(3e6, R, 40.0),
+                           friction=ExponentialFriction())
     assert system.share.sum() == pytest.approx(1.0, rel=1e-14)
     assert system.arrays.normal_parameters[:, 0].sum() == pytest.approx(3e6, rel=1e-13)
     assert system.arrays.normal_parameters[:, 2].sum() == pytest.approx(40.0, rel=1e-13)
