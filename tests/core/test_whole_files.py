@@ -143,7 +143,7 @@ def test_leftovers_of_killed_processes_are_cleared_and_no_others(tmp_path):
     with replaced(tmp_path / "a.txt") as part:
         # While it is written, another process neither clears it nor is kept from writing.
         clear_leftovers(tmp_path)
-        in_process("import sys; from pathlib import Path; from fecontact import whole_files\n"
+        in_process("import sys; from pathlib import Path; from fecontact.core import atomic_write\n"
                    "atomic_write.clear_leftovers(Path(sys.argv[1]))\n"
                    "with atomic_write.replaced(sys.argv[1] + '/a.txt') as part:\n"
                    "    part.write_text('of another process')", tmp_path)
@@ -161,7 +161,7 @@ def test_a_folder_whose_replacing_was_cut_short_comes_back(tmp_path):
     code = """
         import os, signal, sys
         from pathlib import Path
-        from fecontact import whole_files
+        from fecontact.core import atomic_write
         real = os.replace
         def stop(source, target):
             real(source, target)

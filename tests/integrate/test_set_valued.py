@@ -1,10 +1,8 @@
 """Set-valued friction and rigid stops against closed forms and published values."""
 
-
 import numpy as np
 import pytest
 
-from fecontact import ExponentialFriction
 from fecontact.core.errors import InputError
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.integrate.simulate import simulate
@@ -38,10 +36,8 @@ def block(mass=1.0, spring=1.0, nodes=1, **parts):
     basis = basis_from_matrices(
         mass * np.eye(2), np.diag([spring, 0.0]),
         {"contact": np.repeat(row[None], nodes, axis=0), "B": row, "C": row})
-    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": RoughSurface(1e5,
-                                                                                             1e-4,
-                                                                                             0.0),
-                                                                                             **parts})
+    return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-4, 0.0),
+                                   "friction": ExponentialFriction(), **parts})
 
 
 def start(system, x, x_rate=0.0):
@@ -330,11 +326,11 @@ def test_from_rest_under_point_loads():
     parts = {"normal": LinearContact(1e8), "friction": ConstantFriction(0.3)}
     system = ContactSystem(basis, load=Load(0.0, (
         PointLoad("C", "y", signal=Constant(-14.0)), PointLoad("B", "x", signal=Constant(20.0)))),
-        **{"friction": ExponentialFriction(), **parts})
+        **parts)
     # The same forces through springs so soft that they stay as they are.
     springs = ContactSystem(basis, drive=Drive(
         stiffness_x=1e-6, motion_x=Constant(2e7), stiffness_y=1e-6, motion_y=Constant(-1.4e7)),
-        **{"friction": ExponentialFriction(), **parts})
+        **parts)
     times = np.linspace(0.0, 10.0, 101)
     run, other = (integrate_set_valued(each, np.zeros(4), times, scheme="stepping")
                   for each in (system, springs))

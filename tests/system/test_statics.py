@@ -377,10 +377,8 @@ def bracket(reduction="residual", B=(LENGTH, HEIGHT), **parts):
     mesh = rectangle(LENGTH, HEIGHT, 16, 2, split=((0.0, 0.1),))
     basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 8, reduction=reduction,
                         contact="feet", contact_nodes=4, C=(0.19, HEIGHT), B=B)
-    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": RoughSurface(1e5,
-                                                                                             1e-6,
-                                                                                             0.0),
-                                                                                             "load": Load(100.0),
+    return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-6, 0.0),
+                                   "friction": ExponentialFriction(), "load": Load(100.0),
                                    "drive": Drive(stiffness_x=1e5), **parts})
 
 

@@ -195,8 +195,8 @@ def mass_point(mass=2.0, **parts):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(mass * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": RoughSurface(0.3e6,
-                                                                                             5.2e-6, 6.0), **parts})
+    return ContactSystem(basis, **{"normal": RoughSurface(0.3e6, 5.2e-6, 6.0),
+                                   "friction": ExponentialFriction(), **parts})
 
 
 def acceleration(system, t=0.0, place=(0.0, 0.0), velocity=(0.0, 0.0)):
@@ -292,7 +292,7 @@ def test_rigid_translation_is_the_same_for_any_number_of_nodes(n):
         start = RigidStart((1e-3, -depth, 0.0), (0.004, -rate, 0.0))
         results = []
         for nodes in (1, n):
-            system = ContactSystem(beam(nodes), **{"friction": ExponentialFriction(), **parts})
+            system = ContactSystem(beam(nodes), **parts)
             y = initial_state(system, start, 0.0)
             state = system.contact_history(np.zeros(1), y[None])[0]
             results.append((state[:, :2].sum(axis=0), system.rhs(0.0, y)))
