@@ -298,7 +298,7 @@ def test_a_full_disk_keeps_the_earlier_run_and_its_checkpoint(small_disk, tmp_pa
     checkpoint = small_disk / "s.checkpoint"
     code = """
         import sys
-        from fecontact.integrate import checkpoint
+        from fecontact.integrate.rodas5p import checkpoint
         from fecontact.integrate.rodas5p.driver import Run
         from fecontact.cli import execute
         checkpoint.Checkpoint.__dataclass_fields__["period"].default = 0.0
