@@ -35,7 +35,7 @@ def main(folder: Path = Path(), quick: bool = False) -> tuple[fc.Branch, fc.Bran
     folder.mkdir(parents=True, exist_ok=True)
     columns, rows = (7, 5) if quick else (31, 29)
     field = fc.contact_field(system(), [FRICTION, "load.normal"])
-    branch = fc.equilibrium_branch(field, FRICTION, bounds=(0.0, 0.6))
+    branch = fc.equilibrium_branch(field, parameter=FRICTION, bounds=(0.0, 0.6))
     fc.plot_eigenvalues(branch, x_label="friction coefficient", range_hz=(300.0, 1200.0),
                         path=folder / "squeal_modes.png")
     hopf = branch.of_kind("Hopf")[0]

@@ -30,7 +30,7 @@ def mass_in_y(mass=1.0, spring=0.0, **parts):
     """A mass that moves up and down only."""
     rows = np.array([[0.0], [1.0], [0.0]])
     modes = basis_from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
-    return ContactSystem(modes, **{"normal": SURFACE, **parts})
+    return ContactSystem(modes, **{"normal": SURFACE, "friction": ExponentialFriction(), **parts})
 
 
 def mass_in_plane(mass=1.0, spring=0.0, **parts):
@@ -39,7 +39,7 @@ def mass_in_plane(mass=1.0, spring=0.0, **parts):
     rows[0, 0] = rows[1, 1] = 1.0
     modes = basis_from_matrices(mass * np.eye(2), np.diag([spring, 0.0]),
                                 {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(modes, **{"normal": SURFACE, **parts})
+    return ContactSystem(modes, **{"normal": SURFACE, "friction": ExponentialFriction(), **parts})
 
 
 def basis(frequencies_hz, damping, B, contact):

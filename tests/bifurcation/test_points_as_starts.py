@@ -5,7 +5,7 @@ The orbits z' = (r + i w) z - z |z|^2 have the radius sqrt(r) and the period 2 p
 
 import numpy as np
 import pytest
-from systems_for_bifurcations import lorenz_field, two_mass_field
+from systems import lorenz_field, two_mass_field
 
 from fecontact import (
     Collocation,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from systems import belt, lorenz_field, two_mass_field
 
-from fecontact import simulate, window
+from fecontact import simulate
 from fecontact.bifurcation.continuation.problem import Settings
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
@@ -59,7 +59,7 @@ def test_belt_with_steep_friction():
     system = belt(speed=1e-3)
     field = contact_field(system, {"ground.speed": None})
     run = simulate(system, 12.0, initial=np.array([0.0, 0.0]), outputs=24001, rtol=1e-8)
-    branch = orbit_branch(field, window(run, 9.0), "ground.speed",
+    branch = orbit_branch(field, run.between(9.0), "ground.speed",
                           method=Shooting(segments=2), bounds=(1e-3, 4e-3))
     first = branch.points[0]
     row = field.displacement_row(0)

@@ -131,7 +131,7 @@ def test_energies_beyond_all_numbers_have_a_status(change):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": rows})
-    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), ConstantFriction(0.0),
+    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), ExponentialFriction(),
                            load=Load(14.0))
     start = "rest"
     if change == "velocity":

@@ -70,10 +70,10 @@ def test_maps_of_basins(tmp_path):
 
 def test_basins_of_a_system(tmp_path):
     found = basins(impact_oscillator(2), (Axis("B", "y"), [0.0, 4e-4]),
-                   (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient=60, keep=4)
+                   (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient_periods=60, keep=4)
     plot_basins(found, path=tmp_path / "basins.png")
     assert (tmp_path / "basins.png").stat().st_size > 5_000
     runs = brute_force(impact_oscillator(2), "drive.angular_frequency", [64.0, 65.0],
-                       transient=60, keep=2, initial=np.zeros(4))
+                       transient_periods=60, keep=2, initial=np.zeros(4))
     assert len(plot_branches([BRANCH], "observed_section", beneath=runs,
                              observe=("B", "y")).axes[0].lines) == 4
