@@ -13,7 +13,7 @@ from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.cli.commands.branch import special_table
+from fecontact.cli.branch_results import special_table
 
 
 def island(t, x, p, out):

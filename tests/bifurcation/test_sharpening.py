@@ -16,7 +16,7 @@ from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.normal_forms import verdict
-from fecontact.cli.commands.branch import branches_csv, special_table
+from fecontact.cli.branch_results import branches_csv, special_table
 from fecontact.output.files.branches import read_branch
 
 

@@ -1,0 +1,140 @@
+"""What the command ``branch`` writes and prints: tables and pictures of branches."""
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.cli.console import progress_bar
+from fecontact.core.atomic_write import write_text
+from fecontact.output.files.branches import write_branches
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+    from fecontact.bifurcation.diagram import Branches
+    from fecontact.bifurcation.diagram_options import BranchSettings
+    from fecontact.system.contact_system import ContactSystem
+
+_BORN = {"supercritical": "stable orbits", "subcritical": "unstable orbits",
+         "undecided": "orbits, stability undecided"}
+_COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "period",
+            "frequency_hz", "minimum", "maximum", "amplitude", "criticality", "parameter_error")
+
+
+def write_branch_results(
+    result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
+    beneath: "BruteForce | None" = None,
+) -> list[Path]:
+    """Write branches as HDF5 and CSV, and draw them; the files."""
+    from fecontact.output.plots.bifurcation_diagram import plot_branches
+    from fecontact.output.plots.stability import plot_eigenvalues
+
+    files = [write_branches(folder / f"{name}-branch.h5", result.found)]
+    table = folder / f"{name}-branch.csv"
+    write_text(table, branches_csv(result.found))
+    files.append(table)
+    several = list(result.found.values())
+    show = wanted.show if beneath is None else "section"
+    files.append(folder / f"{name}-branch.png")
+    plot_branches(
+        several, f"observed_{show}", y_label=_label(show, *result.observe),
+        names=list(result.found), beneath=beneath, observe=result.observe, path=files[-1])
+    if wanted.kind != "orbits":
+        files.append(folder / f"{name}-stability.png")
+        plot_eigenvalues(several[0], path=files[-1])
+    return files
+
+
+def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any) -> "BruteForce":
+    """Runs over the range of the parameter, up and down.
+
+    Raises
+    ------
+    InputError
+        If nothing excites the system with one period.
+    """
+    import numpy as np
+
+    from fecontact.bifurcation.attractors.poincare_scan import brute_force
+
+    values = np.linspace(*wanted.bounds, wanted.brute_force)
+    with progress_bar("Running at each value", 2.0 * len(values)) as show:
+        return brute_force(system, wanted.name, values, initial=initial, progress=show)
+
+
+def branches_csv(branches: Mapping[str, Branch]) -> str:
+    """All points of branches as CSV, the special ones with their kind."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    for name, branch in branches.items():
+        for point in branch.points:
+            values, period = point.values, _period(point)
+            writer.writerow([
+                name, point.kind or "", repr(point.parameter), int(values["stable"]),
+                int(values["unstable"]), "" if period is None else repr(period),
+                "" if period is None else repr(1.0 / period),
+                *(repr(float(values[f"observed_{what}"]))
+                  for what in ("minimum", "maximum", "amplitude")),
+                point.details.get("criticality", ""),
+                repr(float(error)) if (error := point.details.get("parameter_error")) is not None
+                else ""])
+    return text.getvalue()
+
+
+def special_table(branch: Branch) -> Any:
+    """Ends and special points of a branch: where, which frequency, what changes there."""
+    from fecontact.cli.tables import table
+
+    rows = []
+    for index, point in enumerate(branch.points):
+        if point.kind is None and 0 < index < len(branch) - 1:
+            continue
+        period = _period(point)
+        rows.append((point.kind or ("start" if index == 0 else "end"), f"{point.parameter:.7g}",
+                     "" if period is None else f"{1.0 / period:.5g}", _remark(point)))
+    return table("point", branch.name, "frequency [Hz]", "", rows=rows)
+
+
+def _period(point: BranchPoint) -> float | None:
+    """Period of an orbit, or of what is born at a Hopf point [s]."""
+    found = point.values.get("period", point.details.get("period"))
+    return None if found is None else float(found)
+
+
+def _remark(point: BranchPoint) -> str:
+    if point.kind is not None:
+        return ", ".join(filter(None, (_what_changes(point), _how_sure(point))))
+    unstable = int(point.values["unstable"])
+    if not unstable:
+        return "stable"
+    if "period" in point.values:
+        return f"{unstable} unstable multiplier{'s' if unstable > 1 else ''}"
+    return f"unstable in {unstable} direction{'s' if unstable > 1 else ''}"
+
+
+def _what_changes(point: BranchPoint) -> str:
+    """What begins at a special point, or by how many the unstable directions change."""
+    details = point.details
+    if "instead_of" in details:
+        return f"{details['instead_of']} on this mesh, not on finer ones: take more intervals"
+    if "unstable_before" in details:
+        return f"{details['unstable_before']} to {details['unstable_after']} unstable directions"
+    criticality = str(details.get("criticality", ""))
+    return _BORN.get(criticality, "") if point.kind == "Hopf" else criticality
+
+
+def _how_sure(point: BranchPoint) -> str:
+    """By how much the parameter may be off, where that is more than the table shows."""
+    error = float(point.details.get("parameter_error", 0.0))
+    return f"known to {error:.1g} only" if error > 5e-7 * abs(point.parameter) else ""
+
+
+def _label(show: str, point: str | int, axis: str) -> str:
+    what = {"maximum": "largest displacement", "minimum": "smallest displacement",
+            "amplitude": "amplitude", "section": "displacement once per period,"}[show]
+    where = point if isinstance(point, str) else f"contact node {point}"
+    return f"{what} {axis} of {where} [m]"
