@@ -213,12 +213,12 @@ class HopfPoint(BranchPoint):
 
     @property
     def angular_frequency(self) -> float:
-        """W of the critical pair of eigenvalues +- i w [rad/s]."""
+        """Imaginary part w of the critical pair of eigenvalues [rad/s]."""
         return float(self._detail("angular_frequency"))
 
     @property
     def frequency_hz(self) -> float:
-        """W / (2 pi) [Hz]."""
+        """Its frequency, w / (2 pi) [Hz]."""
         return float(self._detail("frequency_hz"))
 
     @property
