@@ -3,6 +3,8 @@
 The orbits z' = (r + i w) z - z |z|^2 have the radius sqrt(r) and the period 2 pi / w.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from systems import lorenz_field, two_mass_field
@@ -100,6 +102,19 @@ def test_steps_go_on_in_the_size_of_orbits_that_have_grown(field, rest):
     on = orbit_branch(field, orbits.points[-1], bounds=(-0.5, 121.0))
     assert on.attributes["scales"][:2] == pytest.approx([10.0, 10.0], rel=1e-3)
     assert radius(on.points[-1]) == pytest.approx(11.0, rel=1e-6)
+
+
+def test_a_start_may_pass_a_bound_by_rounding(field, rest, kept):
+    """As a bound that was computed does; branches themselves end exactly on theirs."""
+    assert kept.points[-1].parameter == 0.4
+    assert rest.points[-1].parameter == 0.5
+    beyond = np.nextafter(0.4, 1.0)
+    motion = replace(kept.points[-1].orbit(field), parameter_values=[beyond, 2.0])
+    orbits = orbit_branch(field, motion, "r", direction=-1.0, bounds=(0.3, 0.4))
+    assert orbits.parameter[[0, -1]] == pytest.approx([0.4, 0.3], abs=0.0)
+    above = replace(kept.points[-1].orbit(field), parameter_values=[0.4 + 1e-9, 2.0])
+    with pytest.raises(InputError, match="outside the bounds of the parameter"):
+        orbit_branch(field, above, "r", bounds=(0.3, 0.4))
 
 
 def test_a_branch_goes_back(field, kept):

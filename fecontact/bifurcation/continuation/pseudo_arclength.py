@@ -77,7 +77,7 @@ def continuation(
     FecontactError
         If there is no solution near the start.
     """
-    require_inside(float(u[-1]), settings)
+    u = np.append(u[:-1], inside(float(u[-1]), settings))
     start = start_of(problem, u, settings, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
     if _leaves(start, settings):
@@ -130,12 +130,20 @@ def continuation(
     return End(Status.POINTS)
 
 
-def require_inside(value: float, settings: Settings) -> None:
-    """Raise :class:`InputError` unless a value of the parameter lies within the bounds."""
+def inside(value: float, settings: Settings) -> float:
+    """A value of the parameter, moved to the bound that it passes by no more than rounding.
+
+    Raises
+    ------
+    InputError
+        If the value lies outside the bounds.
+    """
     low, high = settings.bounds
-    if not low <= value <= high:
+    rounding = _ON_BOUND * abs(value)
+    if not low - rounding <= value <= high + rounding:
         raise InputError(f"The start lies at {value:.6g}, outside the bounds of the parameter, "
                          f"{low:g} to {high:g}.")
+    return min(max(value, low), high)
 
 
 def _leaves(start: Solution, settings: Settings) -> bool:

@@ -1,6 +1,7 @@
 """Locating special points between two points of a branch."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -92,7 +93,7 @@ def located_between(
                                                 sign * before, sign * after, 1e-12, row)
         if zero is None:
             return None
-        met = zero[0]
+        met = replace(zero[0], u=np.append(zero[0].u[:-1], bound))
     end = met or there
     length = float(row @ (end.u - here.u))
     near = max(1e-4, _BESIDE * problem.precision)

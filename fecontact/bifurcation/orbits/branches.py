@@ -17,7 +17,7 @@ from fecontact.bifurcation.continuation.problem import (
     sizes_of,
     width_of,
 )
-from fecontact.bifurcation.continuation.pseudo_arclength import require_inside
+from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, sharpened
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits import shooting_branches, starts
@@ -270,7 +270,7 @@ def _from_motion(
     if given.shape != field.values.shape:
         raise InputError(f"parameter_values of the motion must be {len(field.values)} numbers, one "
                          f"for each parameter of the field, not of shape {given.shape}.")
-    require_inside(float(given[free]), settings)
+    given[free] = inside(float(given[free]), settings)
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
     widths = np.append(sizes, width_of(width, settings, given[free]))
     if isinstance(method, Shooting):
