@@ -24,7 +24,7 @@ from fecontact import (
     basis_from_matrices,
 )
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.fields.vector_field import VectorField
@@ -80,11 +80,11 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
     hopf = sliding.of_kind("Hopf")[0]
     print("intervals  points  CPU time  per point   AUTO per point   error of fold, doubling")
     for intervals in (50,) if quick else (50, 70, 100, 200):
-        settings = Settings(step=0.002, largest_step=0.065, points=1000)
+        settings = ContinuationOptions(step=0.002, largest_step=0.065, points=1000)
 
-        def task(intervals: int = intervals, settings: Settings = settings) -> Branch:
+        def task(intervals: int = intervals, settings: ContinuationOptions = settings) -> Branch:
             return orbit_branch(field, hopf, method=Collocation(intervals=intervals),
-                                settings=settings, bounds=(0.3, 12.0), scales=np.ones(4))
+                                options=settings, bounds=(0.3, 12.0), scales=np.ones(4))
 
         if not quick:
             task()
@@ -99,9 +99,9 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
     large = chain(20)
     sliding = equilibrium_branch(large, parameter="B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]
-    settings = Settings(step=0.002, largest_step=0.02, points=3 if quick else 20)
+    settings = ContinuationOptions(step=0.002, largest_step=0.02, points=3 if quick else 20)
     seconds, branch = timed(lambda: orbit_branch(large, hopf, method=Collocation(intervals=100),
-                                                 settings=settings, bounds=(0.1, 3.0)), 1)
+                                                 options=settings, bounds=(0.1, 3.0)), 1)
     print(f"40 states, 100 intervals: {len(branch)} points, {seconds / len(branch):.3f} s a point")
 
 

@@ -16,7 +16,7 @@ from fecontact.laws.normal.rough_surface import RoughSurface
 from fecontact.output.files.case import read_case, write_case
 from fecontact.output.files.pvd import export_pvd
 from fecontact.output.render.movie import render
-from fecontact.output.render.offscreen import rendering_works
+from fecontact.output.render.offscreen import can_render
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.system.contact_system import ContactSystem
 
@@ -72,7 +72,7 @@ def main(quick: bool = False) -> None:
               f"{plain.stat().st_size / 1e6:8.0f} MB")
         seconds = best_of(1, lambda: export_pvd(trajectory, Path(folder, "pvd"), frames=frames))
         print(f"{'PVD and VTU':32}{seconds:8.2f} s")
-        if (reason := rendering_works()) is not None:
+        if (reason := can_render()) is not None:
             print(reason)
             return
         for size in ((320, 180),) if quick else ((960, 540), (1280, 720)):

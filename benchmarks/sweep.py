@@ -14,9 +14,9 @@ import time
 
 import numpy as np
 
-from fecontact import Range, Study, SweepSettings, simulate, sweep
-from fecontact.sweep.executors import cores, one_thread_each
-from fecontact.sweep.summaries import functions_for, summarise
+from fecontact import Span, Study, SweepSettings, simulate, sweep
+from fecontact.sweeps.executors import cores, one_thread_each
+from fecontact.sweeps.summaries import functions_for, summarise
 
 STUDY = """
 geometry = { shape = "block", element_size = 0.01 }
@@ -39,9 +39,9 @@ def main(cases: int = 10_000, quick: bool = False) -> None:
     if quick:
         cases = 20
     study = Study.from_toml(STUDY)
-    study.basis()
-    axes = {"ground.speed": Range(1e-3, 4e-3, cases // 20),
-            "friction.static_coefficient": Range(0.6, 0.9, 20)}
+    study.modal_basis()
+    axes = {"ground.speed": Span(1e-3, 4e-3, cases // 20),
+            "friction.static_coefficient": Span(0.6, 0.9, 20)}
     # The first runs load the kernels.
     single: list[tuple[float, float]] = []
     rng = np.random.default_rng(0)
@@ -67,7 +67,7 @@ def main(cases: int = 10_000, quick: bool = False) -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         before = cpu_seconds(resource.RUSAGE_CHILDREN)
-        sweep(study, {"ground.speed": Range(1e-3, 4e-3, 2 * cores())}, folder=f"{folder}/few")
+        sweep(study, {"ground.speed": Span(1e-3, 4e-3, 2 * cores())}, folder=f"{folder}/few")
         starting = cpu_seconds(resource.RUSAGE_CHILDREN) - before - 2 * cores() * alone
         table = sweep(study, axes, folder=folder, progress=tick)
         children = cpu_seconds(resource.RUSAGE_CHILDREN) - before - 2.0 * starting

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import fecontact as fc
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.integrate.initial_state import initial_state
 
 SPEED = "ground.speed"
@@ -49,7 +49,7 @@ def sliding(lowest: float = 2e-3, highest: float = 0.5) -> fc.Branch:
     """Steady sliding over the speed of the belt, from fast to slow."""
     field = fc.contact_field(beam(highest), {SPEED: highest})
     return fc.equilibrium_branch(field, bounds=(lowest, highest), direction=-1.0,
-                                 settings=Settings(step=5e-3, points=300))
+                                 options=ContinuationOptions(step=5e-3, points=300))
 
 
 def stuck(system: fc.ContactSystem) -> NDArray[np.float64]:
@@ -75,7 +75,7 @@ def orbits(motion: fc.PeriodicMotion, speed: float, bounds: tuple[float, float],
     return fc.orbit_branch(
         fc.contact_field(beam(speed), {SPEED: speed}), motion,
         method=fc.Shooting(segments=1, rtol=1e-8, derivative_rtol=1e-2), bounds=bounds,
-        scales=scales(motion), width=0.4, both=both, settings=settings(points))
+        scales=scales(motion), width=0.4, both=both, options=settings(points))
 
 
 def slipping(branch: fc.Branch, fastest: float, points: int = 200) -> fc.Branch:
@@ -86,7 +86,7 @@ def slipping(branch: fc.Branch, fastest: float, points: int = 200) -> fc.Branch:
     field = fc.contact_field(beam(fastest), {SPEED: fastest})
     hopf, = branch.of_kind("Hopf")
     return fc.orbit_branch(field, hopf, method=fc.Collocation(intervals=60), bounds=(2e-3, fastest),
-                           settings=Settings(step=0.01, largest_step=0.03, points=points))
+                           options=ContinuationOptions(step=0.01, largest_step=0.03, points=points))
 
 
 def scales(motion: fc.PeriodicMotion) -> NDArray[np.float64]:
@@ -96,9 +96,9 @@ def scales(motion: fc.PeriodicMotion) -> NDArray[np.float64]:
     return 10.0 * np.repeat([size[:modes].max(), size[modes:].max()], modes)
 
 
-def settings(points: int) -> Settings:
+def settings(points: int) -> ContinuationOptions:
     """Steps of the branches: short ones find the folds; they end where only tiny ones go on."""
-    return Settings(step=0.01, smallest_step=5e-4, largest_step=0.03, points=points, locate=False)
+    return ContinuationOptions(step=0.01, smallest_step=5e-4, largest_step=0.03, points=points, locate=False)
 
 
 def seen(branch: fc.Branch) -> fc.Branch:

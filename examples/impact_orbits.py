@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 import fecontact as fc
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import FecontactError
 
@@ -72,13 +72,13 @@ def field_at(w: float) -> ContactField:
     return fc.contact_field(oscillator(w), {FREQUENCY: w})
 
 
-def runs(quick: bool = False) -> fc.BruteForce:
+def runs(quick: bool = False) -> fc.PoincareScan:
     """States once per period, up and down; more values where motions change quickly."""
     values = np.concatenate([np.arange(5.0, 12.0, 0.5), np.arange(12.0, 46.0, 0.2),
                              np.arange(46.0, 80.5, 0.5)])
     if quick:
         values = np.arange(44.0, 52.0, 2.0)
-    return fc.brute_force(oscillator(), FREQUENCY, values, transient_periods=100, keep=24,
+    return fc.poincare_scan(oscillator(), FREQUENCY, values, transient_periods=100, keep=24,
                           initial=np.zeros(4))
 
 
@@ -93,7 +93,7 @@ def orbits(
     return fc.orbit_branch(
         field, motion, method=fc.Shooting(segments=motion.periods, rtol=RTOL), bounds=bounds,
         both=True, scales=SIZE * np.ptp(motion.states, axis=0) / 2.0, width=WIDTH,
-        settings=Settings(step=1e-3, largest_step=0.01, points=points))
+        options=ContinuationOptions(step=1e-3, largest_step=0.01, points=points))
 
 
 def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch | None:
@@ -102,7 +102,7 @@ def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch 
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4):
         try:
             return fc.orbit_branch(field_at(doubling.parameter), doubling, bounds=(25.0, 80.0),
-                                   settings=Settings(step=step, largest_step=0.02, points=points))
+                                   options=ContinuationOptions(step=step, largest_step=0.02, points=points))
         except FecontactError as error:
             why = error
     print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {why}")
@@ -130,7 +130,7 @@ def known(point: BranchPoint, others: Sequence[Array]) -> bool:
     return any(bool((np.abs(place(point) - other) < 1.0).all()) for other in others)
 
 
-def all_orbits(found: fc.BruteForce, starts: Sequence[Start] = STARTS) -> list[fc.Branch]:
+def all_orbits(found: fc.PoincareScan, starts: Sequence[Start] = STARTS) -> list[fc.Branch]:
     """Branches from the starts, those that double there, and those that double on these."""
     def begun(start: Start) -> fc.Branch | None:
         index = int(np.argmin(np.abs(found.values - start.w)))
@@ -181,7 +181,7 @@ def special(branches: Sequence[fc.Branch]) -> Iterator[tuple[int, BranchPoint]]:
                 yield periods(branch), point
 
 
-def covered(found: fc.BruteForce, branches: Sequence[fc.Branch]) -> tuple[int, list[float]]:
+def covered(found: fc.PoincareScan, branches: Sequence[fc.Branch]) -> tuple[int, list[float]]:
     """Runs that repeat after up to 4 periods on an orbit that is known, and where others are."""
     count, others = 0, []
     for states in (found.up, found.down):
@@ -225,7 +225,7 @@ def pieces(branch: fc.Branch, low: float, high: float, marked: bool) -> list[fc.
 
 
 def draw(
-    path: Path, branches: Sequence[fc.Branch], found: fc.BruteForce, low: float, high: float,
+    path: Path, branches: Sequence[fc.Branch], found: fc.PoincareScan, low: float, high: float,
     chosen: Sequence[tuple[int, float]], marked: bool = False,
 ) -> None:
     """The diagram of a range, with phase planes of orbits of so many periods near some places."""

@@ -19,8 +19,8 @@ import numpy as np
 import fecontact as fc
 
 STUDY = Path(__file__).with_name("sweep_stick_slip.toml")
-AXES = {"ground.speed": fc.Range(1e-3, 12e-3, 12),
-        "friction.static_coefficient": fc.Range(0.6, 0.9, 5)}
+AXES = {"ground.speed": fc.Bound(1e-3, 12e-3, 12),
+        "friction.static_coefficient": fc.Bound(0.6, 0.9, 5)}
 
 
 def start(folder: str, *command: str) -> "subprocess.Popen[bytes]":

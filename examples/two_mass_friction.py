@@ -36,7 +36,7 @@ from fecontact import (
     find_equilibrium,
     simulate,
 )
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.bifurcation.orbits.samples import amplitude
@@ -80,18 +80,18 @@ def diagram_over_B() -> dict[str, Branch]:
     field, bounds = oscillator(B=0.3), (0.3, 10.0)
     sliding = equilibrium_branch(field, parameter="B", bounds=bounds)
     first_hopf, second_hopf = sliding.of_kind("Hopf")
-    settings = Settings(step=0.005, largest_step=0.04)
-    orbits = orbit_branch(field, first_hopf, method=Collocation(intervals=100), settings=settings,
+    settings = ContinuationOptions(step=0.005, largest_step=0.04)
+    orbits = orbit_branch(field, first_hopf, method=Collocation(intervals=100), options=settings,
                           bounds=bounds, scales=SMALL)
     branches = {"steady sliding": sliding, "orbits": orbits}
-    near = Settings(step=0.005, largest_step=0.03)
+    near = ContinuationOptions(step=0.005, largest_step=0.03)
     for period in (2, 4, 8):
         orbits = orbit_branch(field, orbits.of_kind("period doubling")[0],
-                              method=Collocation(intervals=100 * min(period, 6)), settings=near,
+                              method=Collocation(intervals=100 * min(period, 6)), options=near,
                               bounds=bounds if period == 2 else (8.0, 9.6))
         branches[f"period {period}"] = orbits
     branches["second branch"] = orbit_branch(field, second_hopf, method=Collocation(intervals=100),
-                                             settings=settings, bounds=bounds, scales=SMALL)
+                                             options=settings, bounds=bounds, scales=SMALL)
     return branches | doubled(field, branches["second branch"], bounds, "second branch, period 2")
 
 
@@ -99,12 +99,12 @@ def doubled(
     field: ContactField, orbits: Branch, bounds: tuple[float, float], name: str,
 ) -> dict[str, Branch]:
     """Orbits of twice the period from each doubling of a branch, those once that lie on several."""
-    settings, found = Settings(step=0.005, largest_step=0.04, points=300), dict[str, Branch]()
+    settings, found = ContinuationOptions(step=0.005, largest_step=0.04, points=300), dict[str, Branch]()
     for point in orbits.of_kind("period doubling"):
         if not any(abs(place.parameter - point.parameter) < 1e-5
                    for other in found.values() for place in other.special):
             label = name + "'" * len(found)
-            found[label] = orbit_branch(field, point, settings=settings, bounds=bounds)
+            found[label] = orbit_branch(field, point, options=settings, bounds=bounds)
     return found
 
 
@@ -112,11 +112,11 @@ def diagram_over_speed() -> dict[str, Branch]:
     """Orbits over v_0 from both Hopf points, B = 20, D = 0.1."""
     field, bounds = oscillator(B=20.0, v0=8.0), (1.2, 8.0)
     sliding = equilibrium_branch(field, parameter="ground.speed", bounds=bounds, direction=-1.0)
-    settings = Settings(step=0.005, largest_step=0.04, points=600)
+    settings = ContinuationOptions(step=0.005, largest_step=0.04, points=600)
     branches = {"steady sliding": sliding}
     for name, point in zip(("orbits", "second branch"), sliding.of_kind("Hopf"), strict=True):
         branches[name] = orbit_branch(field, point, method=Collocation(intervals=100),
-                                      settings=settings, bounds=bounds, scales=LARGE)
+                                      options=settings, bounds=bounds, scales=LARGE)
     return branches | doubled(field, branches["orbits"], bounds, "period 2")
 
 
@@ -128,7 +128,7 @@ def diagram_over_damping(B: float) -> dict[str, Branch]:
     found = {"steady sliding": sliding}
     for name, point in zip(names, sliding.of_kind("Hopf"), strict=True):
         found[name] = orbit_branch(field, point, method=Collocation(intervals=100), bounds=bounds,
-                                   settings=Settings(step=0.005, points=600), scales=LARGE)
+                                   options=ContinuationOptions(step=0.005, points=600), scales=LARGE)
     return found
 
 
@@ -173,7 +173,7 @@ def basins_of_attraction(v0: float, count: int = 60) -> tuple[Basins, list[np.nd
     around = float(place.row(system) @ sliding) + np.linspace(-18.0, 18.0, count)
     found = basins(system, (place, around), (speed, np.linspace(-12.0, 8.0, count)), base=sliding,
                    transient=300.0, keep=16,
-                   section=Crossing(1, "x", value=0.05, of="velocity", direction="falling"))
+                   section=Crossing(1, "x", value=0.05, of="velocity", sense="falling"))
     return found, [axis.row(system) for axis in (place, speed)]
 
 
@@ -230,7 +230,7 @@ def quick_diagram(folder: Path) -> None:
     field, bounds = oscillator(B=0.3), (0.3, 10.0)
     sliding = equilibrium_branch(field, parameter="B", bounds=bounds)
     orbits = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=bounds,
-                          settings=Settings(step=0.01, largest_step=0.1), scales=SMALL)
+                          options=ContinuationOptions(step=0.01, largest_step=0.1), scales=SMALL)
     plot_branches([sliding, orbits], amplitude(field.displacement_row(1)), x_label="B [m]",
                   y_label="amplitude of x3 [m]", names=["steady sliding", "orbits"],
                   path=folder / "two_masses_over_B.png")

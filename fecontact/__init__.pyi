@@ -1,11 +1,11 @@
-from .analysis.frequency_response import frequency_response
+from .analysis.receptance import receptance
 from .analysis.histories import history
 from .analysis.impacts import Impacts, find_impacts, find_rests
 from .analysis.periodicity import Periodicity, count_periods, periodicity, strobed_states
 from .analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from .bifurcation.attractors.basins import Attractor, Axis, Basins, basins
 from .bifurcation.attractors.lyapunov import LyapunovExponents, lyapunov_exponents
-from .bifurcation.attractors.poincare_scan import BruteForce, brute_force
+from .bifurcation.attractors.poincare_scan import PoincareScan, poincare_scan
 from .bifurcation.continuation.branch import Branch
 from .bifurcation.continuation.points import (
     BranchPoint,
@@ -58,7 +58,7 @@ from .laws.friction.stribeck import (
 )
 from .laws.ground.fourier_series import FourierSeries
 from .laws.ground.ground import Ground
-from .laws.ground.measured_profile import Trace
+from .laws.ground.measured_profile import MeasuredProfile
 from .laws.ground.motion import HarmonicSpeed, SpeedRamp
 from .laws.ground.profile import Flat, Sine
 from .laws.ground.random_roughness import RandomRoughness
@@ -84,7 +84,7 @@ from .output.files.pvd import export_pvd
 from .output.plots.analysis import (
     plot_friction_work,
     plot_poincare,
-    plot_response,
+    plot_receptance,
     plot_spectrogram,
     plot_spectrum,
 )
@@ -107,12 +107,12 @@ from .reduction.reduce_body import modal_basis
 from .reduction.report import BasisReport
 from .reduction.restriction import rows_from_dofs
 from .study.study import Study
-from .study.sweep_section import Distribution, Range, Strobing, SweepSettings
-from .sweep.executors import dask_executor
-from .sweep.plots import plot_sobol, plot_strobed, plot_sweep
-from .sweep.statistics import SobolIndices, sobol_indices, statistics
-from .sweep.sweep import sweep
-from .sweep.table import SweepTable, read_table
+from .study.sweep_section import Distribution, Span, Strobing, SweepSettings
+from .sweeps.executors import dask_executor
+from .sweeps.plots import plot_sobol, plot_strobed, plot_sweep
+from .sweeps.statistics import SobolIndices, sobol_indices, statistics
+from .sweeps.sweep import sweep
+from .sweeps.table import SweepTable, read_table
 from .system.contact_system import ContactSystem
 from .system.forcing_period import forcing_period
 from .system.gap import Crown
@@ -131,7 +131,7 @@ __all__ = [
     "BoucWenFriction",
     "Branch",
     "BranchPoint",
-    "BruteForce",
+    "PoincareScan",
     "Collocation",
     "Constant",
     "ConstantFriction",
@@ -199,7 +199,7 @@ __all__ = [
     "ProductFriction",
     "Pulse",
     "RandomRoughness",
-    "Range",
+    "Span",
     "Rayleigh",
     "RestitutionContact",
     "RigidStart",
@@ -217,11 +217,11 @@ __all__ = [
     "Step",
     "Strobing",
     "Study",
-    "Sweep",
+    "SweptSine",
     "SweepSettings",
     "SweepTable",
     "Tabulated",
-    "Trace",
+    "MeasuredProfile",
     "Trajectory",
     "TwoSidedStop",
     "UnresolvedPoint",
@@ -231,7 +231,7 @@ __all__ = [
     "basins",
     "basis_from_matrices",
     "basis_from_modes",
-    "brute_force",
+    "poincare_scan",
     "check_law",
     "contact_field",
     "count_periods",
@@ -249,7 +249,7 @@ __all__ = [
     "find_rests",
     "fold_curve",
     "forcing_period",
-    "frequency_response",
+    "receptance",
     "friction_law",
     "generate",
     "history",
@@ -276,7 +276,7 @@ __all__ = [
     "plot_modes",
     "plot_phase",
     "plot_poincare",
-    "plot_response",
+    "plot_receptance",
     "plot_sobol",
     "plot_spectrogram",
     "plot_spectrum",

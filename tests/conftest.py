@@ -1,4 +1,4 @@
-"""Settings for all tests."""
+"""ContinuationOptions for all tests."""
 
 import os
 from pathlib import Path

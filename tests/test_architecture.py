@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "fecontact"
 ROOMS = ("core", "fem", "laws", "reduction", "system", "integrate", "analysis", "bifurcation",
-         "output", "study", "sweep", "cli")
+         "output", "study", "sweeps", "cli")
 # Rooms that do not know each other, although the one stands above the other.
 STRANGERS = {("laws", "fem"), ("study", "output")}
 LARGEST, MOST_FILES = 450, 16

@@ -11,7 +11,7 @@ import pytest
 import fecontact as fc
 from fecontact.cli import execute
 from fecontact.cli.app import COMMANDS, app
-from fecontact.output.render.offscreen import rendering_works
+from fecontact.output.render.offscreen import can_render
 from fecontact.study.study import Study
 
 ROOT = Path(__file__).parents[1]
@@ -69,8 +69,8 @@ def orbits_setup(folder):
 def sensitivity(names):
     """The table of a sweep for Sobol indices, of which the page speaks by then."""
     names["table"] = fc.sweep(
-        "study.toml", {"ground.speed": fc.Range(1e-3, 4e-3, 2),
-                       "load.normal": fc.Range(10.0, 20.0, 2)},
+        "study.toml", {"ground.speed": fc.Span(1e-3, 4e-3, 2),
+                       "load.normal": fc.Span(10.0, 20.0, 2)},
         method="sensitivity", samples=8, summaries=["friction_power"], folder="sensitivity")
 
 
@@ -180,7 +180,7 @@ def test_code_of_the_page_runs(page, tmp_path, monkeypatch, capsys):
         BETWEEN.get((page, number), lambda names: None)(names)
         for old, new in shorter.items():
             code = code.replace(old, new)
-        if rendering_works() is not None:
+        if can_render() is not None:
             code = re.sub(r"^render\(.*\)$", "", code, flags=re.MULTILINE)
         exec(compile(code, page, "exec"), names)
     CHECKS[page](names, capsys.readouterr().out, tmp_path)

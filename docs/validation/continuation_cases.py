@@ -18,7 +18,7 @@ from fecontact import (
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
 CASCADE = (("asymmetric orbit", 229.407, 0.480867), ("doubled orbit", 218.210, 0.987949),
            ("twice doubled orbit", 215.966, 1.98675))
@@ -84,7 +84,7 @@ def lorenz() -> list[Comparison]:
                  Comparison(f"Lorenz, {name}: period there", period, doubling.values["period"])]
         if number < 2:
             branch = orbit_branch(field, doubling, bounds=(215.0, 230.0),
-                                  settings=Settings(step=0.01, stop_at=("period doubling",)))
+                                  settings=ContinuationOptions(step=0.01, stop_at=("period doubling",)))
     return rows
 
 

@@ -37,7 +37,7 @@ class History(NamedTuple):
 
 
 def history(
-    trajectory: Trajectory, quantity: str = "displacement", point: Point = "B", axis: str = "x"
+    trajectory: Trajectory, quantity: str = "displacement", point: Point = "B", component: str = "x"
 ) -> History:
     """A quantity of a run at one point over time.
 
@@ -51,13 +51,13 @@ def history(
         contact node; 'total_normal_force', 'total_friction_force' or 'total_friction_work' of all.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
-    axis : 'x', 'y' or 'phi'
+    component : 'x', 'y' or 'phi'
         Of displacements and velocities: along the ground, away from it, or the rotation.
 
     Raises
     ------
     InputError
-        For a quantity, a point or an axis that does not exist, and for a quantity of contact nodes
+        For a quantity, a point or an component that does not exist, and for a quantity of contact nodes
         at a point that is none.
     """
     require_kind("history", Trajectory, trajectory=trajectory)
@@ -77,12 +77,12 @@ def history(
         return History(getattr(trajectory, quantity)[:, node], _OF_NODES[quantity],
                        f"{title} of {point_name(point)}")
     motion = getattr(trajectory, quantity)(point)
-    if axis not in _AXES or _AXES[axis] >= motion.shape[1]:
+    if component not in _AXES or _AXES[component] >= motion.shape[1]:
         raise InputError(f"axis = {axis!r} is not one of {point_name(point)}; choose from "
                          f"{choices(list(_AXES)[: motion.shape[1]])}.")
     unit = _OF_POINTS[quantity]
-    return History(motion[:, _AXES[axis]], unit.replace("m", "rad") if axis == "phi" else unit,
-                   f"{title} {axis} of {point_name(point)}")
+    return History(motion[:, _AXES[component]], unit.replace("m", "rad") if component == "phi" else unit,
+                   f"{title} {component} of {point_name(point)}")
 
 
 def usual_axis(system: ContactSystem) -> str:

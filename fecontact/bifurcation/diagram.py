@@ -10,7 +10,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Settings, Status
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, BranchStatus
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import observe
@@ -40,7 +40,7 @@ class Branches:
     ----------
     contact_field : ContactField
         The system as a function of the parameter.
-    observe : (point, axis)
+    observe : (point, component)
         The displacement that is observed.
     found : dict of name to Branch
         With the range of the observed displacement; see
@@ -85,7 +85,7 @@ def follow_branches(
         shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
     # Found out after a long computation, a wrong name would be found out too late.
     basis.point_index(shown)
-    result = Branches(contact_field(system, {wanted.name: wanted.first}), (shown, wanted.axis))
+    result = Branches(contact_field(system, {wanted.name: wanted.first}), (shown, wanted.component))
     tasks = deque(_first_tasks(result.contact_field, wanted, initial))
     while tasks:
         task = tasks.popleft()
@@ -103,7 +103,7 @@ def follow_branches(
             continue
         result.found[task.title] = observe(result.contact_field, branch, *result.observe)
         warn_of_limits(_limits_exceeded(result.contact_field, branch), f"On '{task.title}'")
-        if branch.status is Status.INTERRUPTED:
+        if branch.status is BranchStatus.INTERRUPTED:
             result.interrupted = True
             break
         if task.generation < wanted.generations:
@@ -138,28 +138,28 @@ class _Task(NamedTuple):
 
 def _settings(
     wanted: "BranchSettings", title: str, progress: Callable[[str, float], None] | None
-) -> Settings:
-    settings = wanted.settings()
+) -> ContinuationOptions:
+    options = wanted.options()
     if progress is None:
-        return settings
+        return options
     progress(title, 0.0)
-    return replace(settings, progress=lambda points: progress(title, points / settings.points))
+    return replace(options, progress=lambda points: progress(title, points / options.points))
 
 
 def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[_Task]:
     low, high = wanted.bounds
     if wanted.kind != "orbits":
-        yield _Task(_EQUILIBRIA, 0, lambda settings: equilibrium_branch(
-            field, parameter=wanted.name, settings=_fine(settings),
+        yield _Task(_EQUILIBRIA, 0, lambda options: equilibrium_branch(
+            field, parameter=wanted.name, options=_fine(options),
             direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
     if wanted.kind != "equilibria":
         yield _Task("orbits of the run", 0, partial(_orbits, field, wanted, initial))
 
 
-def _fine(settings: Settings) -> Settings:
+def _fine(options: ContinuationOptions) -> ContinuationOptions:
     """Shorter steps: equilibria cost little, and curves are drawn through them."""
-    return replace(settings, step=min(settings.step, _FINE),
-                   largest_step=min(settings.largest_step, _FINE))
+    return replace(options, step=min(options.step, _FINE),
+                   largest_step=min(options.largest_step, _FINE))
 
 
 def _tasks_beyond(
@@ -174,7 +174,7 @@ def _tasks_beyond(
 
 
 def _orbits(
-    field: ContactField, wanted: "BranchSettings", initial: Any, settings: Settings
+    field: ContactField, wanted: "BranchSettings", initial: Any, options: ContinuationOptions
 ) -> Branch:
     """The orbit on which a run settles, over the parameter."""
     from fecontact.bifurcation.orbits.branches import orbit_branch
@@ -184,7 +184,7 @@ def _orbits(
     motion = periodic_motion(field.system(), initial=initial, transient=wanted.transient,
                              longest_period=wanted.longest_period)
     return orbit_branch(
-        field, motion, wanted.name, method=_method(wanted), settings=settings,
+        field, motion, wanted.name, method=_method(wanted), options=options,
         # So that a step is one of the parameter rather than of the orbit, which may grow.
         scales=_SIZE * motion.amplitudes,
         direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high)
@@ -200,16 +200,16 @@ def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
 
 
 def _beyond(
-    field: ContactField, point: BranchPoint, wanted: "BranchSettings", settings: Settings
+    field: ContactField, point: BranchPoint, wanted: "BranchSettings", options: ContinuationOptions
 ) -> Branch:
     """The branch that begins at a special point."""
     from fecontact.bifurcation.orbits.branches import orbit_branch
 
     if point.kind == "Hopf":
-        return orbit_branch(field, point, method=_method(wanted), settings=settings)
+        return orbit_branch(field, point, method=_method(wanted), options=options)
     if point.is_orbit:
-        return orbit_branch(field, point, settings=settings)
-    return equilibrium_branch(field, point, settings=settings)
+        return orbit_branch(field, point, options=options)
+    return equilibrium_branch(field, point, options=options)
 
 
 def _title(name: str, kind: str, number: str) -> str:

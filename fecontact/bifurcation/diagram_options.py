@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 from fecontact.core.errors import InputError, choices, require_finite, require_positive
 
 if TYPE_CHECKING:
-    from fecontact.bifurcation.continuation.problem import Settings
+    from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
 # Pieces of an orbit and runs beneath a diagram; more is a slip of the pen.
 _MOST_PIECES, _MOST_RUNS = 10_000, 100_000
@@ -22,10 +22,10 @@ class BranchSettings:
     parameter : str, optional
         Dotted name of a number of the study that changes: 'ground.speed'; needed for
         ``fecontact branch`` only.
-    range : (float, float), optional
+    bounds : (float, float), optional
         Its least and largest value.
     start : float, optional
-        Value at which the first branch begins; the first of the range by default.
+        Value at which the first branch begins; the first of the bounds by default.
     kind : 'equilibria', 'orbits' or 'both'
         What is followed first: steady sliding, the periodic orbit on which a run at ``start``
         settles, or both.
@@ -54,19 +54,19 @@ class BranchSettings:
     point : str or int, optional
         What the diagram shows: 'B', 'C', a further named point, or a contact node by its number;
         B by default, or the middle of the contact where there is no B.
-    axis : 'x' or 'y'
+    component : 'x' or 'y'
         Its displacement along the ground or away from it.
     show : 'maximum', 'minimum', 'amplitude' or 'section'
         Of that displacement over the orbit; the amplitude is half of what lies between them, the
         section what excited systems have once per period.
-    brute_force : int
+    poincare_scan : int
         For excited systems: number of values of the parameter, at least 2, at which runs are drawn
         beneath the branches once per period, up and down; the diagram then shows sections. Zero
         for none.
     """
 
     parameter: str | None = None
-    range: tuple[float, float] | None = None
+    bounds: tuple[float, float] | None = None
     start: float | None = None
     kind: Literal["equilibria", "orbits", "both"] = "equilibria"
     switch: tuple[str, ...] = ()
@@ -80,9 +80,9 @@ class BranchSettings:
     transient: float | None = None
     longest_period: float | None = None
     point: str | int | None = None
-    axis: Literal["x", "y"] = "x"
+    component: Literal["x", "y"] = "x"
     show: Literal["maximum", "minimum", "amplitude", "section"] = "maximum"
-    brute_force: int = 0
+    poincare_scan: int = 0
 
     def __post_init__(self) -> None:
         require_positive("BranchSettings", step=self.step, largest_step=self.largest_step,
@@ -93,8 +93,8 @@ class BranchSettings:
         if self.generations < 0:
             raise InputError(f"BranchSettings: generations = {self.generations} must be zero or "
                              f"above.")
-        if self.brute_force < 0 or self.brute_force == 1:
-            raise InputError(f"BranchSettings: brute_force = {self.brute_force} must be zero, for "
+        if self.poincare_scan < 0 or self.poincare_scan == 1:
+            raise InputError(f"BranchSettings: poincare_scan = {self.poincare_scan} must be zero, for "
                              f"none, or at least 2.")
         if self.step > self.largest_step:
             raise InputError(f"BranchSettings: step = {self.step:g} must not be above largest_step "
@@ -106,28 +106,28 @@ class BranchSettings:
         if self.start is not None:
             require_finite("BranchSettings", start=self.start)
         for name, most in (("intervals", _MOST_PIECES), ("segments", _MOST_PIECES),
-                           ("brute_force", _MOST_RUNS)):
+                           ("poincare_scan", _MOST_RUNS)):
             if getattr(self, name) > most:
                 raise InputError(f"BranchSettings: {name} = {getattr(self, name)} must be at most "
                                  f"{most}.")
-        if self.range is None:
+        if self.bounds is None:
             return
-        low, high = self.range
+        low, high = self.bounds
         require_finite("BranchSettings: the range", low=low, high=high)
         if not low < high:
-            raise InputError(f"BranchSettings: range = {list(self.range)} must be two values, the "
+            raise InputError(f"BranchSettings: range = {list(self.bounds)} must be two values, the "
                              f"smaller one first.")
         if self.start is not None and not low <= self.start <= high:
-            raise InputError(f"BranchSettings: start = {self.start:g} must lie in the range, "
+            raise InputError(f"BranchSettings: start = {self.start:g} must lie in the bounds, "
                              f"{low:g} to {high:g}.")
 
     @property
     def bounds(self) -> tuple[float, float]:
         """The range; InputError where there is none."""
-        if self.range is None:
+        if self.bounds is None:
             raise InputError("[branch] lacks the key 'range', the least and largest value of the "
                              "parameter; give it, or --from and --to.")
-        return self.range
+        return self.bounds
 
     @property
     def name(self) -> str:
@@ -142,9 +142,9 @@ class BranchSettings:
         """Value at which the first branch begins."""
         return self.bounds[0] if self.start is None else self.start
 
-    def settings(self) -> "Settings":
+    def options(self) -> "ContinuationOptions":
         """How branches are followed."""
-        from fecontact.bifurcation.continuation.problem import Settings
+        from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
-        return Settings(step=self.step, largest_step=self.largest_step, points=self.points,
+        return ContinuationOptions(step=self.step, largest_step=self.largest_step, points=self.points,
                         bounds=self.bounds)

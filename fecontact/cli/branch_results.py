@@ -13,7 +13,7 @@ from fecontact.core.atomic_write import write_text
 from fecontact.output.files.branches import write_branches
 
 if TYPE_CHECKING:
-    from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+    from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
     from fecontact.bifurcation.diagram import Branches
     from fecontact.bifurcation.diagram_options import BranchSettings
     from fecontact.system.contact_system import ContactSystem
@@ -26,7 +26,7 @@ _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "per
 
 def write_branch_results(
     result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
-    beneath: "BruteForce | None" = None,
+    beneath: "PoincareScan | None" = None,
 ) -> list[Path]:
     """Write branches as HDF5 and CSV, and draw them; the files."""
     from fecontact.output.plots.bifurcation_diagram import plot_branches
@@ -48,7 +48,7 @@ def write_branch_results(
     return files
 
 
-def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any) -> "BruteForce":
+def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any) -> "PoincareScan":
     """Runs over the range of the parameter, up and down.
 
     Raises
@@ -58,11 +58,11 @@ def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any
     """
     import numpy as np
 
-    from fecontact.bifurcation.attractors.poincare_scan import brute_force
+    from fecontact.bifurcation.attractors.poincare_scan import poincare_scan
 
-    values = np.linspace(*wanted.bounds, wanted.brute_force)
+    values = np.linspace(*wanted.bounds, wanted.poincare_scan)
     with progress_bar("Running at each value", 2.0 * len(values)) as show:
-        return brute_force(system, wanted.name, values, initial=initial, progress=show)
+        return poincare_scan(system, wanted.name, values, initial=initial, progress=show)
 
 
 def branches_csv(branches: Mapping[str, Branch]) -> str:
@@ -133,8 +133,8 @@ def _how_sure(point: BranchPoint) -> str:
     return f"known to {error:.1g} only" if error > 5e-7 * abs(point.parameter) else ""
 
 
-def _label(show: str, point: str | int, axis: str) -> str:
+def _label(show: str, point: str | int, component: str) -> str:
     what = {"maximum": "largest displacement", "minimum": "smallest displacement",
             "amplitude": "amplitude", "section": "displacement once per period,"}[show]
     where = point if isinstance(point, str) else f"contact node {point}"
-    return f"{what} {axis} of {where} [m]"
+    return f"{what} {component} of {where} [m]"

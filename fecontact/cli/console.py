@@ -167,28 +167,28 @@ def show(renderable: Any) -> None:
     Console().print(renderable)
 
 
-def say(text: str) -> None:
+def echo(text: str) -> None:
     """Print a line."""
     print(text)
 
 
-def say_written(*files: Path) -> None:
+def echo_written(*files: Path) -> None:
     """Print which files were written, and their sizes."""
     from fecontact.cli.tables import file_size
 
     for file in files:
         size = f" ({file_size(file)})" if file.is_file() else ""
-        say(f"wrote {file}{size}")
+        echo(f"wrote {file}{size}")
 
 
-def note_age(file: Path, current: bool) -> None:
+def warn_if_stale(file: Path, current: bool) -> None:
     """Note that a study was changed after its run."""
     if not current:
         print(f"note: the run was computed with other values than {file} has now; run it again to "
               f"see these.", file=sys.stderr)
 
 
-def complain(message: str, code: int) -> int:
+def fail(message: str, code: int) -> int:
     """Print an error in one line; the exit code that goes with it."""
     print(f"error: {_one_line(message)}", file=sys.stderr)
     return code

@@ -24,7 +24,7 @@ class Log:
 
     @contextmanager
     def step(self, study: str, what: str) -> Iterator[None]:
-        """Time a step and say on stderr when it is done."""
+        """Time a step and echo on stderr when it is done."""
         begin = time.perf_counter()
         yield
         seconds = time.perf_counter() - begin

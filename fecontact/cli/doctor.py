@@ -29,8 +29,8 @@ subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-version"], check=True, captur
 _COMPILED = "import fecontact.system.contact_system"
 _RENDERING = """
 import sys
-from fecontact.output.render.offscreen import rendering_works
-reason = rendering_works()
+from fecontact.output.render.offscreen import can_render
+reason = can_render()
 sys.exit(reason)
 """
 

@@ -7,7 +7,7 @@ from typing import Any
 from cyclopts import CycloptsError
 
 from fecontact.cli.app import app
-from fecontact.cli.console import INTERRUPTED, complain, ending_signals, interrupted_code
+from fecontact.cli.console import INTERRUPTED, fail, ending_signals, interrupted_code
 from fecontact.core.errors import FecontactError, ModelWarning
 
 
@@ -48,13 +48,13 @@ def _execute(tokens: list[str]) -> int:
         return int(app.meta(tokens, exit_on_error=False, print_error=False,
                             result_action="return_value") or 0)
     except CycloptsError as error:
-        return complain(str(error).replace("\n", " "), 2)
+        return fail(str(error).replace("\n", " "), 2)
     except FecontactError as error:
         if debug:
             raise
-        return complain(str(error), 1)
+        return fail(str(error), 1)
     except KeyboardInterrupt:
-        return complain("interrupted.", INTERRUPTED)
+        return fail("interrupted.", INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output has gone; there is nobody to tell.
         sys.stdout = None
@@ -62,14 +62,14 @@ def _execute(tokens: list[str]) -> int:
     except OSError as error:
         if debug:
             raise
-        return complain(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}.",
+        return fail(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}.",
                          1)
     except Exception as error:
         if _was_interrupted(error):
-            return complain("interrupted.", INTERRUPTED)
+            return fail("interrupted.", INTERRUPTED)
         if debug:
             raise
-        return complain(f"this should not happen ({type(error).__name__}: {error}); run it again "
+        return fail(f"this should not happen ({type(error).__name__}: {error}); run it again "
                          f"with --debug and report what it prints.", 1)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.frequency_response import Place, frequency_response
+from fecontact.analysis.receptance import Place, receptance
 from fecontact.analysis.histories import Point, usual_axis
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Choice:
+class PlotRequest:
     """What is to be drawn of a run.
 
     Attributes
     ----------
-    quantity, axis : str
+    quantity, component : str
         As for :func:`fecontact.analysis.histories.history`; the axis by default that of the drive.
     points : tuple of points
         Named points and contact nodes; all that a history shows, of which the other plots show
@@ -37,7 +37,7 @@ class Choice:
 
     quantity: str = "velocity"
     points: tuple[Point, ...] = ()
-    axis: str | None = None
+    component: str | None = None
     highest_hz: float | None = None
 
     def __post_init__(self) -> None:
@@ -51,14 +51,14 @@ class Choice:
 
     @property
     def direction(self) -> str:
-        """The axis, x where none is chosen."""
-        return self.axis or "x"
+        """The component, x where none is chosen."""
+        return self.component or "x"
 
 
-Draw = Callable[[Trajectory, Choice, Path | None], "Figure"]
+Draw = Callable[[Trajectory, PlotRequest, Path | None], "Figure"]
 
 
-def _receptance(run: Trajectory, c: Choice, path: Path | None) -> "Figure":
+def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
     basis = run.system.basis
     end = c.highest_hz or 1.2 * float(basis.frequencies_hz[-1] or 100.0)
     f = np.linspace(end / 2000.0, end, 2000)
@@ -66,13 +66,13 @@ def _receptance(run: Trajectory, c: Choice, path: Path | None) -> "Figure":
         raise InputError(f"The receptance is one of named points and contact nodes, not of "
                          f"{c.point!r}.")
     place: list[Place] = [(c.point, c.direction)]
-    found = [frequency_response(run.system, f, place)]
+    found = [receptance(run.system, f, place)]
     labels = ["apart from the ground"]
     # Without steady sliding, as on waves, there is nothing to linearise about.
     with suppress(AnalysisError):
-        found.append(frequency_response(run.system, f, place, linearised_at="sliding"))
+        found.append(receptance(run.system, f, place, linearised_at="sliding"))
         labels.append("steadily sliding")
-    return analysis.plot_response(found, labels, path=path)
+    return analysis.plot_receptance(found, labels, path=path)
 
 
 KINDS: dict[str, Draw] = {
@@ -97,7 +97,7 @@ KINDS: dict[str, Draw] = {
 def redraw(
     trajectory: Trajectory,
     kind: str,
-    choice: Choice | None = None,
+    choice: PlotRequest | None = None,
     *,
     t_start: float | None = None,
     t_end: float | None = None,
@@ -111,7 +111,7 @@ def redraw(
         The run.
     kind : str
         One of :data:`KINDS`.
-    choice : Choice, optional
+    choice : PlotRequest, optional
         What to draw.
     t_start, t_end : float, optional
         The part of the run [s].
@@ -128,9 +128,9 @@ def redraw(
                          f"{choices(KINDS)}.")
     whole = t_start is None and t_end is None
     part = trajectory if whole else trajectory.between(t_start, t_end)
-    chosen = choice or Choice()
-    if chosen.axis is None:
-        chosen = replace(chosen, axis=usual_axis(part.system))
+    chosen = choice or PlotRequest()
+    if chosen.component is None:
+        chosen = replace(chosen, component=usual_axis(part.system))
     return KINDS[kind](part, chosen, path)
 
 

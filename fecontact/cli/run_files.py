@@ -157,8 +157,8 @@ def convergence_of(study: "Study", progress: Callable[[float], None]) -> "ModeCo
     """
     from fecontact.reduction.convergence import mode_convergence
 
-    settings = replace(study.basis_settings, select=None)
-    body = study.body()
+    settings = replace(study.basis, select=None)
+    body = study.elastic_body()
     return mode_convergence(
         body, lambda part, count: replace(settings, modes=count).basis(part), settings.modes,
         levels=4 if body.mass.shape[0] < 4000 else 3,

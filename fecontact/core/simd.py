@@ -1,7 +1,7 @@
 """Eight numbers at once, in kernels.
 
 Small matrices are too short for vector instructions, eight of them side by side are not. Arrays
-whose last axis has :data:`LANES` entries are read and written as one value, which takes
+whose last axis has :data:`WIDTH` entries are read and written as one value, which takes
 ``+ - * /`` with others of its kind; LLVM makes of it what the processor has.
 """
 
@@ -13,8 +13,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
-LANES = 8
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+WIDTH = 8
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
 class _Lanes(types.Type):
@@ -66,7 +66,7 @@ def gather(typingctx: Any, values: Any, places: Any, further: Any) -> Any:
         where = context.make_array(signature.args[1])(context, builder, args[1]).data
         first = builder.gep(source, [args[2]])
         result = ir.Constant(_VECTOR, ir.Undefined)
-        for lane in range(LANES):
+        for lane in range(WIDTH):
             index = ir.Constant(ir.IntType(32), lane)
             place = builder.load(builder.gep(where, [index]))
             number = builder.load(builder.gep(first, [place]))
@@ -83,7 +83,7 @@ def spread(typingctx: Any, number: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         empty, index = ir.Constant(_VECTOR, ir.Undefined), ir.IntType(32)
         first = builder.insert_element(empty, args[0], ir.Constant(index, 0))
-        return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(index, LANES), None))
+        return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(index, WIDTH), None))
 
     return lanes(types.float64), codegen
 
@@ -94,7 +94,7 @@ def magnitude(typingctx: Any, numbers: Any) -> Any:
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), f"llvm.fabs.v{LANES}f64")
+            builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), f"llvm.fabs.v{WIDTH}f64")
         return builder.call(function, args)
 
     return lanes(lanes), codegen

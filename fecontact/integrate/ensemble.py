@@ -18,7 +18,7 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, span
-from fecontact.integrate.events import Events, Watched, as_watched
+from fecontact.integrate.events import Events, AnyEvent, as_events
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, start
@@ -77,7 +77,7 @@ def ensemble(
     rtol: float = 1e-6,
     max_step: float | None = None,
     chain: int = 1,
-    events: Watched | Sequence[Watched] | None = None,
+    events: AnyEvent | Sequence[AnyEvent] | None = None,
     workers: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Ensemble:
@@ -132,7 +132,7 @@ def ensemble(
     states = np.full((count, kept, members[0].size), np.nan)
     status = [Status.INTERRUPTED] * count
     steps = np.zeros(count, dtype=np.int64)
-    watched = as_watched(events)
+    watched = as_events(events)
     seen = [Events.none(members[0].size)] * count
     done, leave = [0], [False]
 

@@ -14,7 +14,7 @@ from fecontact.system.contact_system import ContactSystem
 
 CONTACT_EVENTS = ("touch-down", "lift-off", "stick", "slip")
 _AXES = ("x", "y", "phi")
-_DIRECTIONS = {"both": 0, "rising": 1, "falling": -1}
+_SENSES = {"both": 0, "rising": 1, "falling": -1}
 
 
 def event(function: Callable[..., Any]) -> CompiledLaw:
@@ -75,7 +75,7 @@ class Event:
         From :func:`event`.
     parameters : sequence of float
         What the function gets as ``p``.
-    direction : 'both', 'rising' or 'falling'
+    sense : 'both', 'rising' or 'falling'
         The changes that count.
     stop : bool
         Whether the run ends at the first.
@@ -83,17 +83,17 @@ class Event:
     Raises
     ------
     InputError
-        For another direction, a function that is not compiled, and parameters that are no
+        For another sense, a function that is not compiled, and parameters that are no
         finite numbers.
     """
 
     kernel: CompiledLaw
     parameters: Sequence[float] = ()
-    direction: Literal["both", "rising", "falling"] = "both"
+    sense: Literal["both", "rising", "falling"] = "both"
     stop: bool = False
 
     def __post_init__(self) -> None:
-        _require_direction("Event", self.direction)
+        _require_sense("Event", self.sense)
         if not isinstance(self.kernel, CompiledLaw):
             raise InputError(f"Event: kernel = {self.kernel!r} must be a compiled function; put "
                              f"@fecontact.event before its definition.")
@@ -126,13 +126,13 @@ class Crossing:
     ----------
     point : str or int
         'B', 'C' or a further named point; a contact node by its number from 0.
-    axis : 'x', 'y' or 'phi'
+    component : 'x', 'y' or 'phi'
         Along the ground, away from it, counter-clockwise.
     value : float
         Value passed [m], [rad], [m/s], [rad/s].
     of : 'displacement' or 'velocity'
         Which of them.
-    direction : 'both', 'rising' or 'falling'
+    sense : 'both', 'rising' or 'falling'
         The passages that count.
     stop : bool
         Whether the run ends at the first.
@@ -146,15 +146,15 @@ class Crossing:
     kernel: ClassVar[CompiledLaw] = _plane
 
     point: str | int
-    axis: Literal["x", "y", "phi"]
+    component: Literal["x", "y", "phi"]
     value: float = 0.0
     of: Literal["displacement", "velocity"] = "displacement"
-    direction: Literal["both", "rising", "falling"] = "both"
+    sense: Literal["both", "rising", "falling"] = "both"
     stop: bool = False
 
     def __post_init__(self) -> None:
-        _require_direction("Crossing", self.direction)
-        for name, names in (("axis", _AXES), ("of", ("displacement", "velocity"))):
+        _require_sense("Crossing", self.sense)
+        for name, names in (("component", _AXES), ("of", ("displacement", "velocity"))):
             value = getattr(self, name)
             if value not in names:
                 raise InputError(f"Crossing: {name} = {value!r} must be one of {choices(names)}"
@@ -169,7 +169,7 @@ class Crossing:
         row = np.zeros(1 + system.size)
         row[0] = self.value
         first = 1 if self.of == "displacement" else 1 + m
-        row[first : first + m] = basis.T[basis.point_index(self.point), _AXES.index(self.axis)]
+        row[first : first + m] = basis.T[basis.point_index(self.point), _AXES.index(self.component)]
         return row
 
 
@@ -228,22 +228,22 @@ class Events:
                       self.node[keep], self.states[keep])
 
 
-Watched = ContactEvents | Event | Crossing
+AnyEvent = ContactEvents | Event | Crossing
 
 
-def as_watched(events: Watched | Sequence[Watched] | None) -> tuple[Watched, ...]:
+def as_events(events: AnyEvent | Sequence[AnyEvent] | None) -> tuple[AnyEvent, ...]:
     """One, several or no events as a tuple."""
     if events is None:
         return ()
     return tuple(events) if isinstance(events, Sequence) else (events,)
 
 
-def _require_direction(owner: str, direction: str) -> None:
-    if direction not in _DIRECTIONS:
-        raise InputError(f"{owner}: direction = {direction!r} must be one of "
-                         f"{choices(tuple(_DIRECTIONS))}.")
+def _require_sense(owner: str, sense: str) -> None:
+    if sense not in _SENSES:
+        raise InputError(f"{owner}: sense = {sense!r} must be one of "
+                         f"{choices(tuple(_SENSES))}.")
 
 
 def direction_sign(watched: Event | Crossing) -> int:
     """1 for 'rising', -1 for 'falling', 0 for 'both'."""
-    return _DIRECTIONS[watched.direction]
+    return _SENSES[watched.sense]

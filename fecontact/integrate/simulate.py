@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fecontact.core.errors import InputError
 from fecontact.core.memory import require_memory
 from fecontact.core.types import Array
-from fecontact.integrate.events import Watched, as_watched
+from fecontact.integrate.events import AnyEvent, as_events
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.solvers import RODAS5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status, Trajectory
@@ -39,7 +39,7 @@ def simulate(
     solver: Solver = RODAS5P,
     rtol: float = 1e-6,
     max_step: float | None = None,
-    events: Watched | Sequence[Watched] | None = None,
+    events: AnyEvent | Sequence[AnyEvent] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     r"""Integrate a contact system in time.
@@ -106,7 +106,7 @@ def simulate(
                          f"out, or find what happened between the outputs afterwards.")
     if progress is not None and not callable(progress):
         raise InputError(f"progress = {progress!r} must be a function of the time reached.")
-    watched = as_watched(events)
+    watched = as_events(events)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory):
         _warn_of_depth(system, state, t_start)

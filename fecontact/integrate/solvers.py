@@ -12,7 +12,7 @@ import numpy as np
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
-from fecontact.integrate.events import Watched
+from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 
@@ -44,7 +44,7 @@ class Task:
     times: Array
     rtol: float
     max_step: float | None = None
-    events: Sequence[Watched] = ()
+    events: Sequence[AnyEvent] = ()
     progress: Callable[[float], None] | None = None
 
 

@@ -21,8 +21,8 @@ PerNode = float | tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Range:
-    """Values that a parameter may have, as part of its annotation: ``Annotated[PerNode, Range]``.
+class Bound:
+    """Values that a parameter may have, as part of its annotation: ``Annotated[PerNode, Bound]``.
 
     Attributes
     ----------
@@ -36,14 +36,14 @@ class Range:
     holds: Callable[[Array], Any]
 
 
-Positive = Annotated[PerNode, Range("above zero", lambda x: x > 0.0)]
-NotNegative = Annotated[PerNode, Range("zero or above", lambda x: x >= 0.0)]
-OneOrAbove = Annotated[PerNode, Range("one or above", lambda x: x >= 1.0)]
-UpToOne = Annotated[PerNode, Range("above zero and at most 1", lambda x: (x > 0.0) & (x <= 1.0))]
+Positive = Annotated[PerNode, Bound("above zero", lambda x: x > 0.0)]
+NotNegative = Annotated[PerNode, Bound("zero or above", lambda x: x >= 0.0)]
+OneOrAbove = Annotated[PerNode, Bound("one or above", lambda x: x >= 1.0)]
+UpToOne = Annotated[PerNode, Bound("above zero and at most 1", lambda x: (x > 0.0) & (x <= 1.0))]
 
 
 @cache
-def _ranges(law: Any) -> Mapping[str, tuple[Range, ...]]:
+def _ranges(law: Any) -> Mapping[str, tuple[Bound, ...]]:
     """Ranges that the annotations of a law's parameters name."""
     try:
         hints = get_type_hints(law, include_extras=True)
@@ -51,7 +51,7 @@ def _ranges(law: Any) -> Mapping[str, tuple[Range, ...]]:
         raise InputError(f"{law.__name__}: an annotation cannot be understood ({error}); use names "
                          f"that the module of the law knows.") from None
     return {name: tuple(item for item in getattr(hint, "__metadata__", ())
-                        if isinstance(item, Range))
+                        if isinstance(item, Bound))
             for name, hint in hints.items()}
 
 

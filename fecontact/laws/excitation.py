@@ -14,7 +14,7 @@ from fecontact.core.errors import (
 )
 from fecontact.laws.signals.harmonic import Harmonic, Signal
 
-_DIRECTIONS = ("x", "y", "moment")
+_COMPONENTS = ("x", "y", "phi")
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class PointLoad:
     ----------
     point : str or int
         'B', 'C' or a further named point; a contact node by its number from 0.
-    direction : 'x', 'y' or 'moment'
+    component : 'x', 'y' or 'phi'
         A force along +x, along +y (away from the ground), or a moment counter-clockwise.
     signal : Signal
         Its value in time [N], [N m].
@@ -112,11 +112,11 @@ class PointLoad:
     Raises
     ------
     InputError
-        For another direction, or what is no point or no signal.
+        For another component, or what is no point or no signal.
     """
 
     point: str | int = "C"
-    direction: Literal["x", "y", "moment"] = "y"
+    component: Literal["x", "y", "phi"] = "y"
     signal: Signal = field(kw_only=True)
 
     def __post_init__(self) -> None:
@@ -125,10 +125,10 @@ class PointLoad:
         elif not isinstance(self.point, str):
             raise InputError(f"PointLoad: point = {self.point!r} must be the name of a point or "
                              f"the number of a contact node.")
-        if self.direction not in _DIRECTIONS:
-            raise InputError(f"PointLoad: direction = {self.direction!r} must be one of "
-                             f"{choices(_DIRECTIONS)}"
-                             f"{nearest(str(self.direction), _DIRECTIONS)}.")
+        if self.component not in _COMPONENTS:
+            raise InputError(f"PointLoad: component = {self.component!r} must be one of "
+                             f"{choices(_COMPONENTS)}"
+                             f"{nearest(str(self.component), _COMPONENTS)}.")
         _require_signal("PointLoad", "signal", self.signal)
 
 

@@ -74,7 +74,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "flat": profile.Flat,
             "sine": profile.Sine,
             "fourier-series": fourier_series.FourierSeries,
-            "trace": trace.Trace,
+            "trace": trace.MeasuredProfile,
             "random-roughness": random_roughness.RandomRoughness,
         },
         GroundMotion: {
@@ -85,7 +85,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "constant": signals.Constant,
             "harmonic": signals.Harmonic,
             "harmonics": signals.Harmonics,
-            "sweep": signals.Sweep,
+            "sweep": signals.SweptSine,
             "step": transients.Step,
             "pulse": transients.Pulse,
             "tabulated": transients.Tabulated,

@@ -141,7 +141,7 @@ class SymmetricFactors:
                   np.ascontiguousarray(L.data))
         self.diagonal, self.order = np.asarray(diagonal), order
 
-    def half_solved(self, rows: Any) -> tuple[Integers, Array]:
+    def forward_substitute(self, rows: Any) -> tuple[Integers, Array]:
         """``D^-1/2 L^-1 P W^T`` of sparse rows W (k, n): the places of its non-zero rows (r,)
         and these rows (r, k).
         """
@@ -170,7 +170,7 @@ class SymmetricFactors:
             column += block.shape[1]
         return kept, result / np.sqrt(self.diagonal[kept, None])
 
-    def completed(self, places: Integers, half: Array) -> Array:
+    def back_substitute(self, places: Integers, half: Array) -> Array:
         """``A^-1 W^T C`` (n, p) from combinations ``half @ C`` (r, p) of half-solved columns."""
         scaled = half / np.sqrt(self.diagonal[places, None])
         result = np.empty((len(self.order), half.shape[1]))

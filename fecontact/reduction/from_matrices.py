@@ -14,7 +14,7 @@ from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs, free_modes
 from fecontact.reduction.matrix_files import AssembledMatrix
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.null_space import lowest_vectors, null_space, relative_energies
-from fecontact.reduction.restriction import GivenRows, gathered_rows
+from fecontact.reduction.restriction import Restriction, stack_restriction
 
 # Up to this size all modes are kept where no number is given.
 _ALL = 2000
@@ -98,7 +98,7 @@ def basis_from_matrices(
     same_dofs(M, K)
     d = M.matrix.shape[0]
     C = _damping_matrix(damping, M)
-    given = gathered_rows(rows, d)
+    given = stack_restriction(rows, d)
     held = K.matrix.diagonal() >= _HELD
     if held.all():
         raise InputError(f"{K.name} holds every degree of freedom (entries of 1e35 or more).")
@@ -116,7 +116,7 @@ def basis_from_matrices(
 
 
 def assembled_basis(
-    w: Array, shapes: Array, rows: GivenRows, *, damping: Damping, contact_x: ArrayLike | None,
+    w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
     tributary: ArrayLike | None,
 ) -> ModalBasis:
     """The basis of modes (d, m) without geometry, at the rows."""

@@ -13,7 +13,7 @@ from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.eigenmodes import fixed_signs
 from fecontact.reduction.from_matrices import assembled_basis, given_matrix
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.restriction import gathered_rows
+from fecontact.reduction.restriction import stack_restriction
 
 # Mode shapes are often written with five or six digits.
 _EQUAL = 1e-4
@@ -149,7 +149,7 @@ def basis_from_modes(
     signs = fixed_signs(S)
     order = np.argsort(w, kind="stable")
     return assembled_basis(
-        w[order], (S * signs)[:, order], gathered_rows(rows, d), contact_x=contact_x,
+        w[order], (S * signs)[:, order], stack_restriction(rows, d), contact_x=contact_x,
         tributary=tributary, damping=_reordered(damping, order, signs))
 
 

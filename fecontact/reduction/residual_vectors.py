@@ -27,7 +27,7 @@ class Flexibility:
         self.system = system
         self.rows = rows.tocsr()
         self._factors = SymmetricFactors(system.factors)
-        self._places, self._half = self._factors.half_solved(self.rows[:, system.held])
+        self._places, self._half = self._factors.forward_substitute(self.rows[:, system.held])
 
     def of_first(self, count: int) -> "Flexibility":
         """The same for the first rows alone."""
@@ -60,7 +60,7 @@ class Flexibility:
         """G W^T patterns (f, p): elastic displacements under force patterns (k, p) [m/N]."""
         response, motion = self._balance
         deflection = np.zeros((self.system.stiffness.shape[0], patterns.shape[1]))
-        deflection[self.system.held] = self._factors.completed(
+        deflection[self.system.held] = self._factors.back_substitute(
             self._places, self._half @ patterns)
         deflection -= response @ (motion.T @ patterns)
         return self.system.without_rigid(deflection)

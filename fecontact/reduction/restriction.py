@@ -14,7 +14,7 @@ Place = Sequence[int | None]
 
 
 @dataclass(frozen=True, eq=False)
-class GivenRows:
+class Restriction:
     """Rows of all points in the basis' order: B, C, contact nodes, further points.
 
     Attributes
@@ -77,7 +77,7 @@ def rows_from_dofs(
     return rows
 
 
-def gathered_rows(rows: Mapping[str, Any], d: int) -> GivenRows:
+def stack_restriction(rows: Mapping[str, Any], d: int) -> Restriction:
     """All rows as one sparse matrix; see :meth:`basis_from_matrices` for the forms.
 
     Raises
@@ -98,7 +98,7 @@ def gathered_rows(rows: Mapping[str, Any], d: int) -> GivenRows:
             for name in ("B", "C")]
     restriction = sp.csr_array(sp.vstack(
         [*ends, contact, *(_point_block(name, rows[name], d) for name in extra)]))
-    return GivenRows(restriction, contact.shape[0] // 3, extra,
+    return Restriction(restriction, contact.shape[0] // 3, extra,
                      tuple((name, block.shape[0] // 3) for name, block in blocks.items()))
 
 

@@ -60,11 +60,11 @@ _SECTIONS: Mapping[str, type] = {
     "simulation": SimulationSettings, "branch": BranchSettings, "output": OutputSettings,
     "render": RenderSettings,
 }
-_ATTRIBUTES = {name: name for name in _SECTIONS} | {"body": "body_settings",
-                                                     "basis": "basis_settings"}
+_ATTRIBUTES = {name: name for name in _SECTIONS} | {"body": "body",
+                                                     "basis": "basis"}
 # What a study has made once, and the sections that it depends on.
-_MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body_settings"),
-              "_basis": ("geometry", "body_settings", "basis_settings")}
+_MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body"),
+              "_basis": ("geometry", "body", "basis")}
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,9 +78,9 @@ class Study(Summarised):
     geometry : Beam, Pendulum, Block or MeshFile
         ``[geometry]``: a shape and its dimensions, ``shape = "beam"``, or a mesh,
         ``file = "part.msh"``.
-    body_settings : BodySettings
+    body : BodySettings
         ``[body]``
-    basis_settings : BasisSettings
+    basis : BasisSettings
         ``[basis]``
     normal, friction, ground, drive, load
         ``[normal]``, ... : laws, ground, drive and load (what is in contact needs a normal law,
@@ -107,8 +107,8 @@ class Study(Summarised):
     """
 
     geometry: Geometry
-    body_settings: BodySettings = field(default_factory=BodySettings)
-    basis_settings: BasisSettings = field(default_factory=BasisSettings)
+    body: BodySettings = field(default_factory=BodySettings)
+    basis: BasisSettings = field(default_factory=BasisSettings)
     normal: NormalLaw | None = None
     friction: FrictionLaw | None = None
     contact: Mapping[str, ContactLaws] = field(default_factory=dict)
@@ -131,8 +131,8 @@ class Study(Summarised):
         return [
             ("file", "none" if self.path is None else self.path.name),
             ("geometry", type(self.geometry).__name__),
-            ("modes", f"{self.basis_settings.modes}"),
-            ("contact nodes", f"{self.basis_settings.contact_nodes}"),
+            ("modes", f"{self.basis.modes}"),
+            ("contact nodes", f"{self.basis.contact_nodes}"),
             ("laws", ", ".join([*laws, *groups]) or "none"),
             ("ground", quantity(self.ground.speed, "m/s")),
             ("t_end", "none" if end is None else quantity(end, "s", 5)),
@@ -298,7 +298,7 @@ class Study(Summarised):
         FecontactError
             With the file and the section before the message, like all of these methods.
         """
-        return contact_system(self, self.basis(), _title(self.path))
+        return contact_system(self, self.modal_basis(), _title(self.path))
 
     def run(
         self, progress: Callable[[float], None] | None = None, checkpoint: Path | None = None
@@ -337,13 +337,13 @@ class Study(Summarised):
     def _body(self) -> ElasticBody:
         mesh = self.mesh()
         with located(f"{_title(self.path)}: [body]:", "ElasticBody"):
-            return self.body_settings.body(mesh)
+            return self.body.body(mesh)
 
     @cached_property
     def _basis(self) -> ModalBasis:
-        body = self.body()
+        body = self.elastic_body()
         with located(f"{_title(self.path)}: [basis]:"):
-            return self.basis_settings.basis(body)
+            return self.basis.basis(body)
 
 
 def _number(text: str, items: list[Any], name: str, title: str) -> int:

@@ -29,7 +29,7 @@ _PARAMETERS: Mapping[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Range:
+class Span:
     """Values from ``start`` to ``end``, both included: ``{ start = 0.1, end = 1.0, count = 10 }``.
 
     Parameters
@@ -48,18 +48,18 @@ class Range:
     spacing: Literal["linear", "log"] = "linear"
 
     def __post_init__(self) -> None:
-        require_kind("Range", Real, start=self.start, end=self.end)
-        require_kind("Range", (int, NoneType), count=self.count)
+        require_kind("Span", Real, start=self.start, end=self.end)
+        require_kind("Span", (int, NoneType), count=self.count)
         if self.spacing not in ("linear", "log"):
-            raise InputError(f"Range: spacing = {self.spacing!r} must be 'linear' or 'log'.")
+            raise InputError(f"Span: spacing = {self.spacing!r} must be 'linear' or 'log'.")
         if not (math.isfinite(self.start) and math.isfinite(self.end)):
-            raise InputError(f"Range: start = {self.start!r} and end = {self.end!r} must be "
+            raise InputError(f"Span: start = {self.start!r} and end = {self.end!r} must be "
                              f"finite.")
         if self.spacing == "log" and not (self.start > 0.0 and self.end > 0.0):
-            raise InputError(f"Range: start = {self.start!r} and end = {self.end!r} must be above "
+            raise InputError(f"Span: start = {self.start!r} and end = {self.end!r} must be above "
                              f"zero for spacing = 'log'.")
         if self.count is not None and self.count < 1:
-            raise InputError(f"Range: count = {self.count} must be at least 1.")
+            raise InputError(f"Span: count = {self.count} must be at least 1.")
 
 
 @dataclass(frozen=True)
@@ -142,13 +142,13 @@ class Strobing:
     point : str or int
         Whose displacement is kept once per period: 'B', 'C', a named point, a contact node by its
         number.
-    axis : 'x' or 'y'
+    component : 'x' or 'y'
     """
 
     transient_periods: int = 100
     keep: int = 64
     point: str | int = "B"
-    axis: Literal["x", "y"] = "x"
+    component: Literal["x", "y"] = "x"
 
     def __post_init__(self) -> None:
         require_kind("Strobing", int, transient_periods=self.transient_periods, keep=self.keep)
@@ -160,7 +160,7 @@ class Strobing:
 
 
 Value = bool | int | float | str | tuple[float, ...]
-Axis = Range | Distribution | tuple[Value, ...]
+Axis = Span | Distribution | tuple[Value, ...]
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class SweepSettings:
 
     Parameters
     ----------
-    axes : mapping of dotted name to Range, Distribution or list of values
+    axes : mapping of dotted name to Span, Distribution or list of values
         ``[sweep.axes]``: the parameters that change, by the names of the study file:
         ``ground.speed = [0.1, 0.2]``.
     method : str
@@ -182,7 +182,7 @@ class SweepSettings:
     seed : int
         Of the drawn cases; the same seed draws the same.
     summaries : list
-        Numbers to keep of each case, by name: see :mod:`fecontact.sweep.summaries`;
+        Numbers to keep of each case, by name: see :mod:`fecontact.sweeps.summaries`;
         'FILE.py:FUNCTION' for a function of your own.
     t_start : float, optional
         Summaries count from this time on [s]; the whole run by default.
@@ -238,7 +238,7 @@ def flat_axes(table: Any) -> Any:
 def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = []
     for key, value in table.items():
-        # An axis that is a table holds numbers and texts alone.
+        # An component that is a table holds numbers and texts alone.
         if isinstance(value, Mapping) and any(isinstance(item, Mapping | list)
                                               for item in value.values()):
             found += _leaves(value, f"{prefix}{key}.")

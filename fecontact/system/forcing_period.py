@@ -7,7 +7,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws.ground.fourier_series import FourierSeries
-from fecontact.laws.ground.measured_profile import Trace
+from fecontact.laws.ground.measured_profile import MeasuredProfile
 from fecontact.laws.ground.profile import Profile, Sine
 from fecontact.laws.ground.random_roughness import RandomRoughness
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics
@@ -77,10 +77,10 @@ def _repeat_length(name: str, shape: Profile) -> float:
         return float(shape.wavelength)
     if isinstance(shape, RandomRoughness):
         return float(shape.length)
-    if isinstance(shape, Trace) and shape.periodic:
+    if isinstance(shape, MeasuredProfile) and shape.periodic:
         return float(shape.abscissa_scale * (shape.abscissa[-1] - shape.abscissa[0]))
     raise AnalysisError(f"{name} does not repeat; periodic orbits need ground that does, such as "
-                        f"a Sine, a FourierSeries or a periodic Trace.")
+                        f"a Sine, a FourierSeries or a periodic MeasuredProfile.")
 
 
 def _common(periods: list[float]) -> float | None:

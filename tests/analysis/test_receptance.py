@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.analysis.frequency_response import frequency_response
-from fecontact.cli.plot_kinds import Choice, redraw
+from fecontact.analysis.receptance import receptance
+from fecontact.cli.plot_kinds import PlotRequest, redraw
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.integrate.simulate import simulate
@@ -15,7 +15,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.linear import LinearContact
 from fecontact.laws.normal.rough_surface import RoughSurface
 from fecontact.laws.signals.harmonic import Harmonic
-from fecontact.output.plots.analysis import plot_response
+from fecontact.output.plots.analysis import plot_receptance
 from fecontact.reduction.from_matrices import basis_from_matrices
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.system.contact_system import ContactSystem
@@ -41,9 +41,9 @@ def test_mass_on_the_spring_of_the_drive():
     system = mass(drive=Drive(stiffness_x=1500.0, damping_x=6.0))
     expected = 1.0 / (1500.0 - MASS * W**2 + 6j * W)
     for kind, power in (("receptance", 0), ("mobility", 1), ("accelerance", 2)):
-        found = frequency_response(system, F, [("B", "x")], kind=kind)
+        found = receptance(system, F, [("B", "x")], kind=kind)
         assert found.values[:, 0, 0] == pytest.approx((1j * W) ** power * expected, rel=1e-10)
-    free = frequency_response(system.basis, F, [("B", "x")], [(0, "x"), (0, "y")])
+    free = receptance(system.basis, F, [("B", "x")], [(0, "x"), (0, "y")])
     assert free.values[:, 0, 0] == pytest.approx(-1.0 / (MASS * W**2), rel=1e-10)
     assert free.values[:, 1, 0] == pytest.approx(np.zeros(len(F)), abs=1e-12)
     assert (found.unit(), free.unit()) == ("m/s^2/N", "m/N")
@@ -53,13 +53,13 @@ def test_contact_pressed_by_its_load():
     """Above its roughness height the law is linear: c_N0 with the dashpot beta c_N0."""
     system = mass(normal=RoughSurface(1e6, 1e-6, 200.0), load=Load(50.0),
                   drive=Drive(stiffness_x=1500.0))
-    found = frequency_response(system, F, [("C", "y")], linearised_at="rest")
+    found = receptance(system, F, [("C", "y")], linearised_at="rest")
     expected = 1.0 / (1e6 - MASS * W**2 + 200j * W)
     assert found.values[:, 0, 0] == pytest.approx(expected, rel=1e-9)
     # Half way up the roughness: stiffness c s, damping beta c s with s^2 = 2 F / (c R_Z).
     shallow = system.with_(**{"normal.roughness_height": 1e-3})
     s = np.sqrt(2.0 * 50.0 / (1e6 * 1e-3))
-    found = frequency_response(shallow, F, [("C", "y")], linearised_at="rest")
+    found = receptance(shallow, F, [("C", "y")], linearised_at="rest")
     expected = 1.0 / (1e6 * s - MASS * W**2 + 200j * s * W)
     assert found.values[:, 0, 0] == pytest.approx(expected, rel=1e-9)
 
@@ -73,7 +73,7 @@ def test_falling_friction_takes_damping_away():
     slope = -0.2 * 100.0 * np.exp(-100.0 * speed)
     damping = 500.0 + load * slope
     assert damping < 140.0
-    found = frequency_response(system, F, [("B", "x"), ("B", "y")], linearised_at="sliding")
+    found = receptance(system, F, [("B", "x"), ("B", "y")], linearised_at="sliding")
     expected = 1.0 / (1500.0 - MASS * W**2 + 1j * damping * W)
     assert found.values[:, 0, 0] == pytest.approx(expected, rel=1e-4)
     # Pressing changes friction, which pushes along the ground: mu times the change of F.
@@ -90,19 +90,19 @@ def test_response_tells_that_steady_sliding_is_unstable(damping, tmp_path):
     system = mass(normal=LinearContact(1e6, 2000.0), load=Load(load), ground=Ground(speed=speed),
                   friction=ExponentialFriction(0.6, 0.4, 100.0, 1e9),
                   drive=Drive(stiffness_x=1500.0, damping_x=damping - slope - 35.0))
-    found = frequency_response(system, F, [("B", "x")], linearised_at="sliding")
+    found = receptance(system, F, [("B", "x")], linearised_at="sliding")
     left = damping - 35.0
     assert found.stable == (left > 0.0)
-    assert frequency_response(system, F, [("B", "x")]).stable
+    assert receptance(system, F, [("B", "x")]).stable
     if not found.stable:
         expected = np.roots([MASS, left, 1500.0])
         assert found.growing == pytest.approx(expected[expected.imag > 0.0], rel=1e-3)
         assert found.growth_in_words == "vibrations at 4.35 Hz grow by 1.25 1/s"
     run = simulate(system, 0.1, initial="sliding")
-    redraw(run, "receptance", Choice(axis="x"), path=tmp_path / "receptance.svg")
+    redraw(run, "receptance", PlotRequest(component="x"), path=tmp_path / "receptance.svg")
     text = (tmp_path / "receptance.svg").read_text()
     assert ("UNSTABLE" in text) == (left < 0.0)
-    figure = plot_response([frequency_response(system, F, [("B", "x")]), found], ["a", "b"])
+    figure = plot_receptance([receptance(system, F, [("B", "x")]), found], ["a", "b"])
     assert [line.is_dashed() for line in figure.axes[0].lines] == [False, left < 0.0]
 
 
@@ -115,7 +115,7 @@ def test_run_in_time_moves_as_the_response_says():
         system.basis, normal=system.normal, friction=system.friction, ground=system.ground,
         drive=system.drive, load=Load(50.0, (PointLoad("C", "y", signal=Harmonic(
             force, 2.0 * np.pi * f)),)))
-    response = frequency_response(pushed, f, [("C", "y")], [(0, "x"), ("B", "y")],
+    response = receptance(pushed, f, [("C", "y")], [(0, "x"), ("B", "y")],
                                   linearised_at="sliding").values[0, :, 0]
     times = np.concatenate([[0.0], np.linspace(20.0, 21.0, 601) / f])
     run = simulate(pushed, times[-1], initial="sliding", outputs=times, rtol=1e-9)
@@ -137,7 +137,7 @@ def test_tip_of_a_cantilever():
     """Euler-Bernoulli between the first resonances at 4.18, 26.2 and 73.3 Hz, and above them."""
     basis = modal_basis(cantilever(), 25, contact="bottom", contact_nodes=1, B=(LENGTH, HEIGHT))
     f = np.array([0.5, 2.0, 3.5, 5.0, 10.0, 20.0, 30.0, 50.0, 80.0])
-    found = frequency_response(basis, f, [("B", "y")]).values[:, 0, 0]
+    found = receptance(basis, f, [("B", "y")]).values[:, 0, 0]
     EI = 2.1e11 * THICKNESS * HEIGHT**3 / 12.0
     beta = (7850.0 * THICKNESS * HEIGHT * (2.0 * np.pi * f) ** 2 / EI) ** 0.25
     x = beta * LENGTH
@@ -168,7 +168,7 @@ def test_inverse_of_the_dynamic_stiffness_of_all_degrees_of_freedom():
     f = np.array([20.0, 300.0, 1100.0, 6000.0, 2e4])
     places = [("B", "x"), ("B", "y"), (0, "x"), (1, "y")]
     chosen = [d - 2, d - 1, 0, 5]
-    found = frequency_response(system, f, places)
+    found = receptance(system, f, places)
     for w, values in zip(2.0 * np.pi * f, found.values, strict=True):
         inverse = np.linalg.inv(K + 1j * w * C - w**2 * M)[np.ix_(chosen, chosen)]
         assert np.abs(values - inverse).max() < 1e-6 * np.abs(inverse).max()
@@ -188,7 +188,7 @@ def test_beam_on_its_contact_against_jacobian_of_the_statics():
 
     step = 1.0
     change = (static_equilibrium(system(step)) - static_equilibrium(system(-step))) / (2.0 * step)
-    response = frequency_response(
+    response = receptance(
         system(), 0.0, [("C", "y")], [("C", "y"), (2, "y"), ("side", "phi")],
         linearised_at="rest").values[0, :, 0]
     expected = [-basis.T[1, 1] @ change, -basis.contact_T[2, 1] @ change,
@@ -199,18 +199,18 @@ def test_beam_on_its_contact_against_jacobian_of_the_statics():
 def test_what_has_no_response():
     system = mass(drive=Drive(stiffness_x=1500.0))
     with pytest.raises(AnalysisError, match="nothing holds the body"):
-        frequency_response(system.basis, [0.0, 1.0], [("B", "x")])
+        receptance(system.basis, [0.0, 1.0], [("B", "x")])
     with pytest.raises(InputError, match=r"kind = 'mobilty' must.*mean 'mobility'"):
-        frequency_response(system, 1.0, [("B", "x")], kind="mobilty")
+        receptance(system, 1.0, [("B", "x")], kind="mobilty")
     with pytest.raises(InputError, match="There is no point 'D'"):
-        frequency_response(system, 1.0, [("D", "x")])
+        receptance(system, 1.0, [("D", "x")])
     with pytest.raises(InputError, match="direction 'z' at 'B'"):
-        frequency_response(system, 1.0, [("B", "z")])
+        receptance(system, 1.0, [("B", "z")])
     with pytest.raises(InputError, match="zero or above"):
-        frequency_response(system, -1.0, [("B", "x")])
+        receptance(system, -1.0, [("B", "x")])
     with pytest.raises(InputError, match="give a ContactSystem"):
-        frequency_response(system.basis, 1.0, [("B", "x")], linearised_at="rest")
+        receptance(system.basis, 1.0, [("B", "x")], linearised_at="rest")
     with pytest.raises(InputError, match="pair of a point and a direction"):
-        frequency_response(system, 1.0, ["B"])
+        receptance(system, 1.0, ["B"])
     with pytest.raises(InputError, match="at least one"):
-        frequency_response(system, 1.0, [])
+        receptance(system, 1.0, [])

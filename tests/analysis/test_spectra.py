@@ -123,7 +123,7 @@ def test_histories_by_name():
         history(trajectory, "speed")
     with pytest.raises(InputError, match="one of contact nodes, not of point = 'B'"):
         history(trajectory, "pressure")
-    with pytest.raises(InputError, match="axis = 'z' is not one of B"):
+    with pytest.raises(InputError, match="component = 'z' is not one of B"):
         history(trajectory, "velocity", "B", "z")
     with pytest.raises(InputError, match="Contact node 7"):
         history(trajectory, "slip_velocity", 7)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from fecontact import Study, periodic_motion, read_branch, read_branches
-from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.branch import BranchStatus
 from fecontact.cli import execute
 
 STUDY = """
@@ -66,7 +66,7 @@ def test_the_friction_oscillators_loop_is_one_branch(tmp_path, monkeypatch):
     sliding, orbits = found.values()
     hopf, = sliding.special
     assert hopf.parameter == pytest.approx(8.336533e-3, rel=1e-7)
-    assert orbits.status is Status.BOUND
+    assert orbits.status is BranchStatus.BOUND
     fold, = orbits.special
     assert fold.kind == "fold"
     # By integration of one degree of freedom, independently.

@@ -13,9 +13,9 @@ from systems import (
 )
 from test_continuation import CUBIC
 
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.follow import follow
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.fields.function_field import vector_field
@@ -71,9 +71,9 @@ def test_equilibria(field, name, bounds, start, longest):
     index = field.index(name)
     branch = equilibrium_branch(
         field, start, name,
-        settings=Settings(bounds=bounds, step=min(0.05, longest), largest_step=longest),
+        options=ContinuationOptions(bounds=bounds, step=min(0.05, longest), largest_step=longest),
         direction=1.0 if field.values[index] < bounds[1] else -1.0)
-    assert branch.status is Status.BOUND
+    assert branch.status is BranchStatus.BOUND
     assert branch.special
     assert_explained(branch)
     for point in branch.points:
@@ -155,21 +155,21 @@ def test_orbits_of_two_masses(values, name, bounds, direction):
     assert_explained(sliding)
     for hopf in sliding.of_kind("Hopf"):
         branch = orbit_branch(field, hopf, method=Collocation(intervals=30), bounds=bounds,
-                              settings=Settings(step=0.005, points=120))
+                              options=ContinuationOptions(step=0.005, points=120))
         assert branch.special
         assert_explained(branch)
 
 
 @pytest.mark.parametrize(("start", "direction"), [(0.2, 1.0), (-0.3, -1.0)])
 def test_a_start_on_a_bound_that_heads_outwards_is_all(start, direction):
-    settings = Settings(bounds=(-0.3, 0.2))
+    settings = ContinuationOptions(bounds=(-0.3, 0.2))
     x = brentq(lambda x: start + x - x**3, -0.5, 0.5, xtol=1e-15)
     # On this sheet dx/dp is negative, and the direction is that of the parameter.
-    branch = follow(CUBIC, np.array([x, start]), settings, direction=direction)
-    assert branch.status is Status.BOUND
+    branch = continue_branch(CUBIC, np.array([x, start]), settings, direction=direction)
+    assert branch.status is BranchStatus.BOUND
     assert branch.parameter.tolist() == [start]
-    inwards = follow(CUBIC, np.array([x, start]), settings, direction=-direction)
-    both = follow(CUBIC, np.array([x, start]), settings, direction=direction, both=True)
+    inwards = continue_branch(CUBIC, np.array([x, start]), settings, direction=-direction)
+    both = continue_branch(CUBIC, np.array([x, start]), settings, direction=direction, both=True)
     assert len(both) == len(inwards) > 5
     assert sorted(both.parameter[[0, -1]]) == pytest.approx([-0.3, 0.2], abs=1e-15)
     assert (np.diff(both.parameter) * direction > 0.0).all()
@@ -178,7 +178,7 @@ def test_a_start_on_a_bound_that_heads_outwards_is_all(start, direction):
 def test_equilibria_that_start_on_a_bound(tmp_path):
     field = two_mass_field(20.0, 0.05)
     out = equilibrium_branch(field, parameter="ground.speed", bounds=(0.05, 8.0), direction=-1.0)
-    assert (len(out), out.status) == (1, Status.BOUND)
+    assert (len(out), out.status) == (1, BranchStatus.BOUND)
     plot_eigenvalues(out, path=tmp_path / "one.png")
     assert (tmp_path / "one.png").exists()
     there = equilibrium_branch(field, parameter="ground.speed", bounds=(0.05, 8.0), direction=-1.0,

@@ -5,8 +5,8 @@ import pytest
 from systems import two_mass_field, two_mass_jacobian
 
 from fecontact import read_branch, write_branch
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.codim2 import hopf_curve
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
@@ -38,8 +38,8 @@ def test_an_island_of_orbits_is_gone_round_once(largest):
     t, x = circle(np.sqrt(square), 2.0 * np.pi / np.sqrt(4.0 - 0.25 * square))
     branch = orbit_branch(field, PeriodicMotion(t, x, period=t[-1]), "p",
                           method=Collocation(intervals=20), bounds=(-1.0, 1.0),
-                          settings=Settings(largest_step=largest))
-    assert branch.status is Status.CLOSED
+                          options=ContinuationOptions(largest_step=largest))
+    assert branch.status is BranchStatus.CLOSED
     assert [point.kind for point in branch.special] == ["fold", "fold"]
     assert [point.parameter for point in branch.special] == pytest.approx([0.5, -0.5], abs=1e-8)
     assert branch.points[-1].parameter == pytest.approx(0.1, abs=1e-9)
@@ -74,7 +74,7 @@ def test_a_loop_of_doubled_orbits_ends_where_it_is_single():
     assert [first.parameter, last.parameter] == pytest.approx(np.array([-1.0, 1.0])
                                                               * np.sqrt(0.05), abs=1e-8)
     loop = orbit_branch(field, first, bounds=(-0.5, 0.5))
-    assert loop.status is Status.CLOSED
+    assert loop.status is BranchStatus.CLOSED
     assert [point.kind for point in loop.special] == ["period halving"]
     assert loop.points[-1].kind == "period halving"
     assert loop.points[-1].parameter == pytest.approx(last.parameter, abs=1e-6)
@@ -99,7 +99,7 @@ def test_no_fold_beside_a_fork(largest):
     t = np.linspace(50.0, 60.0, 3000)
     branch = orbit_branch(field, PeriodicMotion(t, run.sol(t).T, period=np.pi), "p",
                           method=Collocation(intervals=20), bounds=(-0.5, 0.6), direction=-1.0,
-                          scales=np.ones(3), settings=Settings(largest_step=largest))
+                          scales=np.ones(3), options=ContinuationOptions(largest_step=largest))
     assert [point.kind for point in branch.special] == ["branch point"]
     assert branch.special[0].parameter == pytest.approx(0.0, abs=1e-5)
 
@@ -118,7 +118,7 @@ def test_no_folds_on_a_canard():
     rest = equilibrium_branch(field, [1.2, 1.2**3 / 3.0 - 1.2], "a", bounds=(0.8, 1.3),
                               direction=-1.0)
     orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=100),
-                          bounds=(0.8, 1.3), settings=Settings(points=200))
+                          bounds=(0.8, 1.3), options=ContinuationOptions(points=200))
     # Asymptotically 1 - eps / 8 - 3 eps^2 / 32, eps = 0.01 (Zvonkin and Shubin 1984).
     assert orbits.parameter[-1] == pytest.approx(1.0 - 0.01 / 8.0 - 3e-4 / 32.0, abs=2e-6)
     assert {point.kind for point in orbits.special} <= {"unresolved"}
@@ -147,7 +147,7 @@ def test_folds_of_a_mesh_too_coarse_for_a_canard_are_marked(bounds, largest, poi
     rest = equilibrium_branch(field, [1.2, 1.2**3 / 3.0 - 1.2], "a", bounds=(0.8, 1.3),
                               direction=-1.0)
     orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=50),
-                          bounds=bounds, settings=Settings(points=points, largest_step=largest))
+                          bounds=bounds, options=ContinuationOptions(points=points, largest_step=largest))
     assert_none_unmarked(orbits, tmp_path)
 
 
@@ -156,7 +156,7 @@ def test_special_points_of_a_mesh_too_coarse_for_a_pendulum_are_marked(intervals
     field = vector_field(pendulum, {"a": 0.1}, 2)
     rest = equilibrium_branch(field, parameter="a", bounds=(-0.5, 0.5), direction=-1.0)
     orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=intervals),
-                          bounds=(-0.5, 0.5), settings=Settings(points=90, largest_step=0.1))
+                          bounds=(-0.5, 0.5), options=ContinuationOptions(points=90, largest_step=0.1))
     assert_none_unmarked(orbits, tmp_path)
 
 
@@ -166,7 +166,7 @@ def test_a_conservative_family_has_no_special_points():
     centre, = rest.of_kind("Hopf")
     assert centre.details["criticality"] == "undecided"
     orbits = orbit_branch(field, centre, method=Collocation(intervals=50), bounds=(-0.5, 0.5),
-                          settings=Settings(points=100))
+                          options=ContinuationOptions(points=100))
     assert np.abs(orbits.parameter).max() < 1e-8
     assert orbits.points[-1].values["maximum"][0] > 10.0
     assert not orbits.special
@@ -197,21 +197,21 @@ def test_two_states_have_no_zero_hopf_point(k):
                               direction=-1.0)
     curve = hopf_curve(field, ("c", "b"), rest.of_kind("Hopf")[0],
                        bounds={"c": (-2.0, 2.0), "b": (-3.0, 1.0)},
-                       settings=Settings(points=200, largest_step=0.02 + 0.003 * k))
+                       options=ContinuationOptions(points=200, largest_step=0.02 + 0.003 * k))
     assert [point.kind for point in curve.special] == ["Bogdanov-Takens"]
 
 
 def test_orbits_of_a_strong_hopf_point():
     """l1 is 934: the orbits keep the eigenvector's shape at amplitudes of some 1e-4 only."""
     field = two_mass_field(20.0, 0.06)
-    near = Settings(step=0.005, largest_step=0.01)
+    near = ContinuationOptions(step=0.005, largest_step=0.01)
     rest = equilibrium_branch(field, find_equilibrium(field), "ground.speed", bounds=(0.05, 0.12),
-                              settings=near)
+                              options=near)
     point = rest.of_kind("Hopf")[0]
     eigenvalues = np.linalg.eigvals(two_mass_jacobian(20.0, point.parameter))
     assert np.abs(eigenvalues.real).min() < 1e-8
     orbits = orbit_branch(field, point, method=Collocation(intervals=100), bounds=(0.05, 8.0),
-                          settings=Settings(points=20))
+                          options=ContinuationOptions(points=20))
     assert orbits.points[0].parameter == pytest.approx(point.parameter, rel=1e-3)
     assert orbits.points[0].values["period"] == pytest.approx(
         2.0 * np.pi / np.abs(eigenvalues[np.abs(eigenvalues.real).argmin()].imag), rel=3e-3)
@@ -225,7 +225,7 @@ def test_the_same_call_gives_the_same_branch():
     def branches():
         rest = equilibrium_branch(field, parameter="ground.speed", bounds=(0.3, 8.0))
         return rest, orbit_branch(field, rest.of_kind("Hopf")[0], bounds=(0.3, 8.0),
-                                  settings=Settings(points=60))
+                                  options=ContinuationOptions(points=60))
 
     first, again = branches(), branches()
     x = np.zeros((1, 4))

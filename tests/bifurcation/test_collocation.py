@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from collocation_fields import settled
 
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.linalg import condensation as elimination
@@ -136,7 +136,7 @@ def test_resonance_curve():
     phase = 0.5 * t - np.arctan2(2.0 * D * 0.5, 1.0 - 0.25)
     states = np.stack([X * np.cos(phase), -0.5 * X * np.sin(phase)], axis=1)
     branch = orbit_branch(field, (t, states), "w", method=Collocation(intervals=24),
-                          bounds=(0.5, 1.5), settings=Settings(largest_step=0.1))
+                          bounds=(0.5, 1.5), options=ContinuationOptions(largest_step=0.1))
     w = branch.parameter
     assert w[-1] == pytest.approx(1.5, abs=1e-12)
     assert branch.column("period") == pytest.approx(2.0 * np.pi / w, rel=1e-12)
@@ -204,7 +204,7 @@ def test_one_factorisation_an_orbit(landau, monkeypatch):
     monkeypatch.setattr(elimination, "condense", counted)
     problem, u = orbit_on(landau, np.linspace(0.0, 1.0, 21), 4)
     made.clear()
-    settings = Settings(step=0.02, largest_step=0.02, points=30, locate=False)
+    settings = ContinuationOptions(step=0.02, largest_step=0.02, points=30, locate=False)
     points = list(continuation(problem, u, settings))
     assert len(points) == 30
     for point in points:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fecontact import write_branch
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.follow import follow
-from fecontact.bifurcation.continuation.pseudo_arclength import Problem, Settings, continuation
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.pseudo_arclength import Problem, ContinuationOptions, continuation
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.output.files.branches import read_branch
 
@@ -41,8 +41,8 @@ FOLD = 2.0 / 27.0**0.5
 
 
 def test_s_shaped_curve_and_its_folds():
-    branch = follow(CUBIC, np.array([-1.5, -1.87]), Settings(bounds=(-2.0, 2.0)), name="p")
-    assert branch.status is Status.BOUND
+    branch = continue_branch(CUBIC, np.array([-1.5, -1.87]), ContinuationOptions(bounds=(-2.0, 2.0)), name="p")
+    assert branch.status is BranchStatus.BOUND
     assert branch.parameter[-1] == pytest.approx(2.0, rel=1e-12)
     x, p = branch.column("x"), branch.parameter
     assert p == pytest.approx(x**3 - x, abs=1e-9)
@@ -55,8 +55,8 @@ def test_s_shaped_curve_and_its_folds():
 
 
 def test_closed_curve_ends_at_its_start():
-    branch = follow(CIRCLE, np.array([1.0, 0.0]), Settings(largest_step=0.1))
-    assert branch.status is Status.CLOSED
+    branch = continue_branch(CIRCLE, np.array([1.0, 0.0]), ContinuationOptions(largest_step=0.1))
+    assert branch.status is BranchStatus.CLOSED
     assert branch.points[-1].u == pytest.approx([1.0, 0.0], abs=1e-14)
     angle = np.unwrap(np.arctan2(branch.parameter, branch.column("x")))
     assert angle[-1] - angle[0] == pytest.approx(2.0 * np.pi, abs=1e-12)
@@ -80,28 +80,28 @@ class Helix(Problem):
 
 def test_a_branch_that_passes_by_its_start_goes_on():
     """Much closer than the cubic between two of its points is accurate."""
-    branch = follow(Helix(), np.array([1.0, 0.0, 0.0]), Settings(largest_step=0.1, points=200))
-    assert branch.status is Status.POINTS
+    branch = continue_branch(Helix(), np.array([1.0, 0.0, 0.0]), ContinuationOptions(largest_step=0.1, points=200))
+    assert branch.status is BranchStatus.POINTS
     assert branch.points[-1].values["w"] > 4.0 * np.pi
     assert len(branch.of_kind("fold")) == round(branch.points[-1].values["w"] / np.pi)
 
 
 @pytest.mark.parametrize("turn", [0.3, 0.6])
 def test_turns_between_points_are_limited(turn):
-    branch = follow(CIRCLE, np.array([1.0, 0.0]),
-                    Settings(step=1.0, largest_step=1.0, largest_turn=turn))
+    branch = continue_branch(CIRCLE, np.array([1.0, 0.0]),
+                    ContinuationOptions(step=1.0, largest_step=1.0, largest_turn=turn))
     turns = [np.arccos(min(1.0, before.tangent @ after.tangent))
              for before, after in zip(branch.points[:-1], branch.points[1:], strict=True)]
     assert 0.5 * turn < max(turns) <= turn
 
 
 def test_both_directions_and_restart():
-    settings = Settings(bounds=(-0.3, 0.2))
-    branch = follow(CUBIC, np.array([0.0, 0.0]), settings, both=True)
+    settings = ContinuationOptions(bounds=(-0.3, 0.2))
+    branch = continue_branch(CUBIC, np.array([0.0, 0.0]), settings, both=True)
     assert branch.parameter[[0, -1]] == pytest.approx([-0.3, 0.2], rel=1e-12)
     assert (np.diff(branch.parameter) > 0.0).all()
     middle = branch.points[len(branch) // 2]
-    again = follow(CUBIC, middle.u, settings, tangent=-middle.tangent)
+    again = continue_branch(CUBIC, middle.u, settings, tangent=-middle.tangent)
     assert again.parameter[-1] == pytest.approx(-0.3, rel=1e-12)
     assert (again.points[0].u == pytest.approx(middle.u, abs=1e-12))
     turned = branch.reversed()
@@ -112,13 +112,13 @@ def test_both_directions_and_restart():
 def test_events_and_stops():
     events = {"x = 0.1": lambda values: values["x"] - 0.1}
     start = np.array([-1.2, -1.2**3 + 1.2])
-    branch = follow(CUBIC, start, Settings(events=events, stop_at=["x = 0.1"]))
-    assert branch.status is Status.STOPPED
+    branch = continue_branch(CUBIC, start, ContinuationOptions(events=events, stop_at=["x = 0.1"]))
+    assert branch.status is BranchStatus.STOPPED
     assert branch.points[-1].kind == "x = 0.1"
     assert branch.points[-1].u == pytest.approx([0.1, 0.1**3 - 0.1], rel=1e-12)
-    first = follow(CUBIC, start, Settings(stop_at="fold"))
+    first = continue_branch(CUBIC, start, ContinuationOptions(stop_at="fold"))
     assert [point.kind for point in first.special] == ["fold"]
-    plain = follow(CUBIC, start, Settings(locate=False, bounds=(-2.0, 2.0)))
+    plain = continue_branch(CUBIC, start, ContinuationOptions(locate=False, bounds=(-2.0, 2.0)))
     assert plain.special == ()
 
 
@@ -127,8 +127,8 @@ def test_poles_are_no_special_points():
         def tests(self, u, linearisation, tangent):
             return {"pole": 1.0 / (u[0] - 0.123), "zero": u[0] + 0.321}
 
-    branch = follow(Pole(CUBIC.function, CUBIC.slopes), np.array([-1.0, 0.0]),
-                    Settings(bounds=(-2.0, 2.0)))
+    branch = continue_branch(Pole(CUBIC.function, CUBIC.slopes), np.array([-1.0, 0.0]),
+                    ContinuationOptions(bounds=(-2.0, 2.0)))
     assert sorted(point.kind for point in branch.special) == ["fold", "fold", "zero"]
     assert branch.of_kind("zero")[0].u[0] == pytest.approx(-0.321, rel=1e-12)
 
@@ -143,7 +143,7 @@ def test_crossings_that_hide_each_other_are_told_apart():
             return {"Hopf": (u[1] - 0.5) * (u[1] - 0.52)}
 
     line = TwoPairs(lambda x, p: x, lambda x, p: (1.0, 0.0))
-    branch = follow(line, np.zeros(2), Settings(step=0.2, largest_step=0.2, bounds=(-1.0, 1.0)))
+    branch = continue_branch(line, np.zeros(2), ContinuationOptions(step=0.2, largest_step=0.2, bounds=(-1.0, 1.0)))
     assert [point.parameter for point in branch.special] == pytest.approx([0.5, 0.52], rel=1e-10)
 
 
@@ -153,8 +153,8 @@ def test_end_of_existence_keeps_the_branch():
             raise AnalysisError("There is nothing beyond 0.5.")
         return x - p
 
-    branch = follow(Plane(root, lambda x, p: (1.0, -1.0)), np.zeros(2), Settings())
-    assert branch.status is Status.STALLED
+    branch = continue_branch(Plane(root, lambda x, p: (1.0, -1.0)), np.zeros(2), ContinuationOptions())
+    assert branch.status is BranchStatus.STALLED
     assert branch.message == "There is nothing beyond 0.5."
     assert 0.4999 < branch.parameter[-1] <= 0.5
     assert "what was computed until then is kept" in branch.status.value
@@ -164,8 +164,8 @@ def test_end_of_existence_keeps_the_branch():
 def test_sharp_corner_is_not_jumped(step):
     """A hyperbola's two arms come within 0.02: the steps must not jump from one to the other."""
     near = Plane(lambda x, p: x * x - p * p - 1e-4, lambda x, p: (2.0 * x, -2.0 * p))
-    settings = Settings(bounds=(-2.0, 1.0), step=step, largest_step=step)
-    branch = follow(near, np.array([1.0, -1.0]), settings)
+    settings = ContinuationOptions(bounds=(-2.0, 1.0), step=step, largest_step=step)
+    branch = continue_branch(near, np.array([1.0, -1.0]), settings)
     assert (branch.column("x") > 0.0).all()
     assert branch.points[-1].u[0] == pytest.approx(np.sqrt(1.0001), rel=1e-12)
 
@@ -173,26 +173,26 @@ def test_sharp_corner_is_not_jumped(step):
 def test_corners_of_the_branch_itself_are_passed():
     """x = |p| / 2 turns by 0.93 rad, more than is believed of a step of ordinary size."""
     bent = Plane(lambda x, p: x - 0.5 * abs(p), lambda x, p: (1.0, -0.5 * np.sign(p)))
-    branch = follow(bent, np.array([0.5, -1.0]), Settings(bounds=(-1.0, 1.0)))
-    assert branch.status is Status.BOUND
+    branch = continue_branch(bent, np.array([0.5, -1.0]), ContinuationOptions(bounds=(-1.0, 1.0)))
+    assert branch.status is BranchStatus.BOUND
     assert branch.column("x") == pytest.approx(0.5 * np.abs(branch.parameter), abs=1e-7)
     assert branch.parameter[-1] == pytest.approx(1.0, rel=1e-12)
 
 
 def test_points_come_one_by_one():
-    steps = continuation(CIRCLE, np.array([1.0, 0.0]), Settings(points=5), direction=-1.0)
+    steps = continuation(CIRCLE, np.array([1.0, 0.0]), ContinuationOptions(points=5), direction=-1.0)
     points = [next(steps) for _ in range(5)]
     assert all(point.u[1] < 0.0 for point in points[1:])
     with pytest.raises(StopIteration) as stop:
         next(steps)
-    assert stop.value.value.status is Status.POINTS
+    assert stop.value.value.status is BranchStatus.POINTS
 
 
 def test_no_solution_near_the_start():
     with pytest.raises(InputError, match="no solution near the start at the parameter 3"):
-        follow(CIRCLE, np.array([0.1, 3.0]), Settings())
+        continue_branch(CIRCLE, np.array([0.1, 3.0]), ContinuationOptions())
     with pytest.raises(InputError, match=r"start lies at 1, outside the bounds .* 2 to 3"):
-        follow(CUBIC, np.array([0.1, 1.0]), Settings(bounds=(2.0, 3.0)))
+        continue_branch(CUBIC, np.array([0.1, 1.0]), ContinuationOptions(bounds=(2.0, 3.0)))
 
 
 @pytest.mark.parametrize(("options", "message"), [
@@ -202,7 +202,7 @@ def test_no_solution_near_the_start():
 ])
 def test_settings_are_checked(options, message):
     with pytest.raises(InputError, match=message):
-        Settings(**options)
+        ContinuationOptions(**options)
 
 
 def test_files(tmp_path):
@@ -213,8 +213,8 @@ def test_files(tmp_path):
         def examine(self, kind, u, linearisation, tangent):
             return {"vector": np.array([1.0, 2j]), "note": "as expected"}
 
-    branch = follow(Ragged(CUBIC.function, CUBIC.slopes), np.array([-1.2, -0.5]),
-                    Settings(bounds=(-1.0, 1.0)), name="p", attributes={"who": ["a", "b"]})
+    branch = continue_branch(Ragged(CUBIC.function, CUBIC.slopes), np.array([-1.2, -0.5]),
+                    ContinuationOptions(bounds=(-1.0, 1.0)), name="p", attributes={"who": ["a", "b"]})
     path = write_branch(tmp_path / "branch.h5", branch)
     found = read_branch(path)
     assert (found.name, found.status, len(found)) == ("p", branch.status, len(branch))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from systems import friction_slope, lorenz_field, two_mass_field, two_mass_jacobian
 
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.codim2 import fold_curve, hopf_curve
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, find_equilibrium
@@ -38,7 +38,7 @@ def test_bogdanov_takens():
     field = vector_field(takens, {"b": -1.0, "c": -1.0}, 2)
     branch = equilibrium_branch(field, [-0.6, 0.0], "b", bounds=(-2.0, 2.0))
     hopf = hopf_curve(field, ("b", "c"), branch.of_kind("Hopf")[0], bounds=BOX)
-    assert hopf.status is Status.STOPPED
+    assert hopf.status is BranchStatus.STOPPED
     end, = hopf.of_kind("Bogdanov-Takens")
     assert [end.values["b"], end.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-10)
     assert end is hopf.points[-1]
@@ -84,7 +84,7 @@ def test_a_curve_starts_with_the_parameters_of_its_point():
     start, = equilibrium_branch(field, find_equilibrium(field, {"c": 0.5}), "b",
                                 bounds=(-2.0, 2.0)).of_kind("Hopf")
     assert start.first_lyapunov == pytest.approx(1.0, rel=1e-8)
-    curve = hopf_curve(field, ("b", "c"), start, settings=Settings(points=3), both=False)
+    curve = hopf_curve(field, ("b", "c"), start, options=ContinuationOptions(points=3), both=False)
     assert curve.points[0].values["c"] == pytest.approx(0.5, abs=1e-12)
     with pytest.raises(InputError, match="is on no branch of equilibria or orbits"):
         hopf_curve(field, ("b", "c"), curve.points[0])

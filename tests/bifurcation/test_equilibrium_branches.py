@@ -24,8 +24,8 @@ from fecontact import (
     basis_from_matrices,
     vector_field,
 )
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.pseudo_arclength import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.pseudo_arclength import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
 from fecontact.bifurcation.fields.contact_field import contact_field
@@ -75,18 +75,18 @@ def test_reactor():
 
 def test_predator_and_prey():
     field = vector_field(predator, {"p1": 0.0, "p2": 3.0, "p3": 5.0, "p4": 3.0}, 2)
-    settings = Settings(bounds=(0.01, 1.0))
-    trivial = equilibrium_branch(field, parameter="p1", settings=Settings(bounds=(0.0, 1.0)))
+    settings = ContinuationOptions(bounds=(0.01, 1.0))
+    trivial = equilibrium_branch(field, parameter="p1", options=ContinuationOptions(bounds=(0.0, 1.0)))
     assert parameters(trivial, "branch point") == pytest.approx([0.6], rel=1e-12)
     assert [point.kind for point in trivial.special] == ["branch point"]
-    prey = equilibrium_branch(field, trivial.special[0], settings=settings)
+    prey = equilibrium_branch(field, trivial.special[0], options=settings)
     assert prey.column("state")[:, 1] == pytest.approx(np.zeros(len(prey)), abs=1e-12)
     assert sorted(parameters(prey, "branch point")) == pytest.approx([0.6, 0.821904], abs=6e-7)
     fold, = prey.of_kind("fold")
     assert fold.parameter == pytest.approx(0.832929, abs=6e-7)
     assert fold.u[0] == pytest.approx(0.411162, abs=6e-7)
     crossing = max(prey.of_kind("branch point"), key=lambda point: point.parameter)
-    both = equilibrium_branch(field, crossing, settings=settings)
+    both = equilibrium_branch(field, crossing, options=settings)
     hopf, = both.of_kind("Hopf")
     assert hopf.parameter == pytest.approx(0.671594, abs=6e-7)
     assert hopf.u[:2] == pytest.approx([1.0 / 3.0, 0.365762], abs=6e-7)
@@ -170,7 +170,7 @@ def test_two_masses_over_the_normal_force():
                   for B in (point.parameter - h, point.parameter + h)]
         slope = (growth[0] - growth[1]) / (2.0 * h)
         assert point.details["crossing_speed"] == pytest.approx(slope, rel=1e-6)
-    assert branch.status is Status.BOUND
+    assert branch.status is BranchStatus.BOUND
     assert len(branch) < 120
 
 
@@ -250,7 +250,7 @@ def test_pairs_on_the_axis_do_not_cross_it():
 
     field = vector_field(chain, {"a": 0.1}, 6)
     branch = equilibrium_branch(field, parameter="a", bounds=(0.0, 2.0),
-                                settings=Settings( step=0.005, largest_step=0.005))
+                                options=ContinuationOptions( step=0.005, largest_step=0.005))
     assert len(branch) > 150
     assert branch.special == ()
     assert branch.column("stable").all()
@@ -303,7 +303,7 @@ def test_parameter_leaves_its_range():
     field = contact_field(mode_coupling(0.1), ["friction.friction_coefficient"])
     branch = equilibrium_branch(field, parameter="friction.friction_coefficient",
                                 bounds=(-1.0, 1.0), direction=-1.0)
-    assert branch.status is Status.STALLED
+    assert branch.status is BranchStatus.STALLED
     assert branch.parameter[-1] == pytest.approx(0.0, abs=1e-5)
     assert "friction_coefficient = " in branch.message
     with pytest.raises(InputError, match="no parameter 'mu'"):

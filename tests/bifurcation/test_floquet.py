@@ -11,7 +11,7 @@ from fecontact.bifurcation.orbits.mesh import node_times
 
 
 def planted(multipliers, factors, seed=1):
-    """Factors (N, d, d) with eigenvalues of their product given as real numbers or pairs."""
+    """CondensedFactors (N, d, d) with eigenvalues of their product given as real numbers or pairs."""
     rng = np.random.default_rng(seed)
     blocks, roots = [], []
     for mu in multipliers:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fecontact import ContactEvents, simulate, strobe
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.integrate.sensitivity import sensitivity
 
@@ -74,7 +74,7 @@ def test_a_doubling_is_where_runs_double(branch):
     doubling = max(branch.of_kind("period doubling"), key=lambda point: point.parameter)
     assert doubling.parameter == pytest.approx(39.02833, abs=5e-5)
     twice = orbit_branch(impact_orbits.field_at(39.0), doubling, bounds=(38.9, 39.1),
-                         settings=Settings(step=2e-3, largest_step=5e-3, points=20))
+                         options=ContinuationOptions(step=2e-3, largest_step=5e-3, points=20))
     end = twice.points[-1]
     assert end.parameter == pytest.approx(38.9, rel=1e-12)
     assert end.values["stable"]
@@ -105,7 +105,7 @@ def test_a_loop_of_doubled_orbits_ends_where_it_is_single(branch):
     assert later.parameter == pytest.approx(38.18365, abs=1e-4)
     assert first.parameter == pytest.approx(38.48943, abs=1e-4)
     loop = orbit_branch(impact_orbits.field_at(38.3), first, bounds=(38.1, 38.6),
-                        settings=Settings(step=2e-3, largest_step=0.02, points=30))
+                        options=ContinuationOptions(step=2e-3, largest_step=0.02, points=30))
     end = loop.points[-1]
     assert end.kind == "period halving"
     assert end.parameter == pytest.approx(later.parameter, abs=1e-4)

@@ -5,8 +5,8 @@ import pytest
 from collocation_fields import lorenz_field, settled, two_masses_field
 
 from fecontact import write_branch
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
@@ -26,7 +26,7 @@ def asymmetric(lorenz):
     """The asymmetric family, from rho = 280 down to 225."""
     times, states = settled(lorenz, 40.0, [1.0, 2.0, 250.0], 0.45)
     return orbit_branch(lorenz, (times, states), "rho", method=Collocation(intervals=60),
-                        bounds=(225.0, 330.0), direction=-1.0, settings=Settings(largest_step=0.03))
+                        bounds=(225.0, 330.0), direction=-1.0, options=ContinuationOptions(largest_step=0.03))
 
 
 def test_lorenz_cascade(lorenz, asymmetric):
@@ -41,8 +41,8 @@ def test_lorenz_cascade(lorenz, asymmetric):
         assert point.values["trivial_error"] < 1e-10
         if rho > 217.0:
             branch = orbit_branch(lorenz, point, bounds=(215.0, 230.0),
-                                  settings=Settings( step=0.01, stop_at=("period doubling",)))
-            assert branch.status is Status.STOPPED
+                                  options=ContinuationOptions( step=0.01, stop_at=("period doubling",)))
+            assert branch.status is BranchStatus.STOPPED
 
 
 def test_lorenz_symmetric_orbit_loses_its_symmetry(lorenz, asymmetric):
@@ -77,7 +77,7 @@ def sliding(masses):
 @pytest.fixture(scope="module")
 def first(masses, sliding):
     return orbit_branch(masses, sliding.of_kind("Hopf")[0], method=Collocation(intervals=100),
-                        settings=Settings(step=0.005), bounds=(0.3, 9.6))
+                        options=ContinuationOptions(step=0.005), bounds=(0.3, 9.6))
 
 
 def test_two_masses_first_branch(first):
@@ -122,7 +122,7 @@ def test_two_masses_further_doublings(masses, first):
         intervals = min(2 * intervals, 200)
         branch = orbit_branch(masses, point, method=Collocation(intervals=intervals),
                               bounds=(8.0, 9.6),
-                              settings=Settings(step=0.005, stop_at=("period doubling",)))
+                              options=ContinuationOptions(step=0.005, stop_at=("period doubling",)))
         assert branch.special[-1].parameter == pytest.approx(B, abs=6e-3)
 
 
@@ -139,7 +139,7 @@ def test_two_masses_coexisting_branch(masses, sliding):
 
 def test_points_stay_where_they_are_when_the_mesh_doubles(masses, sliding, first):
     finer = orbit_branch(masses, sliding.of_kind("Hopf")[0], method=Collocation(intervals=200),
-                         settings=Settings(step=0.005), bounds=(0.3, 9.6))
+                         options=ContinuationOptions(step=0.005), bounds=(0.3, 9.6))
     for kind in ("fold", "period doubling"):
         assert finer.of_kind(kind)[0].parameter == pytest.approx(
             first.of_kind(kind)[0].parameter, abs=3e-9)
@@ -150,7 +150,7 @@ def test_branches_go_on_from_their_files(masses, first, tmp_path):
     assert [at.kind for at in loaded.points] == [at.kind for at in first.points]
     assert (loaded.column("multipliers") == first.column("multipliers")).all()
     doubled = [orbit_branch(masses, branch.of_kind("period doubling")[0],
-                            settings=Settings(points=2), bounds=(8.0, 9.6)).points[-1]
+                            options=ContinuationOptions(points=2), bounds=(8.0, 9.6)).points[-1]
                for branch in (first, loaded)]
     assert (doubled[0].u == doubled[1].u).all()
 

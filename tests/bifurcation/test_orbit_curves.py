@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from collocation_fields import two_masses_field
 
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
@@ -31,7 +31,7 @@ def test_curve_agrees_with_branches(masses, kind, second, tolerance):
     field, branch = masses
     start, = branch.of_kind(kind)
     curve = orbit_curve(field, start, second, bounds=(0.2, 20.0),
-                        settings=Settings(step=0.005, largest_step=0.03, points=12))
+                        options=ContinuationOptions(step=0.005, largest_step=0.03, points=12))
     assert len(curve) == 12
     assert curve.parameter[0] == pytest.approx(start.parameter, rel=tolerance)
     end = curve.points[-1]
@@ -61,7 +61,7 @@ def test_curve_of_tori():
                           method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     point, = branch.of_kind("Neimark-Sacker")
     curve = orbit_curve(field, point, "a", direction=-1.0, bounds=(-0.1, 0.5),
-                        settings=Settings(points=30), width=1.0)
+                        options=ContinuationOptions(points=30), width=1.0)
     assert curve.parameter == pytest.approx(curve.column("a") ** 2, abs=1e-9)
     # It goes through the turning point a = 0, and on.
     assert curve.column("a").min() < -0.1
@@ -99,7 +99,7 @@ def test_cusp_of_cycles():
     assert sorted(at.parameter for at in folds) == pytest.approx(
         [-2.0 * 0.1**1.5, 2.0 * 0.1**1.5], rel=1e-8)
     curve = orbit_curve(field, folds[0], "q", both=True, bounds=(-0.2, 0.2), width=1.0,
-                        settings=Settings(largest_step=0.03, points=60))
+                        options=ContinuationOptions(largest_step=0.03, points=60))
     p, q = curve.parameter, curve.column("q")
     assert p**2 == pytest.approx(4.0 * (q / 3.0) ** 3, abs=1e-9)
     assert p.min() < -0.1

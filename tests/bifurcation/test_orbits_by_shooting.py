@@ -14,8 +14,8 @@ from systems import (
 )
 
 from fecontact import simulate, strobe
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.orbits.branches import (
@@ -28,7 +28,7 @@ from fecontact.bifurcation.orbits.restored import restored_shooting
 from fecontact.bifurcation.orbits.samples import observe
 from fecontact.core.errors import AnalysisError, InputError
 
-FEW = Settings(step=5e-3, largest_step=0.05, points=60)
+FEW = ContinuationOptions(step=5e-3, largest_step=0.05, points=60)
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +45,11 @@ def test_doubled_orbits_agree_with_collocation(two_masses):
     doubling, = orbits.of_kind("period doubling")
     near = max((at for at in orbits.points if at.parameter < 8.08), key=lambda at: at.parameter)
     motion = near.orbit(field, 2000)
-    shot = orbit_branch(field, motion, "B", method=Shooting(), bounds=(7.5, 8.11), settings=FEW)
+    shot = orbit_branch(field, motion, "B", method=Shooting(), bounds=(7.5, 8.11), options=FEW)
     found, = shot.of_kind("period doubling")
     assert found.parameter == pytest.approx(doubling.parameter, rel=1e-7)
-    twice = orbit_branch(field, found, settings=FEW, bounds=(8.05, 8.12))
-    wanted = orbit_branch(field, doubling, settings=FEW, bounds=(8.05, 8.12))
+    twice = orbit_branch(field, found, options=FEW, bounds=(8.05, 8.12))
+    wanted = orbit_branch(field, doubling, options=FEW, bounds=(8.05, 8.12))
     for branch in (twice, wanted):
         assert branch.points[-1].parameter == pytest.approx(8.12, rel=1e-12)
     one, other = twice.points[-1].values, wanted.points[-1].values
@@ -69,10 +69,10 @@ def test_events_agree_with_collocation(two_masses):
     near = max((at for at in orbits.points if at.parameter < 7.6), key=lambda at: at.parameter)
     beyond = min((at for at in orbits.points if at.parameter > 7.7), key=lambda at: at.parameter)
     wanted = (near.values["period"] + beyond.values["period"]) / 2.0
-    settings = Settings(step=0.02, points=10, stop_at=["period"],
+    settings = ContinuationOptions(step=0.02, points=10, stop_at=["period"],
                         events={"period": lambda values: values["period"] - wanted})
     places = [orbit_branch(field, near.orbit(field, 2000), "B", method=method, bounds=(7.0, 8.3),
-                           settings=settings).of_kind("period")[0].parameter
+                           options=settings).of_kind("period")[0].parameter
               for method in (Shooting(), Collocation(intervals=100))]
     assert near.parameter < places[0] < beyond.parameter
     assert places[0] == pytest.approx(places[1], rel=1e-8)
@@ -82,10 +82,10 @@ def test_orbits_of_a_hopf_point_agree_with_collocation(two_masses):
     field, sliding, _ = two_masses
     hopf = sliding.of_kind("Hopf")[0]
     # The branch leaves to smaller B.
-    shot = orbit_branch(field, hopf, method=Shooting(segments=3), settings=FEW, bounds=(1.1, 8.3))
+    shot = orbit_branch(field, hopf, method=Shooting(segments=3), options=FEW, bounds=(1.1, 8.3))
     assert shot.points[-1].parameter == pytest.approx(1.1, rel=1e-12)
     assert not shot.points[-1].values["stable"]
-    beside = orbit_branch(field, hopf, settings=FEW, bounds=(1.1, 8.3))
+    beside = orbit_branch(field, hopf, options=FEW, bounds=(1.1, 8.3))
     assert shot.points[-1].values["period"] == pytest.approx(
         beside.points[-1].values["period"], rel=1e-7)
 
@@ -119,15 +119,15 @@ def on_island(two_masses, settings, segments=4):
     motion = replace(near.orbit(samples=2000),
                      parameter_values=[np.sqrt(1.0 - (near.parameter - FOLD) / 0.1)])
     return orbit_branch(island(), motion, method=Shooting(segments), bounds=(-1.5, 1.5),
-                        settings=settings)
+                        options=settings)
 
 
 @pytest.mark.parametrize("segments", [1, 4])
 def test_an_island_of_orbits_is_gone_round_once(two_masses, segments):
     """The branch comes back in another phase; the folds are those over B, at p = -1 and 1."""
     branch = on_island(two_masses, segments=segments,
-                       settings=Settings(largest_step=0.1, points=150))
-    assert branch.status is Status.CLOSED
+                       options=ContinuationOptions(largest_step=0.1, points=150))
+    assert branch.status is BranchStatus.CLOSED
     assert [point.kind for point in branch.special] == ["fold", "fold"]
     assert [point.parameter for point in branch.special] == pytest.approx([1.0, -1.0], abs=1e-8)
     assert (branch.points[-1].u == branch.points[0].u).all()
@@ -140,7 +140,7 @@ def test_an_island_of_orbits_is_gone_round_once(two_masses, segments):
 def test_orbits_in_another_phase_are_met_again(two_masses):
     """A quarter of a period later, off the ends of the segments, it is the same orbit; beside it
     it is not."""
-    branch = on_island(two_masses, settings=Settings(points=2))
+    branch = on_island(two_masses, options=ContinuationOptions(points=2))
     problem, u, _ = restored_shooting(island(), branch.points[0])
     tangent = branch.points[0].tangent
     later = np.concatenate([problem.at_phases(u, problem.mesh[:-1] + 0.217).reshape(-1), u[-2:]])
@@ -161,7 +161,7 @@ def test_driven_orbits_a_period_of_the_drive_later_are_the_same():
     assert motion.periods == 2
     field = impact_orbits.field_at(30.9)
     branch = orbit_branch(field, motion, method=Shooting(segments=3), bounds=(30.0, 32.0),
-                          settings=Settings(points=1))
+                          options=ContinuationOptions(points=1))
     problem, u, _ = restored_shooting(field, branch.points[0])
     tangent = branch.points[0].tangent
     later = np.append(problem.at_phases(u, problem.mesh[:-1] + 0.5).reshape(-1), u[-1])

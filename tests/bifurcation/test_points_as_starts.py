@@ -20,8 +20,8 @@ from fecontact import (
     vector_field,
     write_branch,
 )
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.core.errors import InputError
 
 
@@ -83,7 +83,7 @@ def test_special_points_have_what_is_known_of_them(rest, tmp_path):
 
 def test_a_branch_goes_on_from_its_end(field, kept):
     on = orbit_branch(field, kept.points[-1], bounds=(-0.5, 1.0))
-    assert on.status is Status.BOUND
+    assert on.status is BranchStatus.BOUND
     assert on.points[0].parameter == pytest.approx(0.4, rel=1e-12)
     assert (np.diff(on.parameter) > 0.0).all()
     assert radius(on.points[-1]) == pytest.approx(1.0, rel=1e-7)
@@ -96,8 +96,8 @@ def test_a_branch_goes_on_from_its_end(field, kept):
 
 def test_steps_go_on_in_the_size_of_orbits_that_have_grown(field, rest):
     """At r = 100 the radius is 10, and one the scale at the Hopf point."""
-    wide = Settings(bounds=(-0.5, 100.0), largest_step=0.3)
-    orbits = orbit_branch(field, rest.special[0], method=Collocation(intervals=12), settings=wide)
+    wide = ContinuationOptions(bounds=(-0.5, 100.0), largest_step=0.3)
+    orbits = orbit_branch(field, rest.special[0], method=Collocation(intervals=12), options=wide)
     assert orbits.attributes["scales"][0] == pytest.approx(1.0)
     on = orbit_branch(field, orbits.points[-1], bounds=(-0.5, 121.0))
     assert on.attributes["scales"][:2] == pytest.approx([10.0, 10.0], rel=1e-3)
@@ -191,20 +191,20 @@ def test_shooting_goes_on_and_is_solved_at_a_value():
                           bounds=(0.3, 8.3))
     assert orbits.points[0].orbit().parameter_values is None
     start, wanted = orbits.at(field, 6.0, -1), orbits.at(field, 6.2, -1)
-    few = Settings(step=0.01, points=4)
-    shot = orbit_branch(field, start, method=Shooting(segments=2, rtol=1e-10), settings=few,
+    few = ContinuationOptions(step=0.01, points=4)
+    shot = orbit_branch(field, start, method=Shooting(segments=2, rtol=1e-10), options=few,
                         bounds=(5.9, 6.3))
     assert shot.points[0].by_shooting
     with pytest.raises(InputError, match="give the field"):
         shot.points[0].orbit()
-    on = orbit_branch(field, shot.points[-1], settings=Settings(step=0.05), bounds=(5.9, 6.3))
+    on = orbit_branch(field, shot.points[-1], options=ContinuationOptions(step=0.05), bounds=(5.9, 6.3))
     assert on.attributes["segments"] == 2
     assert on.parameter[-1] == pytest.approx(6.3, rel=1e-12)
     found = on.at(field, 6.2)
     assert found.values["period"] == pytest.approx(wanted.values["period"], rel=1e-7)
     assert found.orbit(field).states.max(axis=0) == pytest.approx(
         wanted.orbit().states.max(axis=0), rel=1e-4, abs=1e-4)
-    other = orbit_branch(field, found, method=Collocation(intervals=100), settings=few,
+    other = orbit_branch(field, found, method=Collocation(intervals=100), options=few,
                          bounds=(5.9, 6.3))
     assert other.points[0].values["period"] == pytest.approx(wanted.values["period"], rel=1e-7)
 

@@ -10,7 +10,7 @@ from test_orbit_bifurcations import moebius, torus
 from fecontact import write_branch
 from fecontact.bifurcation.continuation import sharpening
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
@@ -60,7 +60,7 @@ def slow_doubling():
         branch = orbit_branch(
             field, (times, states), "D", method=Collocation(intervals=intervals),
             bounds=(0.03, 0.05), width=2.0, direction=-1.0, scales=np.full(4, 8.0),
-            settings=Settings(step=0.002, largest_step=0.01, points=40,
+            options=ContinuationOptions(step=0.002, largest_step=0.01, points=40,
                               stop_at=["period doubling"]))
         return branch.special[0]
 
@@ -91,7 +91,7 @@ def second():
     sliding = equilibrium_branch(field, np.zeros(4), "v0", bounds=(0.05, 8.0), direction=-1.0)
     return orbit_branch(field, sliding.of_kind("Hopf")[1], method=Collocation(intervals=50),
                         bounds=(0.05, 8.0), scales=np.full(4, 8.0),
-                        settings=Settings(step=0.005, largest_step=0.04, points=80))
+                        options=ContinuationOptions(step=0.005, largest_step=0.04, points=80))
 
 
 def test_points_on_sharp_turns_are_found_again(second):
@@ -114,7 +114,7 @@ def test_points_that_are_not_found_again_say_so(tmp_path, monkeypatch):
     field = two_masses_field(B=0.3)
     sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.3, 9.6))
     branch = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=(0.3, 9.6),
-                          settings=Settings(step=0.005))
+                          options=ContinuationOptions(step=0.005))
     for point, exact in zip(branch.special, (0.890686833, 8.0921923845), strict=True):
         assert not point.details["located"]
         assert abs(point.parameter - exact) < point.details["parameter_error"]
@@ -141,7 +141,7 @@ def test_doublings_of_a_mesh_too_coarse_are_marked():
     field = two_masses_field(B=0.3)
     sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.3, 9.6))
     branch = orbit_branch(field, sliding.of_kind("Hopf")[0], method=Collocation(intervals=10),
-                          bounds=(0.3, 9.6), settings=Settings(step=0.005))
+                          bounds=(0.3, 9.6), options=ContinuationOptions(step=0.005))
     fold, *others = branch.special
     assert fold.kind == "fold"
     assert abs(fold.parameter - 0.890686833041) <= 1.2 * fold.details["parameter_error"] < 1e-4
@@ -168,7 +168,7 @@ def test_events_on_orbits_are_as_sharp_as_on_equilibria():
               "radius of 0.7": lambda values: values["maximum"][0] - 0.7,
               "multiplier of 0.1": lambda values: np.log(np.abs(values["multipliers"]).min() / 0.1)}
     branch = orbit_branch(field, rest.special[0], method=Collocation(intervals=60),
-                          bounds=(-0.1, 1.0), settings=Settings(events=events))
+                          bounds=(-0.1, 1.0), options=ContinuationOptions(events=events))
 
     def place(kind):
         return branch.of_kind(kind)[0].parameter

@@ -5,7 +5,7 @@ import pytest
 from systems import belt, lorenz_field, two_mass_field
 
 from fecontact import simulate
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
@@ -35,7 +35,7 @@ def test_special_points_agree_with_collocation(two_masses, kind):
     along = np.append(interpolate(problem.mesh, problem.nodes(tangent), shot.mesh[:-1]).reshape(-1),
                       tangent[problem.size:])
     along /= np.sqrt(shot.weights() @ along**2)
-    near = Settings(step=2e-3, largest_step=2e-3, points=3)
+    near = ContinuationOptions(step=2e-3, largest_step=2e-3, points=3)
     found, = [at for at in continuation(shot, v - 1e-3 * along, near, tangent=along)
               if at.kind == kind]
     assert found.parameter == pytest.approx(point.parameter, rel=1e-9)
@@ -81,7 +81,7 @@ def test_driven_belt_closes_after_four_periods():
                    outputs=np.linspace(0.0, 40.0 * period, 8001))
     branch = orbit_branch(field, PeriodicMotion(run.time, run.states, periods=4),
                           "drive.amplitude_x", method=Shooting(), bounds=(0.5e-3, 0.52e-3),
-                          settings=Settings(points=4))
+                          options=ContinuationOptions(points=4))
     first = branch.points[0]
     assert first.values["period"] == pytest.approx(4.0 * period, rel=1e-12)
     assert first.values["stable"]
@@ -117,4 +117,4 @@ def orbits_by_shooting_point(field, problem, u):
     shot, v = shooting_from(problem, u, 3)
     row = np.zeros(len(v))
     row[-1] = 1.0
-    return next(continuation(shot, v, Settings(points=1), tangent=row))
+    return next(continuation(shot, v, ContinuationOptions(points=1), tangent=row))

@@ -6,7 +6,7 @@ import pytest
 import two_mass_friction as example
 
 from fecontact import simulate
-from fecontact.bifurcation.continuation.branch import Status
+from fecontact.bifurcation.continuation.branch import BranchStatus
 
 
 def test_table_and_attractors():
@@ -62,8 +62,8 @@ def test_doublings_at_which_the_new_branch_is_strongly_bent():
     second = over_speed["second branch"]
     close = second.of_kind("period doubling")[0]
     assert second.of_kind("fold")[0].parameter - close.parameter < 1e-3
-    settings = example.Settings(step=0.005, largest_step=0.04, points=3)
-    doubled = example.orbit_branch(example.oscillator(B=20.0, v0=8.0), close, settings=settings,
+    settings = example.ContinuationOptions(step=0.005, largest_step=0.04, points=3)
+    doubled = example.orbit_branch(example.oscillator(B=20.0, v0=8.0), close, options=settings,
                                    bounds=(1.2, 8.0))
     assert len(doubled) == 3
     assert doubled.points[0].values["period"] == pytest.approx(2.0 * close.values["period"],
@@ -71,4 +71,4 @@ def test_doublings_at_which_the_new_branch_is_strongly_bent():
     # Subcritical: on the side on which the single orbit is the more stable one.
     assert doubled.parameter.max() < close.parameter
     # Both branches of the diagram end at its bounds.
-    assert {branch.status for branch in over_speed.values()} == {Status.BOUND}
+    assert {branch.status for branch in over_speed.values()} == {BranchStatus.BOUND}

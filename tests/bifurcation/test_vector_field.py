@@ -28,7 +28,7 @@ from fecontact import (
     PointLoad,
     RoughSurface,
     Sine,
-    Trace,
+    MeasuredProfile,
     equilibrium_branch,
     find_equilibrium,
     stability_map,
@@ -316,7 +316,7 @@ def test_forcing_periods():
     odd = both.with_(**{"drive.angular_frequency": 4.0 * np.sqrt(2.0)})
     with pytest.raises(AnalysisError, match="no common multiple"):
         contact_field(odd, []).forcing_period(np.empty(0))
-    trace = wavy.with_(**{"ground.profile": Trace((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.5, 0.0))})
+    trace = wavy.with_(**{"ground.profile": MeasuredProfile((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.5, 0.0))})
     with pytest.raises(AnalysisError, match=r"ground\.profile does not repeat"):
         contact_field(trace, []).forcing_period(np.empty(0))
     rough = trace.with_(ground=replace(trace.ground, friction_variation=Sine(0.1, 2.0),

@@ -103,7 +103,7 @@ def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
         assert word in out
     case = read_case("results/beam.vtkhdf")
     assert case.trajectory.time[-1] == pytest.approx(1e-3)
-    assert Study.from_toml(case.study, "x").basis_settings.contact_nodes == 5
+    assert Study.from_toml(case.study, "x").basis.contact_nodes == 5
 
     code, out, _ = cli("export", "results/beam.vtkhdf", "--format", "pvd", "--frames", 2)
     assert code == 0

@@ -10,14 +10,14 @@ from fecontact import (
     Event,
     InputError,
     basins,
-    brute_force,
+    poincare_scan,
     contact_field,
     equilibrium_branch,
     event,
     plot_branches,
 )
-from fecontact.bifurcation.continuation.problem import Settings
-from fecontact.cli.plot_kinds import Choice, point_of
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.cli.plot_kinds import PlotRequest, point_of
 from fecontact.core.errors import AnalysisError
 
 
@@ -31,12 +31,12 @@ def plane(t, y, p):
     (lambda: Event(event(plane), [np.nan]), r"parameters = \[nan\]"),
     (lambda: event(None), "not None"),
     (lambda: ContactEvents(stop=None), "stop = None"),
-    (lambda: Axis("B", "q"), "axis = 'q'"),
+    (lambda: Axis("B", "q"), "component = 'q'"),
     (lambda: Axis("B", "y", "speed"), "of = 'speed'"),
-    (lambda: Choice(highest_hz=-5.0), "highest = -5.0"),
-    (lambda: Choice(highest_hz=np.nan), "highest = nan"),
+    (lambda: PlotRequest(highest_hz=-5.0), "highest = -5.0"),
+    (lambda: PlotRequest(highest_hz=np.nan), "highest = nan"),
     (lambda: point_of("nan,0.1"), "nan,0.1"),
-    (lambda: brute_force(impact_oscillator(), "drive.angular_frequency", "abc"), "values must be"),
+    (lambda: poincare_scan(impact_oscillator(), "drive.angular_frequency", "abc"), "values must be"),
 ])
 def test_refused(make, names):
     with pytest.raises(InputError, match=names):
@@ -46,7 +46,7 @@ def test_refused(make, names):
 @pytest.mark.parametrize("bounds", [(1.0, 2.0, 3.0), "ab", 1.0, (2.0, 1.0)])
 def test_bounds_of_branches(bounds):
     with pytest.raises(InputError, match=r"bounds = .* must be two values"):
-        Settings(bounds=bounds)
+        ContinuationOptions(bounds=bounds)
 
 
 def test_no_branch_to_draw(tmp_path):

@@ -25,7 +25,7 @@ from fecontact.output.files.export import export_csv
 from fecontact.output.files.hdf5 import new_file
 from fecontact.output.files.pvd import export_pvd
 from fecontact.output.render.movie import render
-from fecontact.output.render.offscreen import rendering_works
+from fecontact.output.render.offscreen import can_render
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="locks and limits of Linux")
 
@@ -206,7 +206,7 @@ def test_many_writers_of_one_name(tmp_path):
     assert listed(tmp_path) == ["a.txt"]
 
 
-@pytest.mark.skipif(rendering_works() is not None, reason=str(rendering_works()))
+@pytest.mark.skipif(can_render() is not None, reason=str(can_render()))
 def test_pictures_and_frames_leave_what_is_not_theirs(tmp_path):
     trajectory = run(basis(columns=4, rows=2), times=5)
     for name in ("pics.part", "frames.old", "frames.part", "run.part"):

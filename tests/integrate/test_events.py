@@ -62,13 +62,13 @@ def test_a_run_stops_at_an_event(stop, when):
 
 def test_turning_points_are_crossings():
     """Free fall from 1 m/s upwards is highest after 0.1 s, 0.05 m higher."""
-    top = Crossing("B", "y", of="velocity", direction="falling")
+    top = Crossing("B", "y", of="velocity", sense="falling")
     run = simulate(drop(), 0.5, initial=np.array([0.0, 1.0]), events=top, rtol=1e-10)
     assert run.events.time == pytest.approx([0.1], abs=1e-10)
     assert run.events.states[0] == pytest.approx([0.05, 0.0], abs=1e-9)
     assert run.events.kind == ("event 0",)
     assert run.events.node.tolist() == [-1]
-    rising = Crossing("B", "y", of="velocity", direction="rising")
+    rising = Crossing("B", "y", of="velocity", sense="rising")
     assert len(simulate(drop(), 0.5, initial=np.array([0.0, 1.0]), events=rising).events) == 0
 
 
@@ -141,10 +141,10 @@ def test_events_are_stored(tmp_path):
 def test_bad_input():
     with pytest.raises(InputError, match="'touchdown' must be one of"):
         ContactEvents(stop="touchdown")
-    with pytest.raises(InputError, match="axis = 'z'"):
+    with pytest.raises(InputError, match="component = 'z'"):
         Crossing("B", "z")
-    with pytest.raises(InputError, match="direction = 'up'"):
-        Crossing("B", "x", direction="up")
+    with pytest.raises(InputError, match="sense = 'up'"):
+        Crossing("B", "x", sense="up")
     with pytest.raises(InputError, match="value = nan"):
         Crossing("B", "x", value=float("nan"))
     with pytest.raises(InputError, match="events: 'touch-down' must be"):

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fecontact.core.errors import InputError
-from fecontact.laws.base import PerNode, Positive, Range
+from fecontact.laws.base import PerNode, Positive, Bound
 from fecontact.laws.friction.base import MemorylessFriction
 from fecontact.laws.friction.stribeck import (
     ConstantFriction,
@@ -255,7 +255,7 @@ def test_ranges_in_annotations_hold_for_laws_of_ones_own():
     @dataclass(frozen=True)
     class Mine(MemorylessFriction):
         high: Positive = 1.0
-        small: Annotated[PerNode, Range("at most 2", lambda x: x <= 2.0)] = 1.0
+        small: Annotated[PerNode, Bound("at most 2", lambda x: x <= 2.0)] = 1.0
         free: PerNode = -1.0
 
     assert Mine((1.0, 2.0), 2).high == (1.0, 2.0)

@@ -161,7 +161,7 @@ def test_variation_that_reaches_zero_friction():
 
 
 def test_motions_of_the_drive():
-    shake = Sweep(1e-3, 1.0, 50.0, 10.0)
+    shake = SweptSine(1e-3, 1.0, 50.0, 10.0)
     drive = Drive(10.0, 20.0, motion_x=shake, amplitude_y=1e-4, angular_frequency=6.0)
     assert drive.motions == (shake, Harmonic(1e-4, 6.0))
     assert drive.frequency_hz == pytest.approx(6.0 / (2.0 * math.pi))

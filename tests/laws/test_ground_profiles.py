@@ -12,7 +12,7 @@ import pytest
 from fecontact.core.errors import InputError
 from fecontact.laws.ground.fourier_series import FourierSeries
 from fecontact.laws.ground.ground import Ground
-from fecontact.laws.ground.measured_profile import Trace
+from fecontact.laws.ground.measured_profile import MeasuredProfile
 from fecontact.laws.ground.profile import Flat, Profile, Sine
 from fecontact.laws.ground.random_roughness import RandomRoughness
 from fecontact.laws.signatures import ground_profile
@@ -26,8 +26,8 @@ PROFILES = {
     "flat": Flat(),
     "sine": Sine(1e-4, 2.5e-3, 0.7),
     "fourier": FourierSeries(2.5e-3, (1e-4, 0.0, -3e-5, 1e-5), (0.3, 0.0, 2.0, -1.0)),
-    "trace": Trace(TRACE_X, TRACE_Y),
-    "periodic trace": Trace(TRACE_X, CLOSED_Y, periodic=True, remove_mean=True, scale=2.0),
+    "trace": MeasuredProfile(TRACE_X, TRACE_Y),
+    "periodic trace": MeasuredProfile(TRACE_X, CLOSED_Y, periodic=True, remove_mean=True, scale=2.0),
     "random": RandomRoughness(1e-6, 0.8, 2e-3, 1e-4, 1e-2, seed=5),
 }
 
@@ -158,14 +158,14 @@ def test_extremes_of_a_known_sum():
 
 
 def test_trace_goes_through_its_points():
-    trace = Trace(TRACE_X, TRACE_Y, scale=3.0, abscissa_scale=0.5)
+    trace = MeasuredProfile(TRACE_X, TRACE_Y, scale=3.0, abscissa_scale=0.5)
     np.testing.assert_allclose(trace.height(0.5 * TRACE_X), 3.0 * TRACE_Y, rtol=0, atol=1e-19)
 
 
 def test_spline_of_a_sine_is_the_sine():
     x = np.linspace(0.0, 1.0, 101)
     y = np.sin(2.0 * np.pi * x)
-    trace = Trace(x, y, periodic=True)
+    trace = MeasuredProfile(x, y, periodic=True)
     xi = np.linspace(-3.0, 5.0, 997)
     k = 2.0 * np.pi
     # Errors of a cubic spline: 5/384 h^4 y'''', and h^2 / 12 of the curvature.
@@ -257,10 +257,10 @@ def test_traces_from_files(tmp_path, monkeypatch, content, x, y, encoding):
     (tmp_path / "trace.csv").write_bytes(content.encode(encoding))
     monkeypatch.chdir(tmp_path)
     for file in ("trace.csv", str(tmp_path / "trace.csv")):
-        trace = Trace(file=file)
-        assert trace == Trace(x, y)
+        trace = MeasuredProfile(file=file)
+        assert trace == MeasuredProfile(x, y)
         assert trace.file is None
-    assert replace(Trace(file="trace.csv", scale=2.0), scale=3.0) == Trace(x, y, scale=3.0)
+    assert replace(MeasuredProfile(file="trace.csv", scale=2.0), scale=3.0) == MeasuredProfile(x, y, scale=3.0)
 
 
 @pytest.mark.parametrize(("content", "message"), [
@@ -281,25 +281,25 @@ def test_bad_files(tmp_path, content, message):
     path = tmp_path / "bad.txt"
     path.write_text(content)
     with pytest.raises(InputError, match=message) as caught:
-        Trace(file=str(path))
-    assert str(caught.value).startswith(f"Trace: file = '{path}'")
+        MeasuredProfile(file=str(path))
+    assert str(caught.value).startswith(f"MeasuredProfile: file = '{path}'")
     assert "\n" not in str(caught.value)
 
 
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError, match=r"file = 'none\.csv' cannot be read: No such file"):
-        Trace(file="none.csv")
+        MeasuredProfile(file="none.csv")
     with pytest.raises(InputError, match="cannot be read"):
-        Trace(file=str(tmp_path))
+        MeasuredProfile(file=str(tmp_path))
     (tmp_path / "picture").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
     with pytest.raises(InputError, match="cannot be read: it is not a text file"):
-        Trace(file=str(tmp_path / "picture"))
+        MeasuredProfile(file=str(tmp_path / "picture"))
 
 
 def test_smallest_and_largest_traces_have_curves():
     for scale in (1e-60, 1e59):
         for periodic in (False, True):
-            trace = Trace((0, 1, 2, 4), (0, 1, 2, 0), periodic=periodic, scale=scale,
+            trace = MeasuredProfile((0, 1, 2, 4), (0, 1, 2, 0), periodic=periodic, scale=scale,
                           abscissa_scale=scale)
             assert np.isfinite(trace.parameters()).all()
             assert trace.height([scale]) == pytest.approx([scale], rel=1e-12)
@@ -316,20 +316,20 @@ def test_smallest_and_largest_traces_have_curves():
     (lambda: FourierSeries(1.0, "12"), "amplitudes = '12' must be a list of numbers"),
     (lambda: FourierSeries(1.0, (1.0, float("inf"))), r"amplitudes\[1\] = inf must be finite"),
     (lambda: FourierSeries(1.0, (1.0, 2.0), (0.0,)), "phases has 1 values for 2 amplitudes"),
-    (lambda: Trace((0, 1, 2), (0, 1)), "heights has 2 values for 3 abscissa"),
-    (lambda: Trace((0, 2, 1), (0, 1, 2)), r"Trace: abscissa\[2\] = 1 must be larger"),
-    (lambda: Trace((0, 1, 2), (0, float("nan"), 2)), r"heights\[1\] = nan must be finite; repair"),
-    (lambda: Trace((0, 1, 2), (0, 1, 2), file="a.csv"), "cannot stand beside abscissa and heigh"),
-    (lambda: Trace(), "abscissa has 0 values; at least 3"),
-    (lambda: Trace((0, 1, 2), (0, 1, 2), periodic=True), "begins with 0 and ends with 2; add"),
-    (lambda: Trace((0, 1, 2), (0, 1, 2), abscissa_scale=0.0), "Trace: abscissa_scale"),
-    (lambda: Trace((0, 1, 2), (0, 1, 2), abscissa_scale=1e-300),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1)), "heights has 2 values for 3 abscissa"),
+    (lambda: MeasuredProfile((0, 2, 1), (0, 1, 2)), r"MeasuredProfile: abscissa\[2\] = 1 must be larger"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, float("nan"), 2)), r"heights\[1\] = nan must be finite; repair"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), file="a.csv"), "cannot stand beside abscissa and heigh"),
+    (lambda: MeasuredProfile(), "abscissa has 0 values; at least 3"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic=True), "begins with 0 and ends with 2; add"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=0.0), "MeasuredProfile: abscissa_scale"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=1e-300),
      r"abscissa_scale = 1e-300 must be a number from 1e-60 to 1e\+60"),
-    (lambda: Trace((0, 1, 1 + 1e-15), (0, 1, 2), abscissa_scale=1e-59), "apart; their distances"),
-    (lambda: Trace((0, 1, 2), (0, 1, 2), abscissa_scale=1.7e308), "must be a number from 1e-60"),
-    (lambda: Trace((0, 1, 2), (0, 1, -20), scale=1e308), r"scale = 1e\+308 reaches -inf; its va"),
-    (lambda: Trace((0, 1, 2), (0, 1, 2), periodic="yes"), "periodic = 'yes' must be true or fal"),
-    (lambda: Trace(file=3), "file = 3 must be the name of a file"),
+    (lambda: MeasuredProfile((0, 1, 1 + 1e-15), (0, 1, 2), abscissa_scale=1e-59), "apart; their distances"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=1.7e308), "must be a number from 1e-60"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, -20), scale=1e308), r"scale = 1e\+308 reaches -inf; its va"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic="yes"), "periodic = 'yes' must be true or fal"),
+    (lambda: MeasuredProfile(file=3), "file = 3 must be the name of a file"),
     (lambda: RandomRoughness(-1.0, 0.5, 0.1, 0.01, 1.0), "RandomRoughness: rms_height"),
     (lambda: RandomRoughness(1.0, 1.5, 0.1, 0.01, 1.0), r"hurst_exponent = 1\.5 must be from 0"),
     (lambda: RandomRoughness(1.0, 0.5, 0.001, 0.01, 1.0), r"roll_off_wavelength = 0\.001 must"),

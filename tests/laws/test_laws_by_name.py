@@ -214,7 +214,7 @@ duration = 1.0
 normal = 10.0
 [[load.forces]]
 point = "C"
-direction = "x"
+component = "x"
 [load.forces.signal]
 law = "harmonic"
 amplitude = 2.0
@@ -392,7 +392,7 @@ def test_incomplete_own_laws_are_refused(old, new, message, tmp_path):
 def test_lists_per_node_are_counted_rightly():
     with pytest.raises(fc.FecontactError, match="stiffness has 3, roughness_height has 2"):
         fc.RoughSurface((1e6,) * 3, (1e-6,) * 2).node_count()
-    basis = Study.from_toml(HEAD).basis()
+    basis = Study.from_toml(HEAD).modal_basis()
     with pytest.raises(fc.FecontactError, match="3 values for 5 contact nodes"):
         fc.ContactSystem(basis, normal=fc.RoughSurface((1e6,) * 3, 1e-6),
                          friction=fc.ExponentialFriction())

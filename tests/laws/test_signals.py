@@ -18,7 +18,7 @@ from fecontact.laws.signals.harmonic import (
     Pulse,
     Signal,
     Step,
-    Sweep,
+    SweptSine,
     Tabulated,
 )
 from fecontact.laws.signatures import signal
@@ -32,9 +32,9 @@ SIGNALS = {
     "constant": Constant(-3.0),
     "harmonic": Harmonic(0.5e-3, 13.8, 0.4),
     "harmonics": Harmonics((1.0, -0.5, 0.2), (3.0, 7.0, 0.0), (0.1, 0.2, 0.3)),
-    "linear sweep": Sweep(2.0, 1.0, 20.0, 1.5),
-    "falling sweep": Sweep(2.0, 20.0, 0.0, 1.5),
-    "logarithmic sweep": Sweep(2.0, 1.0, 20.0, 1.5, "logarithmic"),
+    "linear sweep": SweptSine(2.0, 1.0, 20.0, 1.5),
+    "falling sweep": SweptSine(2.0, 20.0, 0.0, 1.5),
+    "logarithmic sweep": SweptSine(2.0, 1.0, 20.0, 1.5, "logarithmic"),
     "half-sine": Pulse("half-sine", 5.0, 0.4, 0.1),
     "haversine": Pulse("haversine", -5.0, 0.4, 0.1),
     "triangle": Pulse("triangle", 5.0, 0.4, 0.1),
@@ -155,7 +155,7 @@ def test_frequency_of_a_sweep():
     # Zero crossings of the signal itself: (t - 0) f_0 + (f_1 - f_0) t^2 / (2 T) = k / 2.
     crossing = (-1.0 + math.sqrt(1.0 + 4.0 * 19.0 / 3.0 * 6.5)) / (2.0 * 19.0 / 3.0)
     assert linear.history(crossing)[0, 0] == pytest.approx(0.0, abs=1e-13)
-    still = Sweep(1.0, 5.0, 5.0, 2.0, "logarithmic").history(np.linspace(0.0, 3.0, 31))
+    still = SweptSine(1.0, 5.0, 5.0, 2.0, "logarithmic").history(np.linspace(0.0, 3.0, 31))
     np.testing.assert_allclose(
         still, Harmonic(1.0, 10.0 * math.pi).history(np.linspace(0.0, 3.0, 31)), atol=1e-12)
 
@@ -321,10 +321,10 @@ def test_signal_of_ones_own():
     (lambda: Harmonics((1.0, 2.0), (1.0,)), "angular_frequencies has 1 values for 2 amplitudes"),
     (lambda: Harmonics((1.0,), (1.0,), (1.0, 2.0)), "phases has 2 values for 1 amplitudes"),
     (lambda: Harmonics((1.0,), (-1.0,)), r"angular_frequencies\[0\] = -1\.0 must"),
-    (lambda: Sweep(1.0, -1.0, 2.0, 1.0), r"Sweep: start_frequency_hz = -1\.0"),
-    (lambda: Sweep(1.0, 0.0, 2.0, 1.0, "logarithmic"), r"Sweep: start_frequency_hz = 0\.0"),
-    (lambda: Sweep(1.0, 1.0, 2.0, 0.0), r"Sweep: duration = 0\.0"),
-    (lambda: Sweep(1.0, 1.0, 2.0, 1.0, "log"), "kind = 'log' must be one of 'linear', 'logari"),
+    (lambda: SweptSine(1.0, -1.0, 2.0, 1.0), r"SweptSine: start_frequency_hz = -1\.0"),
+    (lambda: SweptSine(1.0, 0.0, 2.0, 1.0, "logarithmic"), r"SweptSine: start_frequency_hz = 0\.0"),
+    (lambda: SweptSine(1.0, 1.0, 2.0, 0.0), r"SweptSine: duration = 0\.0"),
+    (lambda: SweptSine(1.0, 1.0, 2.0, 1.0, "log"), "kind = 'log' must be one of 'linear', 'logari"),
     (lambda: Pulse("sine", 1.0, 1.0), "Pulse: kind = 'sine' must be one of 'half-sine', 'haver"),
     (lambda: Pulse("triangle", float("inf"), 1.0), "Pulse: amplitude = inf"),
     (lambda: Pulse("triangle", 1.0, -1.0), r"Pulse: duration = -1\.0"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
-from fecontact.analysis.frequency_response import frequency_response
+from fecontact.analysis.receptance import receptance
 from fecontact.cli import execute, plot_kinds
 from fecontact.core.errors import InputError
 from fecontact.integrate.simulate import simulate
@@ -80,9 +80,9 @@ def test_poincare_section_takes_one_point_a_period(trajectory):
 def test_response_figure_names_its_curves(trajectory):
     body = trajectory.system.basis
     f = np.linspace(10.0, 3000.0, 50)
-    one = frequency_response(body, f, [("B", "x")])
-    two = frequency_response(body, f, [("B", "x")], [("C", "y"), (2, "y")])
-    figure = analysis.plot_response([one, two], ["drive", "other"])
+    one = receptance(body, f, [("B", "x")])
+    two = receptance(body, f, [("B", "x")], [("C", "y"), (2, "y")])
+    figure = analysis.plot_receptance([one, two], ["drive", "other"])
     names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert names == ["drive", "other, C y by B x", "other, contact node 2 y by B x"]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), np.abs(one.values[:, 0, 0]))
@@ -115,9 +115,9 @@ def test_a_pendulum_is_drawn_across_the_ground(tmp_path):
         plot_kinds.redraw(trajectory, kind, path=tmp_path / f"{kind}.svg")
     assert b"velocity y" in (tmp_path / "phase.svg").read_bytes()
     for kind in ("spectrum", "spectrogram"):
-        plot_kinds.redraw(trajectory, kind, plot_kinds.Choice("total_friction_force"))
+        plot_kinds.redraw(trajectory, kind, plot_kinds.PlotRequest("total_friction_force"))
     with pytest.raises(InputError, match="B x does not move by a force at B x"):
-        plot_kinds.redraw(trajectory, "receptance", plot_kinds.Choice(axis="x"))
+        plot_kinds.redraw(trajectory, "receptance", plot_kinds.PlotRequest(component="x"))
 
 
 def test_points_of_a_command_line():

@@ -17,7 +17,7 @@ from fecontact import (
     write_basis,
     write_branches,
 )
-from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.core.errors import InputError
 from fecontact.core.stored import DamagedError, npz_arrays
@@ -177,7 +177,7 @@ def branches():
                                {"stable": True, "observed": 0.2 * k},
                                "fold" if k == 1 else None,
                                {"coefficient": 3.0} if k == 1 else {}) for k in range(4))
-    return {"main": Branch("ground.speed", points, Status.BOUND, "", {"nodes": 4})}
+    return {"main": Branch("ground.speed", points, BranchStatus.BOUND, "", {"nodes": 4})}
 
 
 @pytest.mark.parametrize("change", [

@@ -59,7 +59,7 @@ def test_xarray_has_named_dimensions(trajectory, tmp_path):
     path = export.export_netcdf(trajectory, tmp_path / "run.nc")
     with xarray.open_dataset(path, engine="scipy") as stored:
         for dataset in (to_xarray(trajectory), stored):
-            x = dataset.displacement.sel(point="B", axis="x")
+            x = dataset.displacement.sel(point="B", component="x")
             np.testing.assert_allclose(x, trajectory.displacement("B")[:, 0], atol=1e-20)
             assert dataset.friction_force.dims == ("time", "node")
             np.testing.assert_array_equal(dataset.friction_force, trajectory.friction_force)

@@ -17,13 +17,13 @@ from fecontact.output.render import offscreen as probe
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.movie import picture, render
-from fecontact.output.render.overlay import Furniture
+from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.scene import NODE_COLOURS, Scene, needed_height
 
 SMALL = (480, 270)
 
-rendering = pytest.mark.skipif(probe.rendering_works() is not None,
-                               reason=str(probe.rendering_works()))
+rendering = pytest.mark.skipif(probe.can_render() is not None,
+                               reason=str(probe.can_render()))
 
 
 def motion_of(trajectory, frames=50, **options):
@@ -95,7 +95,7 @@ def test_ground_travels_at_its_true_speed_and_its_waves_are_scaled():
 
 def test_flat_bodies_leave_room_for_a_chart_of_the_forces_with_a_cursor():
     motion = motion_of(run(times=21))
-    furniture = Furniture(motion, 960, 540)
+    furniture = Overlay(motion, 960, 540)
     assert furniture.chart_height >= 110
     assert furniture.scene_height >= needed_height(motion) * 960
     chart = ForceChart(motion, 960, furniture.chart_height, 10.5)
@@ -109,10 +109,10 @@ def test_flat_bodies_leave_room_for_a_chart_of_the_forces_with_a_cursor():
     assert np.diff(cursors) == pytest.approx((cursors[-1] - cursors[0]) / 20, abs=1.0)
     assert cursors[-1] - cursors[0] > 0.85 * 960
     # A tall picture of the same body has more room, one of a tall body none.
-    assert Furniture(motion, 480, 640).chart_height > 0
+    assert Overlay(motion, 480, 640).chart_height > 0
     tall = motion_of(still(np.zeros((3, 5))))
     object.__setattr__(tall, "box", (0.0, 0.1, 0.0, 0.1))
-    assert Furniture(tall, 960, 540).chart_height == 0
+    assert Overlay(tall, 960, 540).chart_height == 0
 
 
 def test_without_friction_nodes_are_open_or_in_contact():
@@ -125,7 +125,7 @@ def test_without_friction_nodes_are_open_or_in_contact():
     motion = motion_of(smooth)
     assert motion.state_names == ("open", "contact")
     assert motion.states.tolist() == [[0] * 5, [1] * 5, [1] * 5]
-    footer = Furniture(motion, 960, 540)._footer
+    footer = Overlay(motion, 960, 540)._footer
     assert close_to(footer, rgb(STATE_COLOURS["contact"])).any()
     assert not close_to(footer, rgb(STATE_COLOURS["stick"])).any()
     assert motion_of(trajectory).state_names == ("open", "stick", "slip")
@@ -134,7 +134,7 @@ def test_without_friction_nodes_are_open_or_in_contact():
 def test_strips_and_scene_fill_the_picture_and_say_scale_and_time():
     for size in ((960, 540), (1280, 720), (480, 640)):
         motion = motion_of(run(times=5))
-        furniture = Furniture(motion, *size, "A title " * 30, 40.0)
+        furniture = Overlay(motion, *size, "A title " * 30, 40.0)
         scene = np.full((furniture.scene_height, size[0], 3), 7, dtype=np.uint8)
         image = furniture.around(scene, 3)
         assert image.shape == (size[1], size[0], 3)

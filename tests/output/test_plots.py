@@ -55,7 +55,7 @@ def test_phase_plane_is_velocity_over_displacement_with_the_ground():
     np.testing.assert_allclose(plane.lines[0].get_ydata(), 1e3 * trajectory.velocity(2)[:, 0])
     assert list(plane.lines[2].get_ydata()) == [20.0, 20.0]  # the belt runs at 0.02 m/s
     assert len(plot_phase(trajectory, "B", "y").axes[0].lines) == 2
-    with pytest.raises(InputError, match="axis = 'z'"):
+    with pytest.raises(InputError, match="component = 'z'"):
         plot_phase(trajectory, "B", "z")
     with pytest.raises(InputError, match="no point 'Z'"):
         plot_phase(trajectory, "Z")
@@ -293,7 +293,7 @@ def test_every_plot_returns_its_figure_and_takes_a_path_by_name():
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_a_figure_saved_later_is_the_one_in_the_file(tmp_path, monkeypatch, suffix):
-    """Settings of the user between drawing and saving do not change its style."""
+    """ContinuationOptions of the user between drawing and saving do not change its style."""
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     first, second = tmp_path / f"first.{suffix}", tmp_path / f"second.{suffix}"
     with rc_context({"svg.hashsalt": "one"}):

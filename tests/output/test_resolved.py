@@ -137,7 +137,7 @@ def test_files_read_back_are_drawn_alike(tmp_path, capsys):
                                   resolved(run).trajectory.normal_force)
     assert execute(["plot", str(case), "history", "-o", str(tmp_path / "history.svg")]) == 0
     assert b"straight lines" not in (tmp_path / "history.svg").read_bytes()
-    assert execute(["plot", str(case), "phase", "--axis", "y", "--t-start", "0.01"]) == 0
+    assert execute(["plot", str(case), "phase", "--component", "y", "--t-start", "0.01"]) == 0
 
 
 def test_pictures_say_where_they_are_too_coarse(tmp_path):
@@ -147,7 +147,7 @@ def test_pictures_say_where_they_are_too_coarse(tmp_path):
     assert "not computed by a run" in found.note
     figure = plot_phase(by_hand, 2)
     assert [" ".join(text.get_text().split()) for text in figure.texts] == [found.note]
-    assert not plot_phase(hit(7), axis="y").texts
+    assert not plot_phase(hit(7), component="y").texts
 
 
 def test_long_runs_and_wrong_outputs_stay_as_they_are():

@@ -63,10 +63,10 @@ def test_substitutions_solve_the_factorised_system():
     factors = SymmetricFactors(system.factors)
     rng = np.random.default_rng(2)
     rows = sp.random_array((130, system.stiffness.shape[0]), density=0.01, rng=rng, format="csr")
-    places, half = factors.half_solved(rows)
+    places, half = factors.forward_substitute(rows)
     exact = np.linalg.solve(system.stiffness.toarray(), rows.T.toarray())
     assert np.abs(half.T @ half - rows @ exact).max() < 1e-9 * np.abs(rows @ exact).max()
-    assert np.abs(factors.completed(places, half) - exact).max() < 1e-9 * np.abs(exact).max()
+    assert np.abs(factors.back_substitute(places, half) - exact).max() < 1e-9 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("fixed", SUPPORTS)

@@ -238,7 +238,7 @@ load.normal "a"
 load.normal 1e400
 load.forces 3
 load.forces [{}]
-load.forces [{point="Q",signal={law="constant",value=1},axis="x"}] forces
+load.forces [{point="Q",signal={law="constant",value=1},component="x"}] forces
 load.forces [3]
 load.forces.0.signal 3
 simulation.t_end 0
@@ -300,8 +300,8 @@ branch.kind "x"
 branch.switch ["x"]
 branch.intervals 1000000000000
 branch.segments 0
-branch.brute_force 1
-branch.brute_force 1000000000000
+branch.poincare_scan 1
+branch.poincare_scan 1000000000000
 branch.start nan
 sweep.method "x"
 sweep.samples 0
@@ -463,7 +463,7 @@ plot run.vtkhdf history --point 99 | 99
 plot run.vtkhdf history --point 1,2,3 | 1,2,3
 plot run.vtkhdf history --point nan,nan | nan
 plot run.vtkhdf history --point 9,9 | 9
-plot run.vtkhdf history --axis z | axis
+plot run.vtkhdf history --component z | axis
 plot run.vtkhdf history --t-start nan | t_start
 plot run.vtkhdf history --t-end nan | t_end
 plot run.vtkhdf history --t-start 7 | 7

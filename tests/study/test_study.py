@@ -84,7 +84,7 @@ def test_study_is_the_system_written_by_hand(tiny):
     assert system.parameters() == by_hand.parameters()
     state = np.random.default_rng(1).normal(scale=1e-6, size=10)
     np.testing.assert_array_equal(system.rhs(0.3, state), by_hand.rhs(0.3, state))
-    assert basis.extra == tiny.basis().extra == ("tip", "face")
+    assert basis.extra == tiny.modal_basis().extra == ("tip", "face")
 
 
 def test_run_covers_the_times_asked_for(tiny):
@@ -117,14 +117,14 @@ def test_templates_have_no_key_at_a_wrong_place_and_can_be_started():
     for shape, kind in shapes.items():
         study = Study.from_toml(template(shape))
         assert isinstance(study.geometry, kind)
-        basis = study.basis()
+        basis = study.modal_basis()
         assert basis.rigid_modes == {"beam": 3, "pendulum": 1, "block": 3}[shape]
         assert study.t_end > 0.0
 
 
 def test_pendulum_template_is_the_impact_oscillator():
     """Mass 0.092 kg at the stop, first bending mode near 230 Hz with 0.6 times its amplitude."""
-    basis = Study.from_toml(template("pendulum")).basis()
+    basis = Study.from_toml(template("pendulum")).modal_basis()
     rigid, bending = basis.T[2, 1, :2]
     assert 1.0 / rigid**2 == pytest.approx(0.092, rel=0.02)
     assert basis.frequencies_hz[1] == pytest.approx(230.0, rel=0.03)
@@ -138,10 +138,10 @@ def test_changes_by_dotted_names(tiny):
         "basis.C.radius": 0.02})
     assert changed.ground.speed == 2.0
     assert changed.gap == (0.0, 1e-6, 0.0, 1e-6)
-    assert changed.basis_settings.damping == Rayleigh(mass_factor=1.0)
-    assert changed.basis_settings.C.radius == 0.02
+    assert changed.basis.damping == Rayleigh(mass_factor=1.0)
+    assert changed.basis.C.radius == 0.02
     assert changed.simulation.initial == RigidStart(velocity=(0.0, 1.0, 0.0))
-    assert changed.body_settings.fixed == {"left": "x"}
+    assert changed.body.fixed == {"left": "x"}
     assert changed.friction.static_coefficient == (0.1, 0.2, 0.3, 0.4)
     assert tiny.ground.speed == 1.0
     assert changed.load == tiny.load
@@ -165,15 +165,15 @@ def test_solvers_have_one_name_in_files_and_in_python(tiny):
 
 
 def test_basis_keys_reach_the_basis(tiny):
-    plain = tiny.basis()
-    damped = tiny.with_(**{"basis.dashpots": {"B": [2.0, 0.0], "3": [0.0, 5.0]}}).basis()
+    plain = tiny.modal_basis()
+    damped = tiny.with_(**{"basis.dashpots": {"B": [2.0, 0.0], "3": [0.0, 5.0]}}).modal_basis()
     rows = plain.T[0, 0], plain.T[2 + 3, 1]
     np.testing.assert_allclose(
         damped.damping, plain.damping + 2.0 * np.outer(rows[0], rows[0])
         + 5.0 * np.outer(rows[1], rows[1]), rtol=1e-12, atol=1e-12)
-    assert tiny.with_(**{"basis.select": [0, 1, 3]}).basis().modes == 3
-    assert tiny.with_(**{"basis.reduction": "residual", "basis.tolerance": 0.0}).basis().modes > 5
-    lossy = tiny.with_(**{"basis.damping": {"loss_factor": 0.04}}).basis()
+    assert tiny.with_(**{"basis.select": [0, 1, 3]}).modal_basis().modes == 3
+    assert tiny.with_(**{"basis.reduction": "residual", "basis.tolerance": 0.0}).modal_basis().modes > 5
+    lossy = tiny.with_(**{"basis.damping": {"loss_factor": 0.04}}).modal_basis()
     np.testing.assert_allclose(lossy.damping_ratios[3:], 0.02)
 
 
@@ -190,9 +190,9 @@ def test_another_shape_when_nothing_was_said_of_the_first():
 
 
 def test_material_values_replace_those_of_the_named_one(tiny):
-    material = tiny.with_(**{"body.density": 3000}).body_settings.elastic_material
+    material = tiny.with_(**{"body.density": 3000}).body.elastic_material
     assert (material.density, material.youngs_modulus) == (3000.0, 7.0e10)
-    assert Study.from_toml('geometry = { shape = "beam" }').body().material == Material()
+    assert Study.from_toml('geometry = { shape = "beam" }').elastic_body().material == Material()
 
 
 def test_mesh_file_is_found_beside_the_study(tmp_path):
@@ -214,7 +214,7 @@ def test_mesh_file_is_found_beside_the_study(tmp_path):
     assert study.mesh().area == pytest.approx(1e-3)
     assert {"shoe", "half"} <= set(study.mesh().boundaries)
     assert {"tip", "corner"} <= set(study.mesh().points)
-    assert study.basis().modes == 4
+    assert study.modal_basis().modes == 4
     assert study.mesh() is study.mesh()
     assert Study.from_toml(study.to_toml(), path) == study
     assert study.results == tmp_path / "results"

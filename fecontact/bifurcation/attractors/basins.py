@@ -24,7 +24,7 @@ class Axis:
     ----------
     point : str or int
         'B', 'C' or a further named point; a contact node by its number from 0.
-    axis : 'x', 'y' or 'phi'
+    component : 'x', 'y' or 'phi'
         Along the ground, away from it, counter-clockwise.
     of : 'displacement' or 'velocity'
         Which of them [m], [rad], [m/s], [rad/s].
@@ -36,18 +36,18 @@ class Axis:
     """
 
     point: str | int
-    axis: Literal["x", "y", "phi"]
+    component: Literal["x", "y", "phi"]
     of: Literal["displacement", "velocity"] = "displacement"
 
     def __post_init__(self) -> None:
-        for name, names in (("axis", ("x", "y", "phi")), ("of", ("displacement", "velocity"))):
+        for name, names in (("component", ("x", "y", "phi")), ("of", ("displacement", "velocity"))):
             value = getattr(self, name)
             if value not in names:
                 raise InputError(f"Axis: {name} = {value!r} must be one of {choices(names)}.")
 
     def row(self, system: ContactSystem) -> Array:
         """The quantity as a row (size,) that acts on states."""
-        return Crossing(self.point, self.axis, of=self.of).row(system)[1:]
+        return Crossing(self.point, self.component, of=self.of).row(system)[1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +187,7 @@ def _values(name: str, given: Any) -> Array:
         axis, values = given
         found = np.atleast_1d(np.array(values, dtype=float))
     except (TypeError, ValueError):
-        axis, found = None, np.empty(0)
+        component, found = None, np.empty(0)
     if not (isinstance(axis, Axis) and found.ndim == 1 and len(found)
             and np.isfinite(found).all()):
         raise InputError(f"{name} = {given!r} must be an Axis and a list of finite values: "

@@ -22,7 +22,7 @@ _AXES = ("x", "y", "phi")
 
 
 @dataclass(frozen=True, eq=False)
-class BruteForce:
+class PoincareScan:
     """States once per period of the excitation over a parameter.
 
     Attributes
@@ -45,21 +45,21 @@ class BruteForce:
     down: Array
 
     def observed(
-        self, point: str | int = "B", axis: Literal["x", "y", "phi"] = "y",
+        self, point: str | int = "B", component: Literal["x", "y", "phi"] = "y",
         of: Literal["displacement", "velocity"] = "displacement",
     ) -> tuple[Array, Array]:
         """A displacement [m], [rad] or velocity of a point, (V, K) up and down."""
-        if axis not in _AXES or of not in ("displacement", "velocity"):
+        if component not in _AXES or of not in ("displacement", "velocity"):
             raise InputError(f"axis = {axis!r} must be one of {choices(_AXES)}, of = {of!r} "
                              f"'displacement' or 'velocity'.")
         basis = self.system.basis
-        row = basis.T[basis.point_index(point), _AXES.index(axis)]
+        row = basis.T[basis.point_index(point), _AXES.index(component)]
         first = 0 if of == "displacement" else basis.modes
         columns = slice(first, first + basis.modes)
         return self.up[..., columns] @ row, self.down[..., columns] @ row
 
 
-def brute_force(
+def poincare_scan(
     system: ContactSystem,
     parameter: Change,
     values: ArrayLike,
@@ -72,7 +72,7 @@ def brute_force(
     rtol: float = 1e-5,
     workers: int | None = None,
     progress: Callable[[int], None] | None = None,
-) -> BruteForce:
+) -> PoincareScan:
     """Move a parameter up and down in small steps and keep states once per period.
 
     The values are cut into chains that run side by side on all cores; within a chain each value
@@ -104,7 +104,7 @@ def brute_force(
     InputError
         For values that do not ascend, or as :func:`fecontact.strobe`.
     """
-    require_kind("brute_force", ContactSystem, system=system)
+    require_kind("poincare_scan", ContactSystem, system=system)
     try:
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):
@@ -118,7 +118,7 @@ def brute_force(
         name, made = parameter, [system.with_(**{parameter: float(p)}) for p in points]
     else:
         if not callable(parameter):
-            raise InputError(f"brute_force: parameter must be a text or a function, not "
+            raise InputError(f"poincare_scan: parameter must be a text or a function, not "
                              f"{type(parameter).__name__}.")
         name = getattr(parameter, "__name__", "parameter")
         made = [parameter(system, float(p)) for p in points]
@@ -138,4 +138,4 @@ def brute_force(
     states = np.empty((2, count, keep, system.size))
     for way, part in enumerate(both):
         states[way, part] = found.states[way * len(order) : (way + 1) * len(order)]
-    return BruteForce(system, name, points, states[0], states[1] if down else states[1, :0])
+    return PoincareScan(system, name, points, states[0], states[1] if down else states[1, :0])

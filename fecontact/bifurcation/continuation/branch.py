@@ -18,7 +18,7 @@ from fecontact.bifurcation.continuation.points import (
     PeriodDoublingPoint,
     on_branch,
 )
-from fecontact.bifurcation.continuation.problem import Problem, Settings, Status
+from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions, BranchStatus
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
@@ -28,7 +28,7 @@ from fecontact.core.units import Summarised, listed, span
 # Relative distance from a value of the parameter that counts as there.
 _MET = 1e-9
 
-__all__ = ["Branch", "Status"]
+__all__ = ["Branch", "BranchStatus"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,7 +41,7 @@ class Branch(Summarised):
         Name of the parameter.
     points : tuple of BranchPoint
         All points, special ones in their places.
-    status : Status
+    status : BranchStatus
         How its forward end was reached.
     message : str
         What the last failed step complained of; empty without.
@@ -51,7 +51,7 @@ class Branch(Summarised):
 
     name: str
     points: tuple[BranchPoint, ...]
-    status: Status = Status.POINTS
+    status: BranchStatus = BranchStatus.POINTS
     message: str = ""
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
@@ -152,7 +152,7 @@ class Branch(Summarised):
             return start
         problem, u, tangent = self._restored(field, start)
         bounds = (-np.inf, float(value)) if start.parameter < value else (float(value), np.inf)
-        *_, found = continuation(problem, u, Settings(bounds=bounds, locate=False),
+        *_, found = continuation(problem, u, ContinuationOptions(bounds=bounds, locate=False),
                                  tangent=sign * tangent)
         if abs(found.parameter - value) > _MET * max(abs(value), abs(value - start.parameter)):
             raise AnalysisError(f"The solution at {self.name} = {value:.6g} was not found from "

@@ -10,8 +10,8 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, Settings
-from fecontact.bifurcation.continuation.special_points import located_between
+from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions
+from fecontact.bifurcation.continuation.special_points import locate_between
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 
@@ -22,8 +22,8 @@ _CHANGE = 0.4
 _TRIES = 60
 
 
-def rounded(
-    problem: Problem, before: Solution, here: Solution, step: float, settings: Settings
+def follow_hairpin(
+    problem: Problem, before: Solution, here: Solution, step: float, options: ContinuationOptions
 ) -> list[tuple[Solution, list[BranchPoint]]] | None:
     """Points round a sharp turn ahead, up to where it is as far behind, or to a bound.
 
@@ -37,7 +37,7 @@ def rounded(
         The last two points; the plane of the turn is that of their tangents.
     step : float
         Length of the first step, and of the one after which the turn lies behind.
-    settings : Settings
+    options : ContinuationOptions
         How.
 
     Returns
@@ -56,12 +56,12 @@ def rounded(
     at, slope, length = here, first, step / first
     found: list[tuple[Solution, list[BranchPoint]]] = []
     for _ in range(_TRIES):
-        there = _next(problem, at, row, length, settings)
+        there = _next(problem, at, row, length, options)
         change = np.inf if there is None else float(along @ there.tangent / (row @ there.tangent))
         change = abs(change - slope) / abs(first)
         reached = None
         if there is not None and change <= _CHANGE:
-            reached = located_between(problem, at, there, settings, row)
+            reached = locate_between(problem, at, there, options, row)
         if reached is None:
             length *= 0.5
             if length * first < 0.05 * step:
@@ -72,8 +72,8 @@ def rounded(
         if any(point.kind is None for point in special):
             return found
         turn = float(weights * at.tangent @ there.tangent)
-        turned = float(weights * here.tangent @ there.tangent) < np.cos(settings.largest_turn)
-        if (turned and turn > np.cos(settings.largest_turn)
+        turned = float(weights * here.tangent @ there.tangent) < np.cos(options.largest_turn)
+        if (turned and turn > np.cos(options.largest_turn)
                 and norm(problem, there.u - at.u) >= step):
             return found
         at, slope = there, float(along @ there.tangent / (row @ there.tangent))
@@ -82,12 +82,12 @@ def rounded(
 
 
 def _next(
-    problem: Problem, at: Solution, row: Array, length: float, settings: Settings
+    problem: Problem, at: Solution, row: Array, length: float, options: ContinuationOptions
 ) -> Solution | None:
     """The solution at a distance along the row; None where there is none to be found."""
     guess = at.u + length / float(row @ at.tangent) * at.tangent
     try:
-        found = corrected(problem, guess, row, _TOLERANCE, 2 * settings.iterations)
-        return None if found is None else finished(problem, *found, row, settings)
+        found = corrected(problem, guess, row, _TOLERANCE, 2 * options.iterations)
+        return None if found is None else finished(problem, *found, row, options)
     except FecontactError:
         return None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from fecontact.bifurcation.continuation.problem import Linearisation, Problem, Settings
+from fecontact.bifurcation.continuation.problem import Linearisation, Problem, ContinuationOptions
 from fecontact.core.compiled import borrowed, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
@@ -140,7 +140,7 @@ def _iterated(
 
 def finished(
     problem: Problem, u: Array, linearisation: Linearisation, iterations: int, row: Array,
-    settings: Settings,
+    options: ContinuationOptions,
 ) -> Solution:
     """Tangent, stored values and test functions at a converged u.
 
@@ -159,18 +159,18 @@ def finished(
     tangent = tangent / size
     values = problem.point(u, linearisation, tangent)
     return Solution(u, linearisation, tangent, iterations, values,
-                     _tests(problem, u, linearisation, tangent, values, settings))
+                     _tests(problem, u, linearisation, tangent, values, options))
 
 
 def _tests(
     problem: Problem, u: Array, linearisation: Linearisation, tangent: Array,
-    values: Mapping[str, Any], settings: Settings,
+    values: Mapping[str, Any], options: ContinuationOptions,
 ) -> dict[str, float]:
     found: dict[str, float] = {}
-    if settings.locate:
+    if options.locate:
         found |= {"fold": float(tangent[-1]), **problem.tests(u, linearisation, tangent)}
     known = {**values, "parameter": float(u[-1])}
-    return found | {name: float(event(known)) for name, event in settings.events.items()}
+    return found | {name: float(event(known)) for name, event in options.events.items()}
 
 
 def norm(problem: Problem, vector: Array) -> float:

@@ -15,7 +15,7 @@ from fecontact.core.types import Array
 _PARALLEL = 0.9  # cosine between directions that count as the same
 
 
-class Status(Enum):
+class BranchStatus(Enum):
     """How a branch ended; the value is the sentence for people."""
 
     POINTS = "The branch has as many points as were asked for."
@@ -140,7 +140,7 @@ class Problem(Protocol):
 
 
 @dataclass(frozen=True)
-class Settings:
+class ContinuationOptions:
     """How a branch is followed.
 
     Lengths are those of the problem's inner product; the problems of this package scale it so
@@ -186,12 +186,12 @@ class Settings:
     progress: Callable[[int], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        require_positive("Settings", step=self.step, smallest_step=self.smallest_step,
+        require_positive("ContinuationOptions", step=self.step, smallest_step=self.smallest_step,
                          largest_step=self.largest_step, tolerance=self.tolerance,
                          points=self.points, iterations=self.iterations,
                          largest_turn=self.largest_turn)
         if not self.smallest_step <= self.step <= self.largest_step:
-            raise InputError(f"Settings: step = {self.step:g} must lie between smallest_step = "
+            raise InputError(f"ContinuationOptions: step = {self.step:g} must lie between smallest_step = "
                              f"{self.smallest_step:g} and largest_step = {self.largest_step:g}.")
         try:
             low, high = self.bounds
@@ -199,14 +199,14 @@ class Settings:
         except (TypeError, ValueError):
             fine = False
         if not fine:
-            raise InputError(f"Settings: bounds = {self.bounds!r} must be two values of the "
+            raise InputError(f"ContinuationOptions: bounds = {self.bounds!r} must be two values of the "
                              f"parameter, the smaller one first.")
 
 
-def settings_of(settings: Settings | None, bounds: tuple[float, float] | None) -> Settings:
-    """The settings, with other bounds if these are given."""
-    require_kind("A branch", (Settings, type(None)), settings=settings)
-    chosen = settings or Settings()
+def options_of(options: ContinuationOptions | None, bounds: tuple[float, float] | None) -> ContinuationOptions:
+    """The options, with other bounds if these are given."""
+    require_kind("A branch", (ContinuationOptions, type(None)), options=options)
+    chosen = options or ContinuationOptions()
     return chosen if bounds is None else replace(chosen, bounds=bounds)
 
 
@@ -221,10 +221,10 @@ def sizes_of(given: ArrayLike | None, found: Array) -> tuple[Array, Array | None
     return sizes, None
 
 
-def width_of(given: float | None, settings: Settings, value: float) -> float:
+def width_of(given: float | None, options: ContinuationOptions, value: float) -> float:
     """Width of the diagram in the parameter, by default that of the bounds."""
     if given is not None:
         require_positive("A branch", width=given)
         return given
-    span = settings.bounds[1] - settings.bounds[0]
+    span = options.bounds[1] - options.bounds[0]
     return float(span) if np.isfinite(span) else abs(float(value)) or 1.0

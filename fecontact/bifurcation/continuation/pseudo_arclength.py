@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED
-from fecontact.bifurcation.continuation.hairpin import rounded
+from fecontact.bifurcation.continuation.hairpin import follow_hairpin
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Linearisation, Problem, Settings, Status
-from fecontact.bifurcation.continuation.special_points import between, located_between
+from fecontact.bifurcation.continuation.problem import Linearisation, Problem, ContinuationOptions, BranchStatus
+from fecontact.bifurcation.continuation.special_points import hermite, locate_between
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array
 
@@ -35,21 +35,21 @@ _AGAIN = 1e-5
 # Solutions whose distance is this many times what Newton's method leaves are the same.
 _ALIKE = 10.0
 
-__all__ = ["End", "Linearisation", "Problem", "Settings", "continuation", "start_of"]
+__all__ = ["End", "Linearisation", "Problem", "ContinuationOptions", "continuation", "start_of"]
 
 
 @dataclass(frozen=True)
 class End:
     """How a continuation ended, and what the last failed step complained of."""
 
-    status: Status
+    status: BranchStatus
     message: str = ""
 
 
 def continuation(
     problem: Problem,
     u: Array,
-    settings: Settings,
+    options: ContinuationOptions,
     *,
     tangent: Array | None = None,
     direction: float = 1.0,
@@ -65,7 +65,7 @@ def continuation(
         What is continued.
     u : (N + 1,) array
         Start; corrected at right angles to ``tangent``, or at the given parameter.
-    settings : Settings
+    options : ContinuationOptions
         How.
     tangent : (N + 1,) array, optional
         Direction of the first step.
@@ -77,48 +77,48 @@ def continuation(
     FecontactError
         If there is no solution near the start.
     """
-    u = np.append(u[:-1], inside(float(u[-1]), settings))
-    start = start_of(problem, u, settings, tangent, direction)
+    u = np.append(u[:-1], inside(float(u[-1]), options))
+    start = start_of(problem, u, options, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
-    if _leaves(start, settings):
-        return End(Status.BOUND)
-    here, step, count, message, origin = start, settings.step, 1, "", problem
-    stops = {settings.stop_at} if isinstance(settings.stop_at, str) else set(settings.stop_at)
+    if _leaves(start, options):
+        return End(BranchStatus.BOUND)
+    here, step, count, message, origin = start, options.step, 1, "", problem
+    stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
     before: Solution | None = None
     halved, whole = 0, step
-    while count < settings.points:
-        step = min(step, _BEYOND * _room(here, settings))
+    while count < options.points:
+        step = min(step, _BEYOND * _room(here, options))
         try:
-            reached = _step(problem, here, step, settings)
+            reached = _step(problem, here, step, options)
         except FecontactError as error:
             reached, message = None, str(error)
         if reached is None:
             whole = step if halved == 0 else whole
             step, halved = 0.5 * step, halved + 1
             if before is not None and halved % _PATIENCE == 0:
-                reached = rounded(problem, before, here, step, settings)
+                reached = follow_hairpin(problem, before, here, step, options)
         if reached is None:
-            if step < settings.smallest_step:
-                return End(Status.STALLED, message)
+            if step < options.smallest_step:
+                return End(BranchStatus.STALLED, message)
             continue
         last = here
         for there, special in reached:
             for located in special:
                 yield located
                 if located.kind in stops:
-                    return End(Status.STOPPED)
+                    return End(BranchStatus.STOPPED)
                 if located.kind is None:
-                    return End(Status.BOUND)
-            if count > 2 and _passes(problem, here, there, origin, start, settings):
+                    return End(BranchStatus.BOUND)
+            if count > 2 and _passes(problem, here, there, origin, start, options):
                 yield BranchPoint(start.u, start.tangent, start.values)
-                return End(Status.CLOSED)
+                return End(BranchStatus.CLOSED)
             yield BranchPoint(there.u, there.tangent, there.values)
             count += 1
             last, here = here, there
         before = last
         # Short steps across a change that has no special point are of no use beyond it.
         unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
-        step = whole if unresolved else _next_step(problem, last, here, step, settings)
+        step = whole if unresolved else _next_step(problem, last, here, step, options)
         halved = 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
@@ -127,10 +127,10 @@ def continuation(
             if not np.array_equal(moved, here.u):
                 before = None
             here = Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
-    return End(Status.POINTS)
+    return End(BranchStatus.POINTS)
 
 
-def inside(value: float, settings: Settings) -> float:
+def inside(value: float, options: ContinuationOptions) -> float:
     """A value of the parameter, moved to the bound that it passes by no more than rounding.
 
     Raises
@@ -138,7 +138,7 @@ def inside(value: float, settings: Settings) -> float:
     InputError
         If the value lies outside the bounds.
     """
-    low, high = settings.bounds
+    low, high = options.bounds
     rounding = _ON_BOUND * abs(value)
     if not low - rounding <= value <= high + rounding:
         raise InputError(f"The start lies at {value:.6g}, outside the bounds of the parameter, "
@@ -146,16 +146,16 @@ def inside(value: float, settings: Settings) -> float:
     return min(max(value, low), high)
 
 
-def _leaves(start: Solution, settings: Settings) -> bool:
+def _leaves(start: Solution, options: ContinuationOptions) -> bool:
     """Whether the branch leaves the bounds of the parameter right where it starts."""
     slope, value = float(start.tangent[-1]), float(start.u[-1])
-    bound = settings.bounds[1] if slope > 0.0 else settings.bounds[0]
+    bound = options.bounds[1] if slope > 0.0 else options.bounds[0]
     ahead = np.copysign(1.0, slope) * (bound - value)
     return slope != 0.0 and bool(ahead <= _ON_BOUND * max(abs(value), abs(slope)))
 
 
 def start_of(
-    problem: Problem, u: Array, settings: Settings, tangent: Array | None, direction: float
+    problem: Problem, u: Array, options: ContinuationOptions, tangent: Array | None, direction: float
 ) -> Solution:
     """The solution near u, with its tangent."""
     row = np.zeros(len(u))
@@ -163,60 +163,60 @@ def start_of(
         row[-1] = 1.0 if direction >= 0.0 else -1.0
     else:
         row = problem.weights() * tangent / norm(problem, tangent)
-    found = corrected(problem, np.array(u, dtype=float), row, settings.tolerance,
-                       3 * settings.iterations)
+    found = corrected(problem, np.array(u, dtype=float), row, options.tolerance,
+                       3 * options.iterations)
     if found is None:
         raise InputError(f"There is no solution near the start at the parameter {u[-1]:.6g}; give "
                          f"a start that is closer to one.")
-    return finished(problem, *found, row, settings)
+    return finished(problem, *found, row, options)
 
 
 def _step(
-    problem: Problem, here: Solution, step: float, settings: Settings
+    problem: Problem, here: Solution, step: float, options: ContinuationOptions
 ) -> list[tuple[Solution, list[BranchPoint]]] | None:
     """The solution at a step, with the special points before it; None to be tried with less."""
     row = problem.weights() * here.tangent
     found = corrected(problem, problem.predicted(here.u, here.tangent, step), row,
-                      settings.tolerance, settings.iterations, known=here.linearisation)
+                      options.tolerance, options.iterations, known=here.linearisation)
     if found is None:
         return None
-    there = finished(problem, *found, row, settings)
-    short = step < _SHORT * settings.step
-    if not (short or _believable(problem, here, there, settings)):
+    there = finished(problem, *found, row, options)
+    short = step < _SHORT * options.step
+    if not (short or _believable(problem, here, there, options)):
         return None
-    reached = located_between(problem, here, there, settings, row, strict=not short)
+    reached = locate_between(problem, here, there, options, row, strict=not short)
     return None if reached is None else [reached]
 
 
-def _room(here: Solution, settings: Settings) -> float:
+def _room(here: Solution, options: ContinuationOptions) -> float:
     """Length along the tangent up to a bound of the parameter."""
     slope = float(here.tangent[-1])
-    bound = settings.bounds[1] if slope > 0.0 else settings.bounds[0]
+    bound = options.bounds[1] if slope > 0.0 else options.bounds[0]
     return (bound - float(here.u[-1])) / slope if slope != 0.0 else np.inf
 
 
-def _believable(problem: Problem, here: Solution, there: Solution, settings: Settings) -> bool:
+def _believable(problem: Problem, here: Solution, there: Solution, options: ContinuationOptions) -> bool:
     """Whether a step does not turn too much."""
     row = problem.weights() * here.tangent
     chord = there.u - here.u
     return min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) >= np.cos(
-        settings.largest_turn)
+        options.largest_turn)
 
 
 def _next_step(
-    problem: Problem, here: Solution, there: Solution, step: float, settings: Settings
+    problem: Problem, here: Solution, there: Solution, step: float, options: ContinuationOptions
 ) -> float:
     """Longer after quick convergence on a straight piece, shorter after slow."""
     factor = {1: 2.0, 2: 2.0, 3: 1.5, 4: 1.1}.get(there.iterations, 0.7)
     turn = np.arccos(min(1.0, float(problem.weights() * here.tangent @ there.tangent)))
     if turn > 0.0:
-        factor = min(factor, max(0.5, 0.5 * settings.largest_turn / turn))
-    return min(factor * step, settings.largest_step)
+        factor = min(factor, max(0.5, 0.5 * options.largest_turn / turn))
+    return min(factor * step, options.largest_step)
 
 
 def _passes(
     problem: Problem, here: Solution, there: Solution, origin: Problem, start: Solution,
-    settings: Settings,
+    options: ContinuationOptions,
 ) -> bool:
     """Whether the start of the branch lies on the step from here to there."""
     weights = problem.weights()
@@ -229,24 +229,24 @@ def _passes(
                               2.0 * length + _AGAIN)
     if again is None or not 0.0 < (along := float(row @ (again - here.u))) <= length:
         return False
-    near = between(here, there, along, row)
+    near = hermite(here, there, along, row)
     return (norm(problem, again - near) < 1e-2 * length + _AGAIN
-            and _lead_to_one(problem, again, near, row, settings))
+            and _lead_to_one(problem, again, near, row, options))
 
 
 def _lead_to_one(
-    problem: Problem, one: Array, other: Array, row: Array, settings: Settings
+    problem: Problem, one: Array, other: Array, row: Array, options: ContinuationOptions
 ) -> bool:
     """Whether Newton's method goes from two guesses to the same solution.
 
     A branch may pass itself closer than the cubic between two of its points is accurate.
     """
     try:
-        found = [corrected(problem, guess, row, settings.tolerance, 2 * settings.iterations)
+        found = [corrected(problem, guess, row, options.tolerance, 2 * options.iterations)
                  for guess in (one, other)]
     except FecontactError:
         return False
     if found[0] is None or found[1] is None:
         return False
-    near = _ALIKE * max(settings.tolerance, problem.rounding) * (1.0 + norm(problem, one))
+    near = _ALIKE * max(options.tolerance, problem.rounding) * (1.0 + norm(problem, one))
     return norm(problem, found[0][0] - found[1][0]) < near

@@ -17,7 +17,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED
 from fecontact.bifurcation.continuation.newton import corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.pseudo_arclength import Settings, continuation
+from fecontact.bifurcation.continuation.pseudo_arclength import ContinuationOptions, continuation
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import FLAT
 from fecontact.bifurcation.orbits.mesh import equidistributed
@@ -120,11 +120,11 @@ def _searched(place: Place, start: Array, length: float, kind: str) -> BranchPoi
     """The special point nearest to a place, on the branch from a start on over a length."""
     problem, u, tangent = place
     row, weights = problem.weights() * tangent, problem.weights()
-    settings = Settings(step=length, largest_step=length, points=_POINTS,
+    options = ContinuationOptions(step=length, largest_step=length, points=_POINTS,
                         smallest_step=min(1e-7, length))
     points = []
     try:
-        for point in continuation(problem, start, settings, tangent=tangent):
+        for point in continuation(problem, start, options, tangent=tangent):
             if point.kind == kind:
                 points.append(replace(point, tangent=tangent))
             if float(row @ (point.u - start)) > 0.999 * length:
@@ -228,11 +228,11 @@ def _alike(one: Place, other: Place, kind: str, reach: float) -> bool:
 def _test_beside(place: Place, kind: str, along: float) -> float:
     """A test function on the branch at a distance from a place; NaN where there is none."""
     problem, u, tangent = place
-    settings, row = Settings(), problem.weights() * tangent
+    options, row = ContinuationOptions(), problem.weights() * tangent
     try:
-        reached = corrected(problem, u + along * tangent, row, settings.tolerance,
-                            2 * settings.iterations)
+        reached = corrected(problem, u + along * tangent, row, options.tolerance,
+                            2 * options.iterations)
         return (np.nan if reached is None
-                else finished(problem, *reached, row, settings).tests[kind])
+                else finished(problem, *reached, row, options).tests[kind])
     except FecontactError:
         return np.nan

@@ -8,7 +8,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED, counted, with_count
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, Settings
+from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 
@@ -27,14 +27,14 @@ _GUESSES = 3
 _BESIDE = 30.0
 
 
-def changed(here: Solution, there: Solution) -> list[str]:
+def sign_changes(here: Solution, there: Solution) -> list[str]:
     """Names of the test functions that change sign from one point to the next."""
     return [name for name, after in there.tests.items()
             if (before := here.tests.get(name, 0.0)) * after < 0.0
             or (after == 0.0 and before != 0.0)]
 
 
-def between(here: Solution, there: Solution, along: float, row: Array) -> Array:
+def hermite(here: Solution, there: Solution, along: float, row: Array) -> Array:
     """Cubic between two points of a branch, at a length along a row that grows between them."""
     length = float(row @ (there.u - here.u))
     x = along / length
@@ -46,8 +46,8 @@ def between(here: Solution, there: Solution, along: float, row: Array) -> Array:
         + length * x * x * (x - 1.0) * last)
 
 
-def located_between(
-    problem: Problem, here: Solution, there: Solution, settings: Settings, row: Array,
+def locate_between(
+    problem: Problem, here: Solution, there: Solution, options: ContinuationOptions, row: Array,
     strict: bool = True,
 ) -> tuple[Solution, list[BranchPoint]] | None:
     """The second of two regular points, and the special ones before it, in order.
@@ -64,11 +64,11 @@ def located_between(
     found = []
     rounding = set(problem.unresolved((here.tangent, there.tangent), (here.values, there.values),
                                       (here.tests, there.tests)))
-    for name in changed(here, there):
+    for name in sign_changes(here, there):
         if name in rounding:
             continue
-        event = name in settings.events
-        zero = _zero(problem, here, there, settings, _test_value(name), here.tests[name],
+        event = name in options.events
+        zero = _zero(problem, here, there, options, _test_value(name), here.tests[name],
                      there.tests[name], problem.event_precision if event else problem.precision,
                      row, remeshed=name in problem.confirms)
         located = None if zero is None else zero[0]
@@ -85,11 +85,11 @@ def located_between(
                 rest |= {"located": False, "parameter_error": off * _rate(here, there, row)}
             found.append(BranchPoint(at.u, at.tangent, at.values, kind, rest))
     met: Solution | None = None
-    for sign, bound in zip((-1.0, 1.0), settings.bounds, strict=True):
+    for sign, bound in zip((-1.0, 1.0), options.bounds, strict=True):
         before, after = sign * (here.u[-1] - bound), sign * (there.u[-1] - bound)
         if after < 0.0 or before > 0.0 or before == after:
             continue
-        zero = None if before == 0.0 else _zero(problem, here, there, settings, _distance_to(bound),
+        zero = None if before == 0.0 else _zero(problem, here, there, options, _distance_to(bound),
                                                 sign * before, sign * after, 1e-12, row)
         if zero is None:
             return None
@@ -99,12 +99,12 @@ def located_between(
     near = max(1e-4, _BESIDE * problem.precision)
     found = _without_turns([point for point in found if float(row @ (point.u - here.u)) <= length],
                            row, near * float(row @ (there.u - here.u)))
-    if settings.locate:
-        count = counted(problem, here, end, found, settings.events)
+    if options.locate:
+        count = counted(problem, here, end, found, options.events)
         if count is None and strict:
             return None
         if count is None:
-            found.append(_change(problem, here, end, settings, row))
+            found.append(_change(problem, here, end, options, row))
         else:
             end = with_count(end, count)
     found.sort(key=lambda point: float(row @ (point.u - here.u)))
@@ -119,7 +119,7 @@ def _rate(here: Solution, there: Solution, row: Array) -> float:
 
 
 def _change(
-    problem: Problem, here: Solution, there: Solution, settings: Settings, row: Array
+    problem: Problem, here: Solution, there: Solution, options: ContinuationOptions, row: Array
 ) -> BranchPoint:
     """Where the number of unstable directions jumps, though no test function has a zero there."""
     low, high = 0.0, float(row @ (there.u - here.u))
@@ -128,9 +128,9 @@ def _change(
     while high - low > precision:
         middle = 0.5 * (low + high)
         try:
-            found = corrected(problem, between(here, there, middle, row), row, settings.tolerance,
-                              2 * settings.iterations)
-            reached = None if found is None else finished(problem, *found, row, settings)
+            found = corrected(problem, hermite(here, there, middle, row), row, options.tolerance,
+                              2 * options.iterations)
+            reached = None if found is None else finished(problem, *found, row, options)
         except FecontactError:
             reached = None
         if reached is None:
@@ -152,7 +152,7 @@ def _jumped(
     if located is None:
         return True
     along = float(row @ (located.u - here.u))
-    off = norm(problem, located.u - between(here, there, along, row))
+    off = norm(problem, located.u - hermite(here, there, along, row))
     aside = norm(problem, there.u - here.u - float(row @ (there.u - here.u))
                  / float(row @ here.tangent) * here.tangent)
     return off > _OFF * aside + _ROUGH * (1.0 + norm(problem, here.u))
@@ -174,7 +174,7 @@ def _distance_to(bound: float) -> Callable[[Solution], float]:
 
 
 def _zero(
-    problem: Problem, here: Solution, there: Solution, settings: Settings,
+    problem: Problem, here: Solution, there: Solution, options: ContinuationOptions,
     test: Callable[[Solution], float], before: float, after: float, precision: float,
     row: Array, *, remeshed: bool = False,
 ) -> tuple[Solution, float] | None:
@@ -198,10 +198,10 @@ def _zero(
         # The test functions are those of this very point, not of the last Newton step.
         for guess, beside in _guesses(here, there, along, row, known):
             try:
-                found = corrected(problem, guess, row, exact, 2 * settings.iterations, exact=True,
+                found = corrected(problem, guess, row, exact, 2 * options.iterations, exact=True,
                                   known=beside.linearisation)
                 if found is not None:
-                    at = finished(problem, *found, row, settings)
+                    at = finished(problem, *found, row, options)
                     break
             except FecontactError:
                 continue
@@ -249,7 +249,7 @@ def _guesses(
 
     On the cubic through both ends, then along the tangents of solutions, the nearest first.
     """
-    yield between(here, there, along, row), known[-1][2] if known else there
+    yield hermite(here, there, along, row), known[-1][2] if known else there
     solutions = sorted([here, there, *(at for *_, at in known)],
                        key=lambda at: abs(float(row @ (at.u - here.u)) - along))
     for at in solutions[:_GUESSES]:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint, CrossingPoint
-from fecontact.bifurcation.continuation.problem import Settings, settings_of, sizes_of, width_of
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
     default_scales,
@@ -30,7 +30,7 @@ def equilibrium_branch(
     start: Equilibrium | BranchPoint | ArrayLike | None = None,
     parameter: str | None = None,
     *,
-    settings: Settings | None = None,
+    options: ContinuationOptions | None = None,
     bounds: tuple[float, float] | None = None,
     direction: float = 1.0,
     both: bool | None = None,
@@ -62,10 +62,10 @@ def equilibrium_branch(
         such a branch, also of one read from a file, from which it goes on.
     parameter : str, optional
         The one that is varied; by default that of the point, or the only one of the field.
-    settings : Settings, optional
+    options : ContinuationOptions, optional
         How the branch is followed.
     bounds : (float, float), optional
-        Range of the parameter, as in the settings.
+        Range of the parameter, as in the options.
     direction : float
         Sign of the first change of the parameter; from a point 1 goes on along the branch, and -1
         back.
@@ -104,18 +104,18 @@ def equilibrium_branch(
         begin = _start(field, start)
     parameter = field.parameter_or_only(parameter)
     index = field.index(parameter)
-    problem, chosen = _problem(field, begin, index, settings, bounds, scales, width)
+    problem, chosen = _problem(field, begin, index, options, bounds, scales, width)
     u = np.append(begin.state, begin.values[index])
     attributes = _attributes(field, begin)
     if crossed is not None and tangent is not None:
         return _crossing(problem, crossed, tangent, chosen, parameter, both is not False,
                          attributes)
-    return follow(problem, u, chosen, name=parameter, tangent=tangent, direction=direction,
+    return continue_branch(problem, u, chosen, name=parameter, tangent=tangent, direction=direction,
                   both=bool(both), attributes=attributes)
 
 
 def _crossing(
-    problem: EquilibriumProblem, point: BranchPoint, tangent: Array, settings: Settings,
+    problem: EquilibriumProblem, point: BranchPoint, tangent: Array, options: ContinuationOptions,
     parameter: str, both: bool, attributes: dict[str, Any],
 ) -> Branch:
     """The other branch through a branch point."""
@@ -125,10 +125,10 @@ def _crossing(
     ends = []
     for side in (-1.0, 1.0) if both else (1.0,):
         # The first step leaves the branch point, where the two directions cannot be told apart.
-        first = point.u + side * settings.step * tangent
-        if not settings.bounds[0] <= first[-1] <= settings.bounds[1]:
+        first = point.u + side * options.step * tangent
+        if not options.bounds[0] <= first[-1] <= options.bounds[1]:
             continue
-        branch = follow(problem, first, settings, name=parameter, tangent=side * tangent,
+        branch = continue_branch(problem, first, options, name=parameter, tangent=side * tangent,
                         attributes=attributes)
         ends.append(branch)
         if side < 0.0:
@@ -150,10 +150,10 @@ def _start(field: VectorField, start: Equilibrium | ArrayLike | None) -> Equilib
 
 
 def _problem(
-    field: VectorField, begin: Equilibrium, index: int, settings: Settings | None,
+    field: VectorField, begin: Equilibrium, index: int, options: ContinuationOptions | None,
     bounds: tuple[float, float] | None, scales: ArrayLike | None, width: float | None,
 ) -> tuple[EquilibriumProblem, Settings]:
-    chosen = settings_of(settings, bounds)
+    chosen = options_of(options, bounds)
     for bound in map(float, chosen.bounds):
         # A parameter may be what drives the system, as an amplitude that begins at zero.
         there = begin.values.copy()

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Settings, Status
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, BranchStatus
 from fecontact.bifurcation.equilibria.codim2_problems import (
     FoldCurve,
     HopfCurve,
@@ -31,7 +31,7 @@ _GROWTH = 1e4
 
 def fold_curve(
     field: VectorField, parameters: tuple[str, str], point: BranchPoint | Equilibrium, *,
-    bounds: Mapping[str, tuple[float, float]] | None = None, settings: Settings | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None, options: ContinuationOptions | None = None,
     scales: ArrayLike | None = None, both: bool = True,
 ) -> Branch:
     """Curve of folds of equilibria in two parameters.
@@ -50,7 +50,7 @@ def fold_curve(
         The fold, on a branch of equilibria.
     bounds : mapping, optional
         Range of each parameter; the curve ends there. They also set the width of the diagram.
-    settings : Settings, optional
+    options : ContinuationOptions, optional
         How the curve is followed.
     scales : sequence, optional
         Sizes (d,) of the states in the diagram; by default they grow with the states.
@@ -68,12 +68,12 @@ def fold_curve(
     problem = FoldCurve(field, begin.values, active, np.concatenate([sizes, widths]),
                         np.concatenate([limits, widths]), w, v)
     u = np.concatenate([begin.state, begin.values[list(active)]])
-    return _followed(problem, u, parameters, bounds, settings, both, ())
+    return _followed(problem, u, parameters, bounds, options, both, ())
 
 
 def hopf_curve(
     field: VectorField, parameters: tuple[str, str], point: BranchPoint | Equilibrium, *,
-    bounds: Mapping[str, tuple[float, float]] | None = None, settings: Settings | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None, options: ContinuationOptions | None = None,
     scales: ArrayLike | None = None, both: bool = True,
 ) -> Branch:
     """Curve of Hopf points in two parameters, such as the border of flutter or stick-slip.
@@ -99,7 +99,7 @@ def hopf_curve(
     problem = HopfCurve(field, begin.values, active, np.concatenate([sizes, [square], widths]),
                         np.concatenate([limits, [_GROWTH * square], widths]), b, c)
     u = np.concatenate([begin.state, [square], begin.values[list(active)]])
-    return _followed(problem, u, parameters, bounds, settings, both, ("Bogdanov-Takens",))
+    return _followed(problem, u, parameters, bounds, options, both, ("Bogdanov-Takens",))
 
 
 def _beginning(
@@ -135,10 +135,10 @@ def _beginning(
 
 def _followed(
     problem: PlaneCurve, u: Array, parameters: tuple[str, str],
-    bounds: Mapping[str, tuple[float, float]] | None, settings: Settings | None, both: bool,
+    bounds: Mapping[str, tuple[float, float]] | None, options: ContinuationOptions | None, both: bool,
     ends: tuple[str, ...],
 ) -> Branch:
-    chosen = settings or Settings()
+    chosen = options or ContinuationOptions()
     first = parameters[0]
     events = dict(chosen.events)
     borders: list[str] = []
@@ -151,12 +151,12 @@ def _followed(
     chosen = replace(chosen, events=events, stop_at=(*stops, *borders, *ends),
                      bounds=(bounds or {}).get(parameters[1], chosen.bounds))
     field = problem.field
-    branch = follow(problem, u, chosen, name=parameters[1], both=both, attributes={
+    branch = continue_branch(problem, u, chosen, name=parameters[1], both=both, attributes={
         "parameters": list(parameters), "state_names": list(field.state_names)})
     points = tuple(replace(point, kind=None) if point.kind in borders else point
                    for point in branch.points)
     reached = branch.points[-1].kind in borders
-    return replace(branch, points=points, status=Status.BOUND if reached else branch.status)
+    return replace(branch, points=points, status=BranchStatus.BOUND if reached else branch.status)
 
 
 def _distance(name: str, bound: float) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.parametrised_system import SystemFamily
+from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
@@ -30,7 +30,7 @@ _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "lo
 class ContactField(VectorField):
     """See :func:`contact_field`."""
 
-    def __init__(self, family: SystemFamily) -> None:
+    def __init__(self, family: ParametrisedSystem) -> None:
         self._family = family
         self.parameters = MappingProxyType(dict(family.parameters))
         self._base_values = self.values
@@ -149,4 +149,4 @@ def contact_field(
         If there is no such parameter, or it has a value per node.
     """
     require_kind("contact_field", ContactSystem, system=system)
-    return ContactField(SystemFamily(system, parameters))
+    return ContactField(ParametrisedSystem(system, parameters))

@@ -30,7 +30,7 @@ _RELATIVE = 1e-12
 _MOST_LEVELS = 50
 
 
-class SystemFamily:
+class ParametrisedSystem:
     """Systems of the same size for parameter values (k,).
 
     Attributes
@@ -299,7 +299,7 @@ def _inside(values: Array, limits: list[tuple[float, float]]) -> bool:
     return True
 
 
-def _corners(family: SystemFamily, low: Array, high: Array) -> _Corners:
+def _corners(family: ParametrisedSystem, low: Array, high: Array) -> _Corners:
     # The first parameter changes fastest, as in the weights.
     order = [np.array(corner[::-1])
              for corner in product(*zip(low[::-1].tolist(), high[::-1].tolist(), strict=True))]

@@ -3,14 +3,14 @@
 import numpy as np
 
 from fecontact.bifurcation.linalg import bordered_kernels
-from fecontact.bifurcation.linalg.condensation import Factors, pivot_rows
+from fecontact.bifurcation.linalg.condensation import CondensedFactors, pivot_rows
 from fecontact.core.types import Array
 
 
 class Border:
     """A further row, reduced to x_0, x_N and the common unknowns."""
 
-    def __init__(self, factors: Factors, row: Array) -> None:
+    def __init__(self, factors: CondensedFactors, row: Array) -> None:
         self.weights = np.empty(pivot_rows(factors))
         self.small = np.empty(factors.end.shape[1])
         bordered_kernels.reduce_border(factors, row, self.weights, self.small)
@@ -20,7 +20,7 @@ class Bordered:
     """A bordered system, with x(1) = closing x(0)."""
 
     def __init__(
-        self, factors: Factors, borders: list[Border], closing: float
+        self, factors: CondensedFactors, borders: list[Border], closing: float
     ) -> None:
         self._factors, self._closing = factors, closing
         d = len(factors.end)

@@ -11,14 +11,14 @@ from numba import types
 from fecontact.bifurcation.linalg.condensation import FACTORS
 from fecontact.bifurcation.linalg.lu import (
     back_lanes,
-    eliminate,
+    factorise,
     forward,
     forward_lanes,
     reduce_row,
     reduce_row_lanes,
 )
 from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
-from fecontact.core.simd import LANES, gather, read, spread, write
+from fecontact.core.simd import WIDTH, gather, read, spread, write
 
 
 @helper
@@ -27,21 +27,21 @@ def _parts(factors, pivots):
     groups, size, _, _ = factors.inner.shape
     d = len(factors.end)
     inner = size - d
-    first = groups * inner * LANES
-    second = first + (groups - 1) * d * LANES
-    return (pivots[:first].reshape((groups, inner, LANES)),
-            pivots[first:second].reshape((groups - 1, d, LANES)),
+    first = groups * inner * WIDTH
+    second = first + (groups - 1) * d * WIDTH
+    return (pivots[:first].reshape((groups, inner, WIDTH)),
+            pivots[first:second].reshape((groups - 1, d, WIDTH)),
             pivots[second:].reshape((len(factors.top), d)))
 
 
 @helper
 def _take(given, first, group, groups, N, size, count, places, out):
     """Fill out (count, 8) with given[j size + first ...] of a group's intervals, zero beyond N."""
-    for lane in range(LANES):
+    for lane in range(WIDTH):
         places[lane] = min(lane * groups + group, N - 1) * size + first
     for c in range(count):
         write(out[c], gather(given, places, c))
-    for lane in range(LANES):
+    for lane in range(WIDTH):
         if lane * groups + group >= N:
             for c in range(count):
                 out[c, lane] = 0.0
@@ -62,9 +62,9 @@ def reduce_border(factors, given, weights, small):
     e = columns - 2 * d
     inner = size - d
     nothing = spread(0.0)
-    row, link, left = (np.empty((width, LANES)), np.empty((3 * d + e, LANES)),
-                       np.empty((d, LANES)))
-    places = np.empty(LANES, dtype=np.int64)
+    row, link, left = (np.empty((width, WIDTH)), np.empty((3 * d + e, WIDTH)),
+                       np.empty((d, WIDTH)))
+    places = np.empty(WIDTH, dtype=np.int64)
     _take(given, 0, 0, groups, N, size, d, places, left)
     for c in range(d):
         write(link[d + c], read(left[c]))
@@ -125,13 +125,13 @@ def reduce_side(factors, rhs, reduced, side):
     groups, size, _, _ = factors.inner.shape
     N, d, _ = factors.local.shape
     inner = size - d
-    r, pair, mixed = (np.empty((size, LANES)), np.empty((2 * d, LANES)),
-                      np.empty((2 * d, LANES)))
-    places = np.empty(LANES, dtype=np.int64)
+    r, pair, mixed = (np.empty((size, WIDTH)), np.empty((2 * d, WIDTH)),
+                      np.empty((2 * d, WIDTH)))
+    places = np.empty(WIDTH, dtype=np.int64)
     for group in range(groups):
         order = factors.inner_order[group]
         for i in range(size):
-            for lane in range(LANES):
+            for lane in range(WIDTH):
                 j = lane * groups + group
                 r[i, lane] = rhs[j * size + (order[i, lane] if inner else i)] if j < N else 0.0
         forward_lanes(factors.inner[group], inner, r)
@@ -146,8 +146,8 @@ def reduce_side(factors, rhs, reduced, side):
             write(mixed[d + i], read(r[inner + i]))
         numbers = mixed.reshape(-1)
         for i in range(2 * d):
-            for lane in range(LANES):
-                places[lane] = factors.chain_order[group - 1, i, lane] * LANES + lane
+            for lane in range(WIDTH):
+                places[lane] = factors.chain_order[group - 1, i, lane] * WIDTH + lane
             write(pair[i], gather(numbers, places, 0))
         forward_lanes(factors.chain[group - 1], d, pair)
         for i in range(d):
@@ -176,7 +176,7 @@ def expand(factors, reduced, start, end, common, out):
     inner = size - d
     segments = len(factors.top) + 1
     # The left ends of the groups' intervals, and after them those of the segments that follow.
-    ends = np.zeros((groups + 1, d, LANES))
+    ends = np.zeros((groups + 1, d, WIDTH))
     whole = np.empty(3 * d + e)
     for c in range(d):
         ends[0, c, 0] = start[c]
@@ -194,7 +194,7 @@ def expand(factors, reduced, start, end, common, out):
             whole[k] = total * a[k, k]
         for c in range(d):
             ends[0, c, lane] = ends[groups, c, lane - 1] = whole[2 * d + c] = whole[c]
-    link, known = np.empty((3 * d + e, LANES)), np.empty((width, LANES))
+    link, known = np.empty((3 * d + e, WIDTH)), np.empty((width, WIDTH))
     for c in range(d):
         write(link[d + c], read(ends[0, c]))
     for c in range(e):
@@ -211,7 +211,7 @@ def expand(factors, reduced, start, end, common, out):
             write(known[inner + c], read(ends[group, c]))
             write(known[inner + d + c], read(ends[group + 1, c]))
         back_lanes(factors.inner[group], inner, of_inner[group], known)
-        for lane in range(LANES):
+        for lane in range(WIDTH):
             first = (lane * groups + group) * size
             if lane * groups + group < N:
                 for c in range(d):
@@ -244,7 +244,7 @@ def solve(factors, rhs, weights, small, closing, out):
             a[i, c] = small[i, c] + closing * small[i, d + c]
         for c in range(d, columns):
             a[i, c] = small[i, d + c]
-    eliminate(a, rows, pivots)
+    factorise(a, rows, pivots)
     forward(a, rows, pivots, side)
     for k in range(rows - 1, -1, -1):
         total = side[k]

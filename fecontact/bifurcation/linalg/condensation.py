@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.bifurcation.linalg.lu import eliminate, eliminate_lanes
+from fecontact.bifurcation.linalg.lu import factorise, eliminate_lanes
 from fecontact.core.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
-from fecontact.core.simd import LANES, gather, read, spread, write
+from fecontact.core.simd import WIDTH, gather, read, spread, write
 from fecontact.core.types import Array, Integers
 
 _pivots = types.Array(i8, 2, "C")
@@ -31,8 +31,8 @@ _orders = types.Array(i8, 3, "C")
 _groups = types.Array(f8, 4, "C")
 
 
-class Factors(NamedTuple):
-    """Factors of a collocation system of N intervals, m points each, d states, e common unknowns.
+class CondensedFactors(NamedTuple):
+    """CondensedFactors of a collocation system of N intervals, m points each, d states, e common unknowns.
 
     inner (G, m d, (m + 1) d + e, 8), columns: inner nodes, left end, right end, common unknowns;
     chain (G - 1, 2 d, 3 d + e, 8) within segments, columns: x_j, the segment's first, x_(j+1),
@@ -53,23 +53,23 @@ class Factors(NamedTuple):
 
 
 FACTORS = types.NamedTuple([_groups, _orders, block, _groups, _orders, block, _pivots, matrix],
-                           Factors)
+                           CondensedFactors)
 
 
-def factors_for(intervals: int, points: int, states: int, common: int) -> Factors:
+def factors_for(intervals: int, points: int, states: int, common: int) -> CondensedFactors:
     """Room for the factors of a system of this size."""
     N, m, d, e = intervals, points, states, common
-    G = -(-N // LANES)
+    G = -(-N // WIDTH)
     S = -(-N // G)
-    return Factors(
-        _aligned(G, m * d, (m + 1) * d + e), np.empty((G, m * d, LANES), dtype=np.int64),
+    return CondensedFactors(
+        _aligned(G, m * d, (m + 1) * d + e), np.empty((G, m * d, WIDTH), dtype=np.int64),
         np.empty((N, d, 2 * d + e)),
-        _aligned(G - 1, 2 * d, 3 * d + e), np.empty((G - 1, 2 * d, LANES), dtype=np.int64),
+        _aligned(G - 1, 2 * d, 3 * d + e), np.empty((G - 1, 2 * d, WIDTH), dtype=np.int64),
         np.empty((S - 1, 2 * d, 3 * d + e)), np.empty((S - 1, d), dtype=np.int64),
         np.empty((d, 2 * d + e)))
 
 
-def pivot_rows(factors: Factors) -> int:
+def pivot_rows(factors: CondensedFactors) -> int:
     """Number of rows by which unknowns are eliminated, those of empty lanes among them."""
     groups, size, _, lanes = factors.inner.shape
     d = len(factors.end)
@@ -78,23 +78,23 @@ def pivot_rows(factors: Factors) -> int:
 
 def _aligned(groups: int, rows: int, columns: int) -> Array:
     """Room (groups, rows, columns, 8) of which no eight numbers lie across two cache lines."""
-    size = groups * rows * columns * LANES
-    room = np.empty(size + LANES)
-    first = -(room.__array_interface__["data"][0] // room.itemsize) % LANES
-    return room[first : first + size].reshape(groups, rows, columns, LANES)
+    size = groups * rows * columns * WIDTH
+    room = np.empty(size + WIDTH)
+    first = -(room.__array_interface__["data"][0] // room.itemsize) % WIDTH
+    return room[first : first + size].reshape(groups, rows, columns, WIDTH)
 
 
 @helper
 def _take_links(local, group, groups, places, links):
     """Fill links (d, 2 d + e, 8) with the equations of a group; x_j = x_(j+1) beyond the last."""
     N, d, columns = local.shape
-    for lane in range(LANES):
+    for lane in range(WIDTH):
         places[lane] = min(lane * groups + group, N - 1) * d * columns
     values = local.reshape(-1)
     for i in range(d):
         for c in range(columns):
             write(links[i, c], gather(values, places, i * columns + c))
-    for lane in range(LANES):
+    for lane in range(WIDTH):
         if lane * groups + group >= N:
             for i in range(d):
                 for c in range(columns):
@@ -107,8 +107,8 @@ def _chain_segments(local, chain, order, end):
     d, columns, _ = end.shape
     e = columns - 2 * d
     groups = len(chain) + 1
-    room, links, nothing = np.empty(LANES), np.empty((d, columns, LANES)), spread(0.0)
-    places = np.empty(LANES, dtype=np.int64)
+    room, links, nothing = np.empty(WIDTH), np.empty((d, columns, WIDTH)), spread(0.0)
+    places = np.empty(WIDTH, dtype=np.int64)
     _take_links(local, 0, groups, places, end)
     for group in range(1, groups):
         a = chain[group - 1]
@@ -137,7 +137,7 @@ def chain_intervals(factors):
     top, end = factors.top, factors.end
     d, columns = end.shape
     e = columns - 2 * d
-    segments = np.empty((d, columns, LANES))
+    segments = np.empty((d, columns, WIDTH))
     _chain_segments(factors.local, factors.chain, factors.chain_order, segments)
     for i in range(d):
         for c in range(columns):
@@ -155,7 +155,7 @@ def chain_intervals(factors):
             for c in range(e):
                 a[i, 3 * d + c] = end[i, 2 * d + c]
                 a[d + i, 3 * d + c] = segments[i, 2 * d + c, lane]
-        eliminate(a, d, factors.top_pivots[lane - 1])
+        factorise(a, d, factors.top_pivots[lane - 1])
         for i in range(d):
             for c in range(columns):
                 end[i, c] = a[d + i, d + c]
@@ -179,12 +179,12 @@ def condense(J, f, P, widths, T, values, slopes, with_period, factors):
     e = q + with_period
     inner = (m - 1) * d
     of_states, of_common, rates = J.reshape(-1), P.reshape(-1), f.reshape(-1)
-    room, step, width = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    room, step, width = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
     # Of each lane: where its interval begins, in numbers of collocation points.
-    first_point, places = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
+    first_point, places = np.empty(WIDTH, dtype=np.int64), np.empty(WIDTH, dtype=np.int64)
     for group in range(groups):
         a = factors.inner[group]
-        for lane in range(LANES):
+        for lane in range(WIDTH):
             j = lane * groups + group
             first_point[lane] = min(j, N - 1) * m
             width[lane] = -widths[j] if j < N else 0.0
@@ -192,7 +192,7 @@ def condense(J, f, P, widths, T, values, slopes, with_period, factors):
         for point in range(m):
             for i in range(d):
                 row = point * d + i
-                for lane in range(LANES):
+                for lane in range(WIDTH):
                     places[lane] = ((first_point[lane] + point) * d + i) * d
                 for c in range(d):
                     entry = read(step) * gather(of_states, places, c)
@@ -204,17 +204,17 @@ def condense(J, f, P, widths, T, values, slopes, with_period, factors):
                           + spread(own * slopes[point, 0]))
                     write(a[row, inner + d + c], spread(values[point, m]) * entry
                           + spread(own * slopes[point, m]))
-                for lane in range(LANES):
+                for lane in range(WIDTH):
                     places[lane] = (first_point[lane] + point) * d + i
                 if with_period:
                     write(a[row, inner + 2 * d], read(width) * gather(rates, places, 0))
-                for lane in range(LANES):
+                for lane in range(WIDTH):
                     places[lane] *= q
                 for c in range(q):
                     write(a[row, inner + 2 * d + with_period + c],
                           read(step) * gather(of_common, places, c))
         eliminate_lanes(a, inner, factors.inner_order[group], room)
-        for lane in range(LANES):
+        for lane in range(WIDTH):
             j = lane * groups + group
             if j < N:
                 for i in range(d):

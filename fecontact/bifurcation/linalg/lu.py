@@ -5,11 +5,11 @@ eliminated. In place of these stand the factors of the rows, and on the diagonal
 """
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd import LANES, magnitude, read, spread, where_larger, write
+from fecontact.core.simd import WIDTH, magnitude, read, spread, where_larger, write
 
 
 @helper
-def eliminate(a, count, pivots):
+def factorise(a, count, pivots):
     """Eliminate the first columns of a (rows, columns) in place, with row interchanges."""
     rows, columns = a.shape
     for k in range(count):
@@ -45,7 +45,7 @@ def eliminate(a, count, pivots):
 
 @helper
 def forward(a, count, pivots, r):
-    """Apply to a right side r (rows,) what :func:`eliminate` did to the rows."""
+    """Apply to a right side r (rows,) what :func:`factorise` did to the rows."""
     for k in range(count):
         row = pivots[k]
         r[k], r[row] = r[row], r[k]
@@ -67,14 +67,14 @@ def _with_pivot(a, k, order, room):
         largest = where_larger(size, largest, size, largest)
     write(room, place)
     row, same = int(room[0]), True
-    for lane in range(1, LANES):
+    for lane in range(1, WIDTH):
         same = same and room[lane] == room[0]
     if same and row != k:
         for c in range(columns):
             above = read(a[k, c])
             write(a[k, c], read(a[row, c]))
             write(a[row, c], above)
-    for lane in range(LANES):
+    for lane in range(WIDTH):
         row = int(room[lane])
         if row != k:
             order[k, lane], order[row, lane] = order[row, lane], order[k, lane]
@@ -88,13 +88,13 @@ def _with_pivot(a, k, order, room):
 
 @helper
 def eliminate_lanes(a, count, order, room):
-    """As :func:`eliminate` for a (rows, columns, 8); ``order`` (rows, 8) is filled.
+    """As :func:`factorise` for a (rows, columns, 8); ``order`` (rows, 8) is filled.
 
     Four columns are eliminated from the rows below at once: less is read and written.
     """
     rows, columns, _ = a.shape
     for i in range(rows):
-        for lane in range(LANES):
+        for lane in range(WIDTH):
             order[i, lane] = i
     for first in range(0, count, 4):
         last = min(first + 4, count)

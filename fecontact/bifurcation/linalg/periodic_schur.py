@@ -13,7 +13,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.linalg.transition_matrices import merge
+from fecontact.bifurcation.linalg.transition_matrices import condense_products
 from fecontact.core.compiled import block, helper, kernel
 from fecontact.core.types import Array
 
@@ -188,7 +188,7 @@ def product_eigenvalues(M, values):
 
     Returns whether they were found.
     """
-    H = M[: merge(M)].astype(np.complex128)
+    H = M[: condense_products(M)].astype(np.complex128)
     K, d, _ = H.shape
     _to_hessenberg(H)
     h = H[0]

@@ -53,7 +53,7 @@ def transitions(factors, out):
 
 
 @kernel(types.i8(block))
-def merge(M):
+def condense_products(M):
     """Multiply neighbours of M (N, d, d) in place as long as no digits are lost.
 
     A product is closed before the bound of its condition number passes 100. Returns the number of

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
 from fecontact.bifurcation.continuation.problem import (
-    Settings,
+    ContinuationOptions,
     Status,
-    settings_of,
+    options_of,
     sizes_of,
     width_of,
 )
@@ -102,7 +102,7 @@ def orbit_branch(
     field: VectorField,
     start: BranchPoint | PeriodicMotion | Trajectory | tuple[ArrayLike, ArrayLike],
     parameter: str | None = None, *, method: Collocation | Shooting | None = None,
-    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
+    options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
     scales: ArrayLike | None = None, width: float | None = None, direction: float = 1.0,
     both: bool = False,
 ) -> Branch:
@@ -126,10 +126,10 @@ def orbit_branch(
     method : Collocation or Shooting, optional
         How orbits are found; by default as on the branch of the point, else by collocation. Beyond
         a period doubling there are by default twice the intervals or segments.
-    settings : Settings, optional
+    options : ContinuationOptions, optional
         How the branch is followed.
     bounds : (float, float), optional
-        Range of the parameter, as in the settings.
+        Range of the parameter, as in the options.
     scales : (d,) sequence, optional
         Amplitudes of the states that count as one in the length of a step. By default they are
         those of the branch of orbits from which the point is; else those of the motion, or at a
@@ -170,7 +170,7 @@ def orbit_branch(
     require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, tuple), start=start)
     require_kind("orbit_branch", (Collocation, Shooting, type(None)), method=method)
     require_finite("orbit_branch", direction=direction)
-    chosen = settings_of(settings, bounds)
+    chosen = options_of(options, bounds)
     if not isinstance(start, BranchPoint):
         return _from_motion(field, _as_motion(start), field.parameter_or_only(parameter),
                             method or Collocation(), chosen, scales, width, direction, both)
@@ -247,22 +247,22 @@ def _first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch
 
 
 def _from_hopf(
-    field: VectorField, point: HopfPoint, method: Collocation | Shooting, settings: Settings,
+    field: VectorField, point: HopfPoint, method: Collocation | Shooting, options: ContinuationOptions,
     scales: ArrayLike | None, width: float | None,
 ) -> Branch:
     if isinstance(method, Shooting):
         return _first_that_goes(
-            starts.at_hopf(field, point, 50, 4, settings, scales, width),
+            starts.at_hopf(field, point, 50, 4, options, scales, width),
             lambda found: shooting_branches.born(found[0], method.segments, method.rtol,
-                                                 method.derivative_rtol, settings))
+                                                 method.derivative_rtol, options))
     return _first_that_goes(
-        starts.at_hopf(field, point, method.intervals, method.degree, settings, scales, width),
-        lambda found: _followed(found[0], settings, found[1]))
+        starts.at_hopf(field, point, method.intervals, method.degree, options, scales, width),
+        lambda found: _followed(found[0], options, found[1]))
 
 
 def _from_motion(
     field: VectorField, motion: PeriodicMotion, parameter: str, method: Collocation | Shooting,
-    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
     both: bool,
 ) -> Branch:
     free = field.index(parameter)
@@ -270,22 +270,22 @@ def _from_motion(
     if given.shape != field.values.shape:
         raise InputError(f"parameter_values of the motion must be {len(field.values)} numbers, one "
                          f"for each parameter of the field, not of shape {given.shape}.")
-    given[free] = inside(float(given[free]), settings)
+    given[free] = inside(float(given[free]), options)
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
-    widths = np.append(sizes, width_of(width, settings, given[free]))
+    widths = np.append(sizes, width_of(width, options, given[free]))
     if isinstance(method, Shooting):
         return shooting_branches.from_motion(
             field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
-            settings, widths, direction, both)
+            options, widths, direction, both)
     problem, u = starts.corrected(*starts.from_samples(
         field, given, free, motion.times, motion.states, motion.period, method.intervals,
         method.degree, motion.periods, widths))
-    return _followed((problem, u, None), settings, limits, direction=direction, both=both)
+    return _followed((problem, u, None), options, limits, direction=direction, both=both)
 
 
 def _beyond(
     field: VectorField, point: BranchPoint, method: Collocation | Shooting | None,
-    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
 ) -> Branch:
     """The other orbits at a special point of a branch of orbits."""
     if point.by_shooting:
@@ -295,7 +295,7 @@ def _beyond(
         return shooting_branches.doubled(
             field, point, None if method is None else (method.segments, method.rtol,
                                                        method.derivative_rtol),
-            settings, scales, width, direction)
+            options, scales, width, direction)
     if not _keeps(point, method):
         raise InputError(f"{point.place} was found by collocation of degree "
                          f"{point.branch.attributes['degree']}, and so are the orbits beyond it; "
@@ -311,8 +311,8 @@ def _beyond(
     # The first step leaves the point, where the branches cannot be told apart; the new one may be
     # strongly bent there.
     def go(part: float) -> Branch:
-        step = max(part * settings.step, settings.smallest_step)
-        return _followed((problem, u + step * tangent, tangent), replace(settings, step=step),
+        step = max(part * options.step, options.smallest_step)
+        return _followed((problem, u + step * tangent, tangent), replace(options, step=step),
                          None)
 
     return _first_that_goes(iter(_FIRST), go)
@@ -320,14 +320,14 @@ def _beyond(
 
 def _goes_on(
     field: VectorField, point: BranchPoint, method: Collocation | Shooting | None,
-    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
     both: bool,
 ) -> Branch:
     """The branch of orbits on from one of its points."""
     sign = float(np.copysign(1.0, direction))
     if point.by_shooting:
         return shooting_branches.goes_on(
-            field, point, method.rtol if isinstance(method, Shooting) else None, settings, scales,
+            field, point, method.rtol if isinstance(method, Shooting) else None, options, scales,
             width, sign, both)
     limits = None if scales is not None else point.branch.attributes.get("limits")
     found = restored(field, point)
@@ -335,11 +335,11 @@ def _goes_on(
     problem, u, tangent = starts.on_intervals(
         (problem, *found[1:]), method.intervals if isinstance(method, Collocation) else None)
     problem, u, tangent = problem.adapted(u, sign * tangent)
-    return _followed((problem, u, tangent), settings, limits, both=both)
+    return _followed((problem, u, tangent), options, limits, both=both)
 
 
 def _followed(
-    start: tuple[CollocationProblem, Array, Array | None], settings: Settings,
+    start: tuple[CollocationProblem, Array, Array | None], options: ContinuationOptions,
     limits: Array | None, **options: Any,
 ) -> Branch:
     """The branch of orbits by collocation, its special points on meshes of their own."""
@@ -352,10 +352,10 @@ def _followed(
     if limits is not None:
         attributes["limits"] = limits
     name = list(field.parameters)[problem.free]
-    stops = [settings.stop_at] if isinstance(settings.stop_at, str) else list(settings.stop_at)
-    ended = replace(settings, stop_at=[*stops, HALVING])
+    stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
+    ended = replace(options, stop_at=[*stops, HALVING])
     # What is special is located once more below, on a mesh of its own.
-    branch = follow(replace(problem, limits=limits, precision=ROUGHLY), u, ended, name=name,
+    branch = continue_branch(replace(problem, limits=limits, precision=ROUGHLY), u, ended, name=name,
                     tangent=tangent, attributes=attributes, **options)
     if branch.points[-1].kind == HALVING and HALVING not in stops:
         branch = replace(branch, status=Status.CLOSED)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, Settings, settings_of
+from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions, options_of
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
@@ -166,7 +166,7 @@ class CurveLinearised:
 
 def orbit_curve(
     field: VectorField, point: BranchPoint, second: str, *,
-    settings: Settings | None = None, bounds: tuple[float, float] | None = None,
+    options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
     width: float | None = None, direction: float = 1.0, both: bool = False,
 ) -> Branch:
     """The curve of a special point of orbits over two parameters.
@@ -180,7 +180,7 @@ def orbit_curve(
         :func:`fecontact.orbit_branch` by collocation.
     second : str
         The second parameter.
-    settings, bounds : optional
+    options, bounds : optional
         How the curve is followed; the bounds are those of the branch's parameter.
     width : float, optional
         Width of the diagram in the second parameter; by default its value.
@@ -226,7 +226,7 @@ def orbit_curve(
     if not np.isfinite(tangent).all():
         tangent = CurveLinearised(curve, start).solve(_unit(len(start), -2), unit)
     tangent = np.copysign(1.0, direction) * tangent
-    return follow(curve, start, settings_of(settings, bounds), name=first, tangent=tangent,
+    return continue_branch(curve, start, options_of(options, bounds), name=first, tangent=tangent,
                   both=both, attributes=attributes)
 
 

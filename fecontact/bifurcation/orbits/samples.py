@@ -59,20 +59,20 @@ _FINE = 4000
 
 
 def observe(
-    field: ContactField, branch: Branch, point: str | int = "B", axis: Literal["x", "y"] = "x"
+    field: ContactField, branch: Branch, point: str | int = "B", component: Literal["x", "y"] = "x"
 ) -> Branch:
     """The branch with the range of a displacement at each of its points.
 
     Stored are the numbers 'observed_minimum', 'observed_maximum' and 'observed_amplitude', half of
     what lies between the two [m], of an equilibrium or over one period; for orbits of excited
     systems also 'observed_section' (n,), its values at the starts of the n periods of the
-    excitation, as :func:`fecontact.brute_force` keeps them.
+    excitation, as :func:`fecontact.poincare_scan` keeps them.
 
     Parameters
     ----------
     field, branch : ContactField, Branch
         A branch of equilibria or orbits, by collocation or shooting, and its field.
-    point, axis
+    point, component
         'B', 'C', a named point or the number of a contact node; 'x' or 'y'.
 
     Raises
@@ -82,7 +82,7 @@ def observe(
     """
     require_kind("observe", ContactField, field=field)
     require_kind("observe", Branch, branch=branch)
-    row = field.displacement_row(point, axis)
+    row = field.displacement_row(point, component)
     points = []
     for one in branch.points:
         low, high, section = _range(field, branch, one, row)

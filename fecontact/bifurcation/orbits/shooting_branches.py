@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import follow
+from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Settings, Status
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, BranchStatus
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.mesh import interpolate
@@ -48,21 +48,21 @@ def _name(problem: ShootingProblem) -> str:
 
 
 def born(
-    start: Start, segments: int, rtol: float, derivative_rtol: float | None, settings: Settings
+    start: Start, segments: int, rtol: float, derivative_rtol: float | None, options: ContinuationOptions
 ) -> Branch:
     """The branch from a start at a Hopf point; for orbits that come to stick on steep friction."""
     found, u, leaving = start
     problem, first = shooting_from(found, u, segments, rtol, derivative_rtol)
     shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
     tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
-    return follow(problem, first, settings, name=_name(problem),
+    return continue_branch(problem, first, options, name=_name(problem),
                   tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
                   attributes=_attributes(problem))
 
 
 def from_motion(
     field: VectorField, values: Array, free: int, motion: PeriodicMotion, segments: int,
-    rtol: float, derivative_rtol: float | None, settings: Settings, widths: Array,
+    rtol: float, derivative_rtol: float | None, options: ContinuationOptions, widths: Array,
     direction: float, both: bool,
 ) -> Branch:
     """The branch through the orbit to which a motion of a contact system has settled.
@@ -85,7 +85,7 @@ def from_motion(
                          motion.periods, widths)
     problem, u = shooting_from(*found, segments, rtol, derivative_rtol)
     try:
-        return follow(problem, u, settings, name=_name(problem), direction=direction, both=both,
+        return continue_branch(problem, u, options, name=_name(problem), direction=direction, both=both,
                       attributes=_attributes(problem))
     except (AnalysisError, InputError) as error:
         raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {values[free]:.6g} "
@@ -111,7 +111,7 @@ def _to_fastest(
 
 
 def goes_on(
-    field: VectorField, point: BranchPoint, rtol: float | None, settings: Settings,
+    field: VectorField, point: BranchPoint, rtol: float | None, options: ContinuationOptions,
     scales: ArrayLike | None, width: float | None, sign: float, both: bool,
 ) -> Branch:
     """The branch on from one of its points, or back where ``sign`` is -1."""
@@ -119,13 +119,13 @@ def goes_on(
     problem = rescaled(problem, scales, width)
     if rtol is not None:
         problem = replace(problem, rtol=rtol)
-    return follow(problem, u, settings, name=_name(problem), tangent=sign * tangent, both=both,
+    return continue_branch(problem, u, options, name=_name(problem), tangent=sign * tangent, both=both,
                   attributes=_attributes(problem))
 
 
 def doubled(
     field: VectorField, point: BranchPoint, options: tuple[int, float, float | None] | None,
-    settings: Settings, scales: ArrayLike | None, width: float | None, direction: float,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
 ) -> Branch:
     """The branch of orbits of twice the period that begins at a period doubling.
 
@@ -154,11 +154,11 @@ def doubled(
         problem = replace(problem, rtol=options[1], derivative_rtol=options[2])
     twice, start, tangent = _doubled(problem, u)
     tangent = np.copysign(1.0, direction) * tangent
-    stops = [settings.stop_at] if isinstance(settings.stop_at, str) else list(settings.stop_at)
-    twice, start, tangent = twice.adapted(start + settings.step * tangent, tangent)
-    found = follow(twice, start, replace(settings, stop_at=[*stops, HALVING]), name=_name(twice),
+    stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
+    twice, start, tangent = twice.adapted(start + options.step * tangent, tangent)
+    found = continue_branch(twice, start, replace(options, stop_at=[*stops, HALVING]), name=_name(twice),
                    tangent=tangent, attributes=_attributes(twice))
-    return _ended(found, problem, settings)
+    return _ended(found, problem, options)
 
 
 def _halves(u: Array, common: int) -> tuple[Array, Array]:
@@ -199,7 +199,7 @@ class _Doubled(ShootingProblem):
         return {} if kind == HALVING else super().examine(kind, u, linearisation, tangent)
 
 
-def _ended(branch: Branch, single: ShootingProblem, settings: Settings) -> Branch:
+def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions) -> Branch:
     """The branch, with an end that comes back to single orbits located on these.
 
     Where that was passed in one step, what follows are single orbits, and is left out.
@@ -212,7 +212,7 @@ def _ended(branch: Branch, single: ShootingProblem, settings: Settings) -> Branc
     if not len(close):
         return branch
     points = branch.points[: close[0] + 1]
-    branch = replace(branch, status=Status.CLOSED, message="")
+    branch = replace(branch, status=BranchStatus.CLOSED, message="")
     before, last = points[-2:]
     # The parameter is even in what parts the halves.
     one, other = sizes[close[0] - 1 : close[0] + 1] ** 2
@@ -221,7 +221,7 @@ def _ended(branch: Branch, single: ShootingProblem, settings: Settings) -> Branc
     tail = last.u[-common:].copy()
     tail[:-1] /= 2.0
     tail[-1] = there
-    near = _doublings_near(single, np.concatenate([(first + second) / 2.0, tail]), settings,
+    near = _doublings_near(single, np.concatenate([(first + second) / 2.0, tail]), options,
                            abs(there - last.parameter), branch.name)
     if not near:
         return replace(branch, points=points[:-1])
@@ -235,15 +235,15 @@ def _ended(branch: Branch, single: ShootingProblem, settings: Settings) -> Branc
 
 
 def _doublings_near(
-    single: ShootingProblem, u: Array, settings: Settings, off: float, name: str
+    single: ShootingProblem, u: Array, options: ContinuationOptions, off: float, name: str
 ) -> tuple[BranchPoint, ...]:
     """Doublings of the single orbits, ``off`` or so in the parameter from that near u."""
-    step = max(4.0 * off / float(single.scales[-1]), settings.step)
-    low, high = settings.bounds
-    beside = replace(settings, step=step, largest_step=step, points=4, stop_at=(),
+    step = max(4.0 * off / float(single.scales[-1]), options.step)
+    low, high = options.bounds
+    beside = replace(options, step=step, largest_step=step, points=4, stop_at=(),
                      bounds=(min(low, u[-1] - 20.0 * off), max(high, u[-1] + 20.0 * off)))
     try:
-        return follow(single, u, beside, name=name, both=True).of_kind("period doubling")
+        return continue_branch(single, u, beside, name=name, both=True).of_kind("period doubling")
     except FecontactError:
         return ()
 

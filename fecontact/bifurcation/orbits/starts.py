@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.points import HopfPoint
-from fecontact.bifurcation.continuation.problem import Settings, sizes_of, width_of
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
@@ -70,14 +70,14 @@ def from_hopf(
 
 
 def at_hopf(
-    field: VectorField, point: HopfPoint, intervals: int, degree: int, settings: Settings,
+    field: VectorField, point: HopfPoint, intervals: int, degree: int, options: ContinuationOptions,
     scales: ArrayLike | None, width: float | None,
 ) -> Iterator[tuple[Start, Array | None]]:
     """Starts at a Hopf point, one for each of the amplitudes to try, and limits of the scales."""
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
     state = np.ascontiguousarray(point.u[:-1])
     sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    widths = np.append(sizes, width_of(width, settings, point.parameter))
+    widths = np.append(sizes, width_of(width, options, point.parameter))
     for amplitude in AMPLITUDES:
         yield from_hopf(field, values, free, state, point.angular_frequency, point.eigenvector,
                         intervals, degree, widths, amplitude), limits

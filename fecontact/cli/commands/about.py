@@ -5,11 +5,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import say, show
+from fecontact.cli.console import echo, show
 
 
 def doctor() -> int:
-    """Check that all libraries are there and work; say what to install."""
+    """Check that all libraries are there and work; echo what to install."""
     from fecontact.cli.console import waiting
     from fecontact.cli.doctor import examine
     from fecontact.cli.tables import table
@@ -21,10 +21,10 @@ def doctor() -> int:
     show(table("", "", left=2, rows=rows))
     remedies = dict.fromkeys(finding.remedy for finding in found if not finding.works)
     for remedy in filter(None, remedies):
-        say(f"To repair: {remedy}")
+        echo(f"To repair: {remedy}")
     if remedies:
         return 1
-    say("All is well.")
+    echo("All is well.")
     return 0
 
 

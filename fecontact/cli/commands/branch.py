@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import complain, say, say_written, show
+from fecontact.cli.console import fail, echo, echo_written, show
 from fecontact.cli.options import Changes, Folder, StudyFile
 from fecontact.core.errors import InputError
 
@@ -49,23 +49,23 @@ def branch(
         with titled_bar() as progress:
             result = follow_branches(system, wanted, described.simulation.initial, progress)
         beneath = None
-        if wanted.brute_force and not result.interrupted:
+        if wanted.poincare_scan and not result.interrupted:
             beneath = runs_beneath(system, wanted, described.simulation.initial)
         with waiting("Writing"):
             files = write_branch_results(result, wanted, folder, described.name, beneath)
         for name, found in result.found.items():
-            say(f"\n{name}: {found.status.value}")
+            echo(f"\n{name}: {found.status.value}")
             if found.message:
-                say(f"The last step failed: {found.message}")
+                echo(f"The last step failed: {found.message}")
             show(special_table(found))
         for note in result.notes:
-            say(f"note: {note}")
-        say_written(*map(Path, files))
+            echo(f"note: {note}")
+        echo_written(*map(Path, files))
     if result.interrupted:
         return INTERRUPTED
     stalled = [name for name, found in result.found.items() if found.status.name == "STALLED"]
     if stalled:
-        return complain(f"{', '.join(stalled)}: the steps became too small to go on; what was "
+        return fail(f"{', '.join(stalled)}: the steps became too small to go on; what was "
                         f"computed is written.", 1)
     return 1 if result.notes else 0
 

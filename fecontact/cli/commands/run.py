@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import note_age, say_written
+from fecontact.cli.console import warn_if_stale, echo_written
 from fecontact.cli.options import RunFile, Trust
 
 
@@ -45,8 +45,8 @@ def render(
                            **{key: value for key, value in changes.items() if value is not None})
     target = output or stored.path.with_suffix(".mp4")
     with output_folder(target.parent):
-        say_written(movie(stored.trajectory, target, settings))
-    note_age(file, stored.current)
+        echo_written(movie(stored.trajectory, target, settings))
+    warn_if_stale(file, stored.current)
 
 
 def plot(
@@ -60,7 +60,7 @@ def plot(
         negative=(), show_default=False,
         help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
         "takes several.")] = None,
-    axis: Annotated[Literal["x", "y", "phi"] | None, Parameter(
+    component: Annotated[Literal["x", "y", "phi"] | None, Parameter(
         help="Direction of the motion; that of the drive by default.")] = None,
     quantity: Annotated[str, Parameter(
         help="Of spectra: velocity, displacement, normal_force, ...")] = "velocity",
@@ -77,14 +77,14 @@ def plot(
     from fecontact.core.atomic_write import output_folder
 
     stored = stored_run(file, trust)
-    from fecontact.cli.plot_kinds import Choice, point_of, redraw
+    from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw
 
-    choice = Choice(quantity, tuple(point_of(text) for text in point or ()), axis, highest)
+    choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component, highest)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"):
         redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)
-        say_written(target)
-    note_age(file, stored.current)
+        echo_written(target)
+    warn_if_stale(file, stored.current)
 
 
 def export(
@@ -109,5 +109,5 @@ def export(
 
     with output_folder((output or stored.path).parent), waiting("Writing"):
         written = export_run(stored.trajectory, stored.path, format_, output, frames)
-    say_written(written)
-    note_age(file, stored.current)
+    echo_written(written)
+    warn_if_stale(file, stored.current)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import INTERRUPTED, complain, say, say_written, show
+from fecontact.cli.console import INTERRUPTED, fail, echo, echo_written, show
 from fecontact.cli.options import Changes, Folder, StudyFile
 from fecontact.core.errors import InputError
 
@@ -29,7 +29,7 @@ def init(
     if file.resolve().exists() and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
-    say(f"{file} is written; next: fecontact run {file}")
+    echo(f"{file} is written; next: fecontact run {file}")
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
@@ -48,7 +48,7 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
             raise InputError(f"{target} is the mesh that the study names; choose another folder "
                              f"for what is read of it.")
         write_mesh(made, target)
-        say_written(target)
+        echo_written(target)
 
 
 def modes(
@@ -72,18 +72,18 @@ def modes(
 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
-            basis = described.basis()
-        say(str(BasisReport(basis)))
+            basis = described.modal_basis()
+        echo(str(BasisReport(basis)))
         picture = folder / f"{described.name}-modes.png"
         plot_modes(basis, path=picture)
-        say_written(picture)
+        echo_written(picture)
         if converge:
             with progress_bar("Refining", 1.0) as progress:
                 result = convergence_of(described, progress)
-            say(f"\n{result}")
+            echo(f"\n{result}")
             picture = folder / f"{described.name}-convergence.png"
             plot_convergence(result, path=picture)
-            say_written(picture)
+            echo_written(picture)
 
 
 def run(
@@ -131,8 +131,8 @@ def run(
             checkpoint.unlink(missing_ok=True)
         show(run_table(trajectory))
         for note in notes(trajectory):
-            say(f"note: {note}")
-        say_written(*files)
+            echo(f"note: {note}")
+        echo_written(*files)
     if ended not in ("FINISHED", "EVENT", "INTERRUPTED"):
-        return complain("the run did not reach its end; what was computed is written.", 1)
+        return fail("the run did not reach its end; what was computed is written.", 1)
     return INTERRUPTED if ended == "INTERRUPTED" else 0

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import say, say_written, show
+from fecontact.cli.console import echo, echo_written, show
 from fecontact.cli.options import Changes, StudyFile
 from fecontact.core.errors import InputError
 
 if TYPE_CHECKING:
     from fecontact.study.sweep_section import SweepSettings
-    from fecontact.sweep.table import SweepTable
+    from fecontact.sweeps.table import SweepTable
 
 _SHOWN = 10  # reasons, and cases of each
 
@@ -53,8 +53,8 @@ def sweep(
     if dask is not None and workers is not None:
         raise InputError("--workers is for processes on this machine; leave it out with --dask.")
     from fecontact.cli.sweep_progress import sweep_bar
-    from fecontact.sweep.executors import dask_executor
-    from fecontact.sweep.sweep import sweep as run_sweep
+    from fecontact.sweeps.executors import dask_executor
+    from fecontact.sweeps.sweep import sweep as run_sweep
 
     with waiting("Compiling, once after an installation"):
         pass
@@ -76,7 +76,7 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int
     from fecontact.cli.console import waiting
 
     failed = table.failed
-    say(f"{len(table)} cases, {len(failed)} failed")
+    echo(f"{len(table)} cases, {len(failed)} failed")
     if len(failed) < len(table):
         show(_summary_table(table, settings.method))
         if settings.method == "sensitivity":
@@ -87,7 +87,7 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int
     _warn({case: one for case, one in enumerate(table.warnings) if one})
     with waiting("Drawing"):
         pictures = _draw(table, settings, folder)
-    say_written(folder / "index.csv", *pictures)
+    echo_written(folder / "index.csv", *pictures)
     return 1 if len(failed) == len(table) else 0
 
 
@@ -114,7 +114,7 @@ def _warn(warnings: Mapping[int, str]) -> None:
 
 def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
     from fecontact.cli.tables import table as make_table
-    from fecontact.sweep.statistics import Estimate, sobol_indices
+    from fecontact.sweeps.statistics import Estimate, sobol_indices
 
     def shown(one: Estimate) -> tuple[str, str]:
         return f"{one.value:.2f}", f"{one.low:.2f} ... {one.high:.2f}"
@@ -131,8 +131,8 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
     from rich.markup import escape
 
     from fecontact.cli.tables import table as make_table
-    from fecontact.sweep.statistics import statistics
-    from fecontact.sweep.summaries import unit_of
+    from fecontact.sweeps.statistics import statistics
+    from fecontact.sweeps.summaries import unit_of
 
     rows: list[tuple[str, ...]] = []
     drawn = method not in ("grid", "list", "sensitivity")
@@ -153,8 +153,8 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
 
 
 def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[Path]:
-    from fecontact.sweep.plots import plot_sobol, plot_strobed, plot_sweep
-    from fecontact.sweep.statistics import sobol_indices
+    from fecontact.sweeps.plots import plot_sobol, plot_strobed, plot_sweep
+    from fecontact.sweeps.statistics import sobol_indices
 
     if len(set(table.keys)) < 2:
         return []

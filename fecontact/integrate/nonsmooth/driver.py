@@ -145,7 +145,7 @@ def _problem(
     restitution: float | None,
     static_coefficient: float | Sequence[float] | None,
     longest: float,
-) -> kinds.Problem:
+) -> kinds.NonsmoothProblem:
     n = system.basis.contact_nodes
     groups = [(_unsmoothed(law), share) for _, share, law in system.law_groups("friction")]
     tables = [law.table(share) for law, share in groups]
@@ -155,7 +155,7 @@ def _problem(
     cluster, rows = _clusters(arrays.Tx)
     ground = system.ground
     wave = ground.shortest_wavelength if ground.wavy else None
-    problem = kinds.Problem(arrays, _static(static_coefficient, n), cluster, rows,
+    problem = kinds.NonsmoothProblem(arrays, _static(static_coefficient, n), cluster, rows,
                             1e-4 * longest, -1.0 if restitution is None else float(restitution),
                             np.array([*ground.height_range, np.inf if wave is None else wave]),
                             int(ground.motion is None), compiled_derivative.address)
@@ -198,7 +198,7 @@ def _static(given: float | Sequence[float] | None, n: int) -> Array:
 
 
 def _require_free_stops(
-    system: ContactSystem, groups: list[tuple[FrictionLaw, Array]], problem: kinds.Problem
+    system: ContactSystem, groups: list[tuple[FrictionLaw, Array]], problem: kinds.NonsmoothProblem
 ) -> None:
     limits = np.concatenate([
         [law.kernel.python(kinds.CREEP, 1.0, row)[0] for row in law.table(share)]
@@ -216,7 +216,7 @@ def _require_free_stops(
                          f"modes.")
 
 
-def _chosen(problem: kinds.Problem, scheme: str) -> str:
+def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
     if problem.restitution >= 0.0:
         return "events"
     moving = problem.rows[np.any(problem.rows != 0.0, axis=1)]

@@ -38,7 +38,7 @@ from fecontact.integrate.nonsmooth.problem import (
     STUCK,
     WORKSPACE,
 )
-from fecontact.integrate.nonsmooth.transitions import decide_clusters, decide_stops, hold_velocity
+from fecontact.integrate.nonsmooth.transitions import decide_clusters, resolve_impacts, hold_velocity
 from fecontact.system.kernels import drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
@@ -88,7 +88,7 @@ def run_events(
                 touched[j] = w.nodes[j, PENETRATION] >= 0.0
                 height = max(height, abs(w.nodes[j, PENETRATION]))
                 largest[1] = max(largest[1], abs(w.nodes[j, RATE]))
-            decide_stops(t, Y, p, touched, parting, 1e-9 * largest[1], height,
+            resolve_impacts(t, Y, p, touched, parting, 1e-9 * largest[1], height,
                          1e-9 * longest, status, closed, fresh[clusters:], w, rate)
         else:
             for c in range(clusters):
@@ -229,7 +229,7 @@ def run_events(
                 touched[j], parting[j] = event and closed[j] == 0, event and closed[j] == 1
                 if touched[j]:
                     counts[IMPACTS] += 1
-            flight = decide_stops(t, Y, p, touched, parting, 0.01 * rtol * largest[1], height,
+            flight = resolve_impacts(t, Y, p, touched, parting, 0.01 * rtol * largest[1], height,
                                   1e-9 * longest, status, closed, fresh[clusters:], w, slopes[0])
             h = min(h, max(0.5 * flight, tiny))
         else:

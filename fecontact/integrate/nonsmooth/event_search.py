@@ -37,7 +37,7 @@ from fecontact.integrate.nonsmooth.problem import (
     PROBLEM,
     STICK,
     WORKSPACE,
-    Problem,
+    NonsmoothProblem,
 )
 from fecontact.laws.signatures import ground_at, normal_at, signal_at
 
@@ -99,7 +99,7 @@ class Room(NamedTuple):
 ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix], Room)
 
 
-def room_for(problem: Problem, size: int) -> Room:
+def room_for(problem: NonsmoothProblem, size: int) -> Room:
     """Room for a problem whose state is of this size."""
     n, k = len(problem.cluster), len(problem.rows)
     new, state, rate = np.zeros((3, size))

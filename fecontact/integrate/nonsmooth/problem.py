@@ -29,7 +29,7 @@ GOING_ON, FINISHED, STUCK, DIVERGED = range(4)
 STEPS, REJECTED, EVENTS, IMPACTS, OUTPUTS, STARTED = range(6)
 
 
-class Problem(NamedTuple):
+class NonsmoothProblem(NamedTuple):
     """A system with set-valued friction, as the kernels see it.
 
     ``system`` has unsmoothed friction; ``static`` (n,) is the coefficient that limits stick, below
@@ -52,7 +52,7 @@ class Problem(NamedTuple):
     derivative: int
 
 
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, vector, i8, i8], Problem)
+PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, vector, i8, i8], NonsmoothProblem)
 
 
 class Workspace(NamedTuple):
@@ -73,7 +73,7 @@ WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, ma
                               integers], Workspace)
 
 
-def workspace_for(problem: Problem) -> Workspace:
+def workspace_for(problem: NonsmoothProblem) -> Workspace:
     """Room for a problem."""
     n, k = len(problem.cluster), len(problem.rows)
     size = max(n, k)

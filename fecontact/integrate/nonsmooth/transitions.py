@@ -205,7 +205,7 @@ def _pack(touching, w, column):
 
 
 @helper
-def decide_stops(t, Y, p, touched, parting, slow, height, brief, status, closed, fresh, w, out):
+def resolve_impacts(t, Y, p, touched, parting, slow, height, brief, status, closed, fresh, w, out):
     """Impacts of the ``touched`` nodes, then which stops stay closed.
 
     ``parting`` nodes were closed and lift off. After the impact, stops whose penetration rate is

@@ -9,7 +9,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.integrate.events import Watched
+from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.reference.scipy import energy_scale
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
@@ -45,7 +45,7 @@ def start(
     work: bool = True,
     vary: bool | tuple[ContactSystem, ContactSystem, float] = False,
     vary_rtol: float | None = None,
-    events: Sequence[Watched] = (),
+    events: Sequence[AnyEvent] = (),
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -192,7 +192,7 @@ def integrate(
     max_step: float | None = None,
     progress: Callable[[float], None] | None = None,
     checkpoint: Path | None = None,
-    events: Sequence[Watched] = (),
+    events: Sequence[AnyEvent] = (),
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()

@@ -10,7 +10,7 @@ from fecontact.integrate.events import (
     CONTACT_EVENTS,
     ContactEvents,
     Crossing,
-    Watched,
+    AnyEvent,
     direction_sign,
 )
 from fecontact.integrate.rodas5p.event_kernels import (
@@ -27,7 +27,7 @@ from fecontact.system.contact_system import ContactSystem
 _CURVE = np.logspace(-9.0, 2.0, 441)
 
 
-def watch_for(system: ContactSystem, events: Sequence[Watched], kinks: bool) -> Watch:
+def watch_for(system: ContactSystem, events: Sequence[AnyEvent], kinks: bool) -> Watch:
     """Room for what is watched for, and nothing found yet.
 
     Raises
@@ -37,7 +37,7 @@ def watch_for(system: ContactSystem, events: Sequence[Watched], kinks: bool) -> 
     """
     n, states = system.basis.contact_nodes, system.size
     for one in events:
-        if not isinstance(one, Watched):
+        if not isinstance(one, AnyEvent):
             raise InputError(f"events: {one!r} must be a ContactEvents, Crossing or Event.")
     own = [one for one in events if not isinstance(one, ContactEvents)]
     contact = [one for one in events if isinstance(one, ContactEvents)]

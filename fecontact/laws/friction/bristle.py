@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
-from fecontact.laws.base import NotNegative, OneOrAbove, PerNode, Positive, Range
+from fecontact.laws.base import NotNegative, OneOrAbove, PerNode, Positive, Bound
 from fecontact.laws.friction.base import MemoryFriction, require_at_least
 from fecontact.laws.signatures import memory_friction_law
 
@@ -275,7 +275,7 @@ class BoucWenFriction(MemoryFriction):
 
     friction_coefficient: NotNegative = 0.55
     yield_displacement: Positive = 5e-6
-    beta: Annotated[PerNode, Range("0.5 or above", lambda x: x >= 0.5)] = 0.5
+    beta: Annotated[PerNode, Bound("0.5 or above", lambda x: x >= 0.5)] = 0.5
     exponent: OneOrAbove = 1.0
 
     @property

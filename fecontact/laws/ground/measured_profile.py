@@ -26,7 +26,7 @@ def _trace(xi, p):
 
 
 @dataclass(frozen=True)
-class Trace(Profile):
+class MeasuredProfile(Profile):
     """A measured height trace: the cubic spline through its points.
 
     Slope and curvature are continuous everywhere. A trace that is not periodic has no curvature
@@ -67,19 +67,19 @@ class Trace(Profile):
     abscissa_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        require_finite("Trace", scale=self.scale)
-        require_positive("Trace", abscissa_scale=self.abscissa_scale)
+        require_finite("MeasuredProfile", scale=self.scale)
+        require_positive("MeasuredProfile", abscissa_scale=self.abscissa_scale)
         for name in ("periodic", "remove_mean"):
             if not isinstance(getattr(self, name), bool):
-                raise InputError(f"Trace: {name} = {getattr(self, name)!r} must be true or false.")
-        x, y = read_or_given("Trace", self.file, abscissa=self.abscissa, heights=self.heights,
+                raise InputError(f"MeasuredProfile: {name} = {getattr(self, name)!r} must be true or false.")
+        x, y = read_or_given("MeasuredProfile", self.file, abscissa=self.abscissa, heights=self.heights,
                              least=3)
         if self.periodic:
-            y = require_closed("Trace", "heights", y)
+            y = require_closed("MeasuredProfile", "heights", y)
         for name, value in (("abscissa", x), ("heights", y), ("file", None)):
             object.__setattr__(self, name, value)
         places, heights = self._points
-        require_resolved("Trace", f"abscissa times abscissa_scale = {self.abscissa_scale:g}",
+        require_resolved("MeasuredProfile", f"abscissa times abscissa_scale = {self.abscissa_scale:g}",
                          places, f"heights times scale = {self.scale:g}", heights)
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
-from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive, Range
+from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive, Bound
 from fecontact.laws.signatures import normal_law
 
 _TAU = 2.0 * math.pi
@@ -269,7 +269,7 @@ class GaussianSurface(RoughSurface):
 
     kernel: ClassVar = gaussian
 
-    deviation: Annotated[PerNode, Range(
+    deviation: Annotated[PerNode, Bound(
         "at least 0.02 and at most 1", lambda x: (x >= 0.02) & (x <= 1.0))] = 1.0 / 6.0
 
     def table(self, share: Array) -> Array:

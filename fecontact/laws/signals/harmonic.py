@@ -14,7 +14,7 @@ from fecontact.laws.signals.base import Signal, between, require_one_of
 from fecontact.laws.signals.transient import Pulse, Step, Tabulated
 from fecontact.laws.signatures import signal
 
-__all__ = ["Constant", "Harmonic", "Harmonics", "Pulse", "Signal", "Step", "Sweep", "Tabulated"]
+__all__ = ["Constant", "Harmonic", "Harmonics", "Pulse", "Signal", "Step", "SweptSine", "Tabulated"]
 
 
 @signal
@@ -203,7 +203,7 @@ def _sweep(t, p):
 
 
 @dataclass(frozen=True)
-class Sweep(Signal):
+class SweptSine(Signal):
     r"""A sine whose frequency goes from one value to another, and stays there.
 
     .. math:: A \sin\Big(2 \pi \int_0^t f\,dt\Big), \qquad
@@ -237,12 +237,12 @@ class Sweep(Signal):
     kind: Literal["linear", "logarithmic"] = "linear"
 
     def __post_init__(self) -> None:
-        require_finite("Sweep", amplitude=self.amplitude)
-        require_one_of("Sweep", "kind", self.kind, ("linear", "logarithmic"))
+        require_finite("SweptSine", amplitude=self.amplitude)
+        require_one_of("SweptSine", "kind", self.kind, ("linear", "logarithmic"))
         require = require_not_negative if self.kind == "linear" else require_positive
-        require("Sweep", start_frequency_hz=self.start_frequency_hz,
+        require("SweptSine", start_frequency_hz=self.start_frequency_hz,
                 end_frequency_hz=self.end_frequency_hz)
-        require_positive("Sweep", duration=self.duration)
+        require_positive("SweptSine", duration=self.duration)
 
     def parameters(self) -> Array:
         """A, the angular frequencies, T, and 1 for a logarithmic sweep."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.branch import Branch, Status
+from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -117,7 +117,7 @@ def _stored(group: Any, path: str | Path) -> Branch:
                         kinds[k] or None, details.get(k, {})) for k in range(count))
         attributes = {name: _value(item)
                       for name, item in _members(group, "attributes").items()}
-        return Branch(text(group, "parameter"), points, Status[text(group, "status")],
+        return Branch(text(group, "parameter"), points, BranchStatus[text(group, "status")],
                    text(group, "message"), attributes)
 
 

@@ -27,7 +27,7 @@ class Variable:
     Attributes
     ----------
     dims : tuple of str
-        Names out of time, point, axis, node, mode.
+        Names out of time, point, component, node, mode.
     values : array
     unit : str
     """
@@ -44,7 +44,7 @@ def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
     return {
         "time": Variable(("time",), trajectory.time, "s"),
         "point": Variable(("point",), np.array(_points(trajectory)), "1"),
-        "axis": Variable(("axis",), np.array(_AXES), "1"),
+        "component": Variable(("component",), np.array(_AXES), "1"),
         "node": Variable(("node",), np.arange(basis.contact_nodes), "1"),
         "node_x": Variable(("node",), basis.contact_x, "m"),
         "node_length": Variable(("node",), basis.tributary, "m"),
@@ -68,7 +68,7 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
     for name, modal, unit in (("displacement", q, "m, m, rad"),
                               ("velocity", rate, "m/s, m/s, rad/s")):
         for what, rows, dim in (("", basis.T[points], "point"), ("node_", basis.T[nodes], "node")):
-            found[what + name] = Variable(("time", dim, "axis"), np.einsum(
+            found[what + name] = Variable(("time", dim, "component"), np.einsum(
                 "pam,tm->tpa", rows, modal), unit)
     for name, unit in _NODES.items():
         found[name] = Variable(("time", "node"), getattr(trajectory, name), unit)
@@ -96,22 +96,22 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
         if variable.dims == ("time",):
             found[f"{title} [{variable.unit}]"] = variable.values
             continue
-        units = variable.unit.split(", ") if "axis" in variable.dims else [variable.unit]
+        units = variable.unit.split(", ") if "component" in variable.dims else [variable.unit]
         dim = variable.dims[1]
         for place, label in enumerate(names[dim]):
             owner = label if dim == "point" else f"node {label}"
             for axis, unit in enumerate(units):
-                ending = f" {_AXES[axis]}" if "axis" in variable.dims else ""
+                ending = f" {_AXES[component]}" if "component" in variable.dims else ""
                 values = variable.values[:, place]
                 found[f"{owner} {title}{ending} [{unit}]"] = (
-                    values[:, axis] if values.ndim > 1 else values)
+                    values[:, component] if values.ndim > 1 else values)
     return found
 
 
 def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
     """A run as an :class:`xarray.Dataset`, with coordinates and an attribute ``units`` each.
 
-    Dimensions are time, point, axis, node and mode: ``ds.displacement.sel(point="B", axis="x")``.
+    Dimensions are time, point, component, node and mode: ``ds.displacement.sel(point="B", component="x")``.
 
     Raises
     ------

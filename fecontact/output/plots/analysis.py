@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.frequency_response import FrequencyResponse
+from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.histories import Point, history, point_name
 from fecontact.analysis.periodicity import strobed_states
 from fecontact.analysis.resolved import resolved
@@ -39,7 +39,7 @@ def plot_spectrum(
     trajectory: Trajectory,
     quantity: str = "velocity",
     point: Point = "B",
-    axis: str = "x",
+    component: str = "x",
     *,
     density: bool = False,
     highest_hz: float | None = None,
@@ -51,7 +51,7 @@ def plot_spectrum(
     ----------
     trajectory : Trajectory
         The run, transients cut off by :func:`fecontact.analysis.window.window`.
-    quantity, point, axis
+    quantity, point, component
         As for :func:`fecontact.analysis.histories.history`.
     density : bool
         Power spectral density by Welch's method in the place of amplitudes.
@@ -67,7 +67,7 @@ def plot_spectrum(
         that cannot be written.
     """
     require_kind("plot_spectrum", Trajectory, trajectory=trajectory)
-    shown = history(trajectory, quantity, point, axis)
+    shown = history(trajectory, quantity, point, component)
     make = power_spectral_density if density else amplitude_spectrum
     found = make(trajectory.time, shown.values)
     with new_figure(9.0, 4.6, path) as figure:
@@ -100,7 +100,7 @@ def plot_spectrogram(
     trajectory: Trajectory,
     quantity: str = "velocity",
     point: Point = "B",
-    axis: str = "x",
+    component: str = "x",
     *,
     piece: float | None = None,
     highest_hz: float | None = None,
@@ -110,7 +110,7 @@ def plot_spectrogram(
 
     Parameters
     ----------
-    trajectory, quantity, point, axis, highest_hz, path
+    trajectory, quantity, point, component, highest_hz, path
         As for :func:`plot_spectrum`.
     piece : float, optional
         Length of the pieces that are transformed [s]; a thirty-second of the run by default.
@@ -123,7 +123,7 @@ def plot_spectrogram(
     from matplotlib.colors import LogNorm
 
     require_kind("plot_spectrogram", Trajectory, trajectory=trajectory)
-    shown = history(trajectory, quantity, point, axis)
+    shown = history(trajectory, quantity, point, component)
     found = spectrogram(trajectory.time, shown.values, piece=piece, overlap=0.9)
     with new_figure(9.5, 5.6, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
@@ -131,7 +131,7 @@ def plot_spectrogram(
         unit, symbol = suitable_unit(float(np.abs(shown.values).max()), shown.unit)
         drawn = resolved(trajectory)
         add_note(figure, drawn)
-        line = history(drawn.trajectory, quantity, point, axis).values
+        line = history(drawn.trajectory, quantity, point, component).values
         upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
                    linewidth=0.8)
         upper.set_ylabel(f"[{symbol}]")
@@ -154,7 +154,7 @@ def plot_spectrogram(
 def plot_poincare(
     trajectory: Trajectory,
     point: Point = "B",
-    axis: str = "x",
+    component: str = "x",
     *,
     period: float | None = None,
     phase: float = 0.0,
@@ -168,7 +168,7 @@ def plot_poincare(
         As for :func:`plot_spectrum`.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
-    axis : "x" or "y"
+    component : "x" or "y"
         Direction of the motion.
     period, phase
         As for :func:`fecontact.analysis.periodicity.strobed_states`.
@@ -176,13 +176,13 @@ def plot_poincare(
     Raises
     ------
     InputError
-        For a point or an axis that does not exist, a system without a period, another suffix, or
+        For a point or an component that does not exist, a system without a period, another suffix, or
         a file that cannot be written.
     """
     require_kind("plot_poincare", Trajectory, trajectory=trajectory)
-    if axis not in _AXES:
+    if component not in _AXES:
         raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
-    row = _AXES.index(axis)
+    row = _AXES.index(component)
     found = strobed_states(trajectory, period=period, phase=phase,
                            t_start=float(trajectory.time[0]))
     basis = trajectory.system.basis
@@ -200,8 +200,8 @@ def plot_poincare(
         once = found.states[:, :m] @ rows / unit, found.states[:, m : 2 * m] @ rows / factor
         plane.plot(*once, "o", markersize=3.5, color=COLOURS[1],
                    label=f"once per {found.period:.4g} s")
-        plane.set_xlabel(f"displacement {axis} [{symbol}]")
-        plane.set_ylabel(f"velocity {axis} [{rate_symbol}]")
+        plane.set_xlabel(f"displacement {component} [{symbol}]")
+        plane.set_ylabel(f"velocity {component} [{rate_symbol}]")
         plane.legend(loc="best")
         plane.set_title(f"{point_name(point)}, {count(len(found.time), 'point')}")
     return figure
@@ -248,8 +248,8 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     return figure
 
 
-def plot_response(
-    responses: FrequencyResponse | Sequence[FrequencyResponse], labels: Sequence[str] = (), *,
+def plot_receptance(
+    responses: Receptance | Sequence[Receptance], labels: Sequence[str] = (), *,
     path: str | Path | None = None,
 ) -> "Figure":
     """Plot magnitude and phase of frequency responses; those of unstable states are dashed.
@@ -259,8 +259,8 @@ def plot_response(
 
     Parameters
     ----------
-    responses : FrequencyResponse or sequence of them
-        What :func:`fecontact.analysis.frequency_response.frequency_response` found, all of one
+    responses : Receptance or sequence of them
+        What :func:`fecontact.analysis.receptance.receptance` found, all of one
         kind.
     labels : sequence of str
         A name for each.
@@ -272,8 +272,8 @@ def plot_response(
     InputError
         For nothing to draw, another suffix, or a file that cannot be written.
     """
-    require_kind("plot_response", (FrequencyResponse, Sequence), responses=responses)
-    if isinstance(responses, FrequencyResponse):
+    require_kind("plot_receptance", (Receptance, Sequence), responses=responses)
+    if isinstance(responses, Receptance):
         responses = [responses]
     if not responses:
         raise InputError("responses = [] holds nothing to draw; give at least one.")
@@ -319,7 +319,7 @@ def plot_response(
     return figure
 
 
-def _whole_width(panel: "Axes", response: FrequencyResponse) -> None:
+def _whole_width(panel: "Axes", response: Receptance) -> None:
     f = response.frequency_hz
     if len(f) > 1:
         panel.set_xlim(f[0], f[-1])

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+    from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
     from fecontact.bifurcation.continuation.branch import Branch
     from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.output.plots.diagram_insets import Inset
@@ -39,7 +39,7 @@ _SPECIAL = {
 def plot_branches(
     branches: "Branch | Sequence[Branch]", y: Quantity = 0, *,
     x: Quantity = "parameter", x_label: str | None = None, y_label: str | None = None,
-    names: Sequence[str] = (), beneath: "BruteForce | None" = None,
+    names: Sequence[str] = (), beneath: "PoincareScan | None" = None,
     observe: tuple[str | int, str] = ("B", "x"), insets: "Sequence[Inset]" = (),
     path: str | Path | None = None,
 ) -> "Figure":
@@ -59,12 +59,12 @@ def plot_branches(
     names : sequence of str
         Names of the branches for the legend, in which each name stands once; several branches
         without names are numbered there.
-    beneath : BruteForce, optional
+    beneath : PoincareScan, optional
         Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
         should be 'observed_section'.
     observe : (point, axis)
         The displacement of the runs that is drawn; see
-        :meth:`fecontact.bifurcation.attractors.poincare_scan.BruteForce.observed`.
+        :meth:`fecontact.bifurcation.attractors.poincare_scan.PoincareScan.observed`.
     insets : sequence of Inset
         Phase planes of chosen points, drawn above the diagram; see
         :func:`fecontact.output.plots.diagram_insets.phase_inset`.

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+    from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
     from fecontact.bifurcation.continuation.branch import Branch
     from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
@@ -119,7 +119,7 @@ def draw_insets(figure: "Figure", axis: "Axes", insets: Sequence[Inset]) -> None
 
 
 def draw_beneath(
-    axis: "Axes", runs: "BruteForce | None", observe: tuple[str | int, str]
+    axis: "Axes", runs: "PoincareScan | None", observe: tuple[str | int, str]
 ) -> list[Any]:
     """Dots of runs once per period, up and down; handles for the legend."""
     if runs is None:

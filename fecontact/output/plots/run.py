@@ -98,7 +98,7 @@ def _without_round_off(values: list[Array]) -> list[Array]:
 
 
 def plot_phase(
-    trajectory: Trajectory, point: Point = "B", axis: str = "x", *,
+    trajectory: Trajectory, point: Point = "B", component: str = "x", *,
     path: str | Path | None = None,
 ) -> "Figure":
     """Plot the velocity of a point over its displacement, and the speed of the ground.
@@ -109,7 +109,7 @@ def plot_phase(
         The run.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
-    axis : "x" or "y"
+    component : "x" or "y"
         Direction of the motion.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
@@ -117,13 +117,13 @@ def plot_phase(
     Raises
     ------
     InputError
-        For a point or an axis that does not exist, another suffix, or a file that cannot be
+        For a point or an component that does not exist, another suffix, or a file that cannot be
         written.
     """
     require_kind("plot_phase", Trajectory, trajectory=trajectory)
-    if axis not in _AXES:
+    if component not in _AXES:
         raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
-    row = _AXES.index(axis)
+    row = _AXES.index(component)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     with new_figure(6.4, 5.2, path) as figure:
@@ -131,8 +131,8 @@ def plot_phase(
         plane = figure.subplots()
         x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
         unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
-        plane.set_xlabel(f"displacement {axis} [{symbol}]")
-        factor = _labelled(plane, f"velocity {axis}", "m/s", v)
+        plane.set_xlabel(f"displacement {component} [{symbol}]")
+        factor = _labelled(plane, f"velocity {component}", "m/s", v)
         plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
         plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
         ground = trajectory.system.ground
@@ -329,7 +329,7 @@ def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:
 
 
 def _place_edges(trajectory: Trajectory) -> tuple[Array, NDArray[np.intp], str]:
-    """Borders (k + 1,) of the rows of the map, their nodes (k,), and the label of their axis.
+    """Borders (k + 1,) of the rows of the map, their nodes (k,), and the label of their component.
 
     The node of a row without contact face is -1.
     """

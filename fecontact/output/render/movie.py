@@ -20,7 +20,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.frames import frame_indices, require_field
 from fecontact.output.render.frames_data import Colour, Motion
 from fecontact.output.render.offscreen import require_rendering
-from fecontact.output.render.overlay import Furniture
+from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.scene import Scene
 
 Image = NDArray[np.uint8]
@@ -176,7 +176,7 @@ def picture(
 def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: float | None,
             only: int | None = None) -> Iterator[Image]:
     """Pictures (height, width, 3) of all frames of a motion, or of one."""
-    furniture = Furniture(motion, *size, title, slowness)
+    furniture = Overlay(motion, *size, title, slowness)
     scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
                   fineness=_MOVING if only is None else _STILL)
     with scene:

@@ -36,7 +36,7 @@ print("window", window.GetClassName(), vtkTextureObject.GetMaximumTextureSize(wi
 """
 
 
-def rendering_works() -> str | None:
+def can_render() -> str | None:
     """Try to render a small picture off screen, once per process.
 
     Returns

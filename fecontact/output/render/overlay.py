@@ -25,7 +25,7 @@ _FONT = 10.5  # points at 960 x 540
 
 
 @dataclass(frozen=True, eq=False)
-class Furniture:
+class Overlay:
     """Strips above and below the scene, in the size of the whole picture.
 
     Attributes

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from sweep_study import Serial, files_below, is_alive, write_study
 
-from fecontact import Range, Study, read_case, read_table, sweep
+from fecontact import Span, Study, read_case, read_table, sweep
 from fecontact.core.atomic_write import _MARK
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.sweep.batch import UnwritableError, changed
-from fecontact.sweep.case import Row
-from fecontact.sweep.store import Store
-from fecontact.sweep.summaries import functions_for, summarise
+from fecontact.sweeps.batch import UnwritableError, changed
+from fecontact.sweeps.case import Row
+from fecontact.sweeps.store import Store
+from fecontact.sweeps.summaries import functions_for, summarise
 
 AXES = {"ground.speed": [1e-3, 2e-3, 4e-3], "friction.static_coefficient": [0.6, 0.8]}
 
@@ -86,11 +86,11 @@ def test_members_of_lists_and_kept_bodies(study):
     assert [one.signal.amplitude for one in moved.load.forces] == [1.0, 3.0]
     with pytest.raises(InputError, match="'2' is none of the 2 members, counted from 0"):
         loaded.with_(**{"load.forces.2.signal.amplitude": 3.0})
-    basis = study.basis()
-    assert study.with_(**{"ground.speed": 1.0}).basis() is basis
+    basis = study.modal_basis()
+    assert study.with_(**{"ground.speed": 1.0}).modal_basis() is basis
     other = study.with_(**{"basis.modes": 3})
-    assert other.body() is study.body()
-    assert other.basis() is not basis
+    assert other.elastic_body() is study.elastic_body()
+    assert other.modal_basis() is not basis
     assert study.with_(**{"geometry.width": 0.13}).mesh() is not study.mesh()
 
 
@@ -244,7 +244,7 @@ def rate(run):
     table = sweep(study, {"ground.speed": [6e-3, 7e-3, 9e-3, 12e-3],
                           "friction.static_coefficient": [0.7, 0.8]}, Serial(), t_start=0.5,
                   summaries=["growth.py:rate", "dominant_frequency"])
-    mass = 1.0 / study.basis().T[0, 0, 0] ** 2
+    mass = 1.0 / study.modal_basis().T[0, 0, 0] ** 2
     assert mass == pytest.approx(7850.0 * 0.12 * 0.06 * 0.1, rel=1e-9)
     V, mu = table.column("ground.speed"), table.column("friction.static_coefficient")
     k = 1e6
@@ -352,7 +352,7 @@ def test_an_executor_that_breaks(study, tmp_path):
 
 def test_progress_is_told(study, tmp_path):
     told = []
-    sweep(study, {"ground.speed": Range(1e-3, 4e-3, 4)}, Serial(), batch=2,
+    sweep(study, {"ground.speed": Span(1e-3, 4e-3, 4)}, Serial(), batch=2,
           folder=tmp_path / "f", progress=lambda *counts: told.append(counts))
     assert told == [(0, 0, 4), (2, 0, 4), (4, 0, 4)]
 
@@ -363,7 +363,7 @@ def test_progress_is_told(study, tmp_path):
     ({"ground.speed": []}, {}, "ground.speed has no values; give at least one"),
     ({}, {}, "has no axes; name the parameters that change"),
     ({"ground.speed": 1.0}, {}, "ground.speed = 1.0 must be a table of start, end"),
-    ({"ground.speed": Range(0.1, 1.0)}, {}, "lacks the key 'count'"),
+    ({"ground.speed": Span(0.1, 1.0)}, {}, "lacks the key 'count'"),
     ({"ground.speed": [1.0, 2.0], "friction.decay": [1.0]}, {"method": "list"},
      "ground.speed has 2, friction.decay has 1"),
     ({"ground.speed": [1.0]}, {"method": "random"}, "needs samples"),

@@ -10,7 +10,7 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.memory import require_memory, shown_count
 from fecontact.core.types import Array
-from fecontact.study.sweep_section import Axis, Distribution, Range, SweepSettings
+from fecontact.study.sweep_section import Axis, Distribution, Span, SweepSettings
 
 _MOST = 10_000_000  # cases; more than that is a slip of the pen
 _BYTES = 2000.0  # memory for the values, the key and the row of a case
@@ -50,7 +50,7 @@ def plan(settings: SweepSettings) -> Plan:
     for name, axis in axes.items():
         if isinstance(axis, tuple) and not axis:
             raise InputError(f"[sweep.axes]: {name} has no values; give at least one.")
-        if isinstance(axis, Range) and axis.count is not None and axis.count > _MOST:
+        if isinstance(axis, Span) and axis.count is not None and axis.count > _MOST:
             raise InputError(f"[sweep.axes]: {name} has count = {shown_count(axis.count)} values; "
                              f"at most {_MOST:,} are possible.")
     names = tuple(axes)
@@ -88,7 +88,7 @@ def _values(name: str, axis: Axis, method: str) -> Sequence[Any]:
         raise InputError(f"[sweep.axes]: {name} is a distribution, which method = '{method}' "
                          f"cannot use; take 'latin-hypercube', 'sobol', 'random' or "
                          f"'sensitivity', and samples.")
-    if not isinstance(axis, Range):
+    if not isinstance(axis, Span):
         return axis
     if axis.count is None:
         raise InputError(f"[sweep.axes]: {name} lacks the key 'count', the number of values from "
@@ -133,7 +133,7 @@ def _at(name: str, axis: Axis, parts: Array) -> list[Any]:
     """Values of a parameter below which the given parts of its distribution lie."""
     if isinstance(axis, tuple):
         return [axis[k] for k in np.minimum((parts * len(axis)).astype(int), len(axis) - 1)]
-    if isinstance(axis, Range):
+    if isinstance(axis, Span):
         if axis.spacing == "log":
             return list(np.exp(np.log(axis.start) + parts * np.log(axis.end / axis.start))
                         .tolist())

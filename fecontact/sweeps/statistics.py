@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.sweep.table import SweepTable
+from fecontact.sweeps.table import SweepTable
 
 QUANTILES = (0.05, 0.5, 0.95)
 _RESAMPLES = 2000

@@ -12,7 +12,7 @@ from fecontact.integrate.initial_state import initial_state
 from fecontact.integrate.trajectory import Status
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import Strobing
-from fecontact.sweep.case import Case, Row
+from fecontact.sweeps.case import SweepCase, Row
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
@@ -21,14 +21,14 @@ _AXES = ("x", "y")
 
 
 def strobed_rows(
-    cases: Sequence[Case], strobing: Strobing, study_of: Callable[[Case], Study]
+    cases: Sequence[SweepCase], strobing: Strobing, study_of: Callable[[SweepCase], Study]
 ) -> list[Row]:
     """Rows of cases, from ensembles of those whose states have the same size.
 
     The numbers are those of :func:`fecontact.ensemble` for each case alone.
     """
     rows: dict[str, Row] = {}
-    groups: dict[tuple[int, float], list[tuple[Case, ContactSystem, Array, Array]]] = {}
+    groups: dict[tuple[int, float], list[tuple[SweepCase, ContactSystem, Array, Array]]] = {}
     for case in cases:
         try:
             study = study_of(case)
@@ -66,9 +66,9 @@ def strobe_times(period: float, strobing: Strobing) -> Array:
     return np.concatenate([[0.0], later[later > 0.0]])
 
 
-def _row(case: Case, system: ContactSystem, states: Array, strobing: Strobing) -> Row:
+def _row(case: SweepCase, system: ContactSystem, states: Array, strobing: Strobing) -> Row:
     m = system.basis.modes
-    row = system.basis.T[system.basis.point_index(strobing.point), _AXES.index(strobing.axis)]
+    row = system.basis.T[system.basis.point_index(strobing.point), _AXES.index(strobing.component)]
     once = states[len(states) - 1 - _PHASES * (strobing.keep - 1) :: _PHASES]
     return Row(case=case.key, values={"periods": _periods(states, once, system)}, reason="",
                points=(once[:, :m] @ row).tolist())

@@ -64,7 +64,7 @@ def test_a_load_pulse_is_not_stepped_over(method):
 
 
 def test_sweep_of_the_drive():
-    sweep = fc.Sweep(amplitude=1e-3, start_frequency_hz=1.0, end_frequency_hz=6.0, duration=2.0)
+    sweep = fc.SweptSine(amplitude=1e-3, start_frequency_hz=1.0, end_frequency_hz=6.0, duration=2.0)
     system = point(drive=fc.Drive(stiffness_x=STIFFNESS, damping_x=DASHPOT, motion_x=sweep))
     times = np.linspace(0.0, 2.0, 9)
     wanted = oscillator(lambda t: STIFFNESS * 1e-3 * np.sin(
@@ -127,7 +127,7 @@ def test_moment_and_constant_loads_at_points():
 def test_longest_steps_resolve_what_is_given_in_time():
     """Parts of the shortest period, and of the time in which a wave passes; a given limit."""
     def loaded(signal):
-        return fc.Load(forces=(fc.PointLoad(point="C", direction="x", signal=signal),))
+        return fc.Load(forces=(fc.PointLoad(point="C", component="x", signal=signal),))
 
     times = np.array([0.0, 10.0])
     cases = {

@@ -16,7 +16,7 @@ from fecontact import (
     PrescribedForce,
     ProductFriction,
     basins,
-    brute_force,
+    poincare_scan,
     lyapunov_exponents,
     sensitivity,
     simulate,
@@ -74,7 +74,7 @@ def test_multipliers_at_loose_tolerance(w, periods, wanted):
 def test_brute_force_meets_single_runs():
     system = impact_oscillator(2)
     values = np.linspace(60.0, 65.0, 5)
-    found = brute_force(system, "drive.angular_frequency", values, transient_periods=60, keep=4,
+    found = poincare_scan(system, "drive.angular_frequency", values, transient_periods=60, keep=4,
                         initial=np.zeros(4), chains=2)
     assert found.up.shape == found.down.shape == (5, 4, 4)
     alone = strobe(system.with_(**{"drive.angular_frequency": 60.0}), transient_periods=60, keep=4,
@@ -93,7 +93,7 @@ def test_brute_force_meets_single_runs():
     def faster(system, value):
         return system.with_(**{"drive.angular_frequency": value})
 
-    same = brute_force(system, faster, values, transient_periods=60, keep=4, initial=np.zeros(4),
+    same = poincare_scan(system, faster, values, transient_periods=60, keep=4, initial=np.zeros(4),
                        chains=2, down=False)
     assert same.parameter == "faster"
     assert (same.up == found.up).all()
@@ -115,7 +115,7 @@ def test_basins_of_sliding_and_stick_slip():
     x, v = np.array([0.2, 0.8, 1.6, 2.4]), np.array([-1.2, -0.4, 0.5])
     found = basins(system, (Axis("B", "x"), x), (Axis("B", "x", "velocity"), v), transient=600.0,
                    keep=8, section=Crossing("B", "x", value=0.05, of="velocity",
-                                            direction="falling"))
+                                            sense="falling"))
     assert [one.kind for one in found.attractors] == ["periodic", "equilibrium"]
     swings = np.array([[np.ptp(simulate(system, 600.0, initial=np.array([place, speed]),
                                         outputs=6001).states[-600:, 0]) for speed in v]
@@ -143,7 +143,7 @@ def test_a_damped_mass_comes_to_rest():
         basis([0.0], [0.0], shape, shape), normal=PrescribedForce(1.0),
         friction=ConstantFriction(0.0), drive=Drive(stiffness_x=4.0, damping_x=0.8))
     found = basins(system, (Axis("B", "x"), [0.5, 1.0]), (Axis("B", "x", "velocity"), [0.0, 1.0]),
-                   transient=60.0, section=Crossing("B", "x", value=1e-3, direction="rising"))
+                   transient=60.0, section=Crossing("B", "x", value=1e-3, sense="rising"))
     assert [one.kind for one in found.attractors] == ["equilibrium"]
     assert np.abs(found.attractors[0].points).max() < 1e-6
 
@@ -151,9 +151,9 @@ def test_a_damped_mass_comes_to_rest():
 def test_bad_input():
     system = impact_oscillator(2)
     with pytest.raises(InputError, match="ascending order"):
-        brute_force(system, "drive.angular_frequency", [2.0, 1.0])
+        poincare_scan(system, "drive.angular_frequency", [2.0, 1.0])
     with pytest.raises(InputError, match=r"no parameter 'drive\.frequency'"):
-        brute_force(system, "drive.frequency", [1.0, 2.0])
+        poincare_scan(system, "drive.frequency", [1.0, 2.0])
     with pytest.raises(InputError, match="duration = 0"):
         lyapunov_exponents(system, 0)
     with pytest.raises(InputError, match="count = 5"):

@@ -20,7 +20,7 @@ damping_y = 0.02046
 amplitude_y = 0.47e-3
 angular_frequency = 64.32
 [sweep]
-strobe = { transient_periods = 120, keep = 48, axis = "y" }
+strobe = { transient_periods = 120, keep = 48, component = "y" }
 [sweep.axes]
 drive.angular_frequency = [64.32, 30.84, 37.41, 23.63]
 """
@@ -59,14 +59,14 @@ def test_published_regimes_and_the_numbers_of_ensembles(study, tmp_path):
 def test_going_on_with_a_strobed_sweep(study, tmp_path):
     axes = {"drive.angular_frequency": [64.32, 60.0, -1.0, 0.0]}
     table = sweep(study, axes, Serial(), folder=tmp_path / "f", batch=1,
-                  strobe={"transient_periods": 2, "keep": 12, "axis": "y"})
+                  strobe={"transient_periods": 2, "keep": 12, "component": "y"})
     assert list(table.failed) == [2, 3]
     assert "Nothing excites the system in time" in table.failed[3]
     assert np.isnan(table.strobed[2:]).all()
     files = files_below(tmp_path / "f")
     next((tmp_path / "f/shards").iterdir()).unlink()
     sweep(study, axes, Serial(), folder=tmp_path / "f", batch=1, resume=True,
-          strobe={"transient_periods": 2, "keep": 12, "axis": "y"})
+          strobe={"transient_periods": 2, "keep": 12, "component": "y"})
     assert files_below(tmp_path / "f") == files
 
 
@@ -76,7 +76,7 @@ def test_what_cannot_be_strobed(study, tmp_path):
     with pytest.raises(InputError, match="keep = 0 must be from 1 to"):
         sweep(study, strobe={"keep": 0}, executor=Serial(), folder=tmp_path / "f")
     few = sweep(study, {"drive.angular_frequency": [60.0]}, Serial(), folder=tmp_path / "f",
-                strobe={"transient_periods": 0, "keep": 3, "axis": "y"})
+                strobe={"transient_periods": 0, "keep": 3, "component": "y"})
     assert np.isnan(few.values["periods"]).all()
     assert few.strobed[0, 0] == pytest.approx(1e-4, rel=1e-12)  # the start itself
     assert not few.failed

@@ -15,16 +15,16 @@ from fecontact.core.tables import from_table, plain, require_known, to_table
 from fecontact.core.types import Array
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import SweepSettings, flat_axes
-from fecontact.sweep.batch import Batch, make_basis
-from fecontact.sweep.case import Case, Row
-from fecontact.sweep.case_key import case_keys
-from fecontact.sweep.dispatch import LostError, results
-from fecontact.sweep.executors import opened, worker_count
-from fecontact.sweep.plan import Plan, plan
-from fecontact.sweep.shared_bases import Bases
-from fecontact.sweep.store import Store, write_whole
-from fecontact.sweep.summaries import functions_for
-from fecontact.sweep.table import SweepTable
+from fecontact.sweeps.batch import Batch, make_basis
+from fecontact.sweeps.case import SweepCase, Row
+from fecontact.sweeps.case_key import case_keys
+from fecontact.sweeps.dispatch import LostError, results
+from fecontact.sweeps.executors import opened, worker_count
+from fecontact.sweeps.plan import Plan, plan
+from fecontact.sweeps.shared_bases import Bases
+from fecontact.sweeps.store import Store, write_whole
+from fecontact.sweeps.summaries import functions_for
+from fecontact.sweeps.table import SweepTable
 
 Progress = Callable[[int, int, int], None]
 
@@ -46,7 +46,7 @@ def sweep(
 ) -> SweepTable:
     """Run many cases of a study.
 
-    ``sweep("study.toml", {"ground.speed": [0.1, 0.2], "friction.decay": Range(1.0, 9.0, 5)})``
+    ``sweep("study.toml", {"ground.speed": [0.1, 0.2], "friction.decay": Span(1.0, 9.0, 5)})``
 
     Each case gives the numbers that ``study.with_(**changes).run()`` gives, to the last bit. It is
     known by the hash of its resolved study; finished ones are kept in ``folder`` batch by batch,
@@ -59,7 +59,7 @@ def sweep(
         What all cases have in common.
     axes : mapping, optional
         Parameters that change, by dotted names, with a list of values, a
-        :class:`~fecontact.study.sweep_section.Range` or a
+        :class:`~fecontact.study.sweep_section.Span` or a
         :class:`~fecontact.study.sweep_section.Distribution`; those of ``[sweep.axes]`` by default.
     executor : concurrent.futures.Executor, optional
         What runs the batches: the executor of a Dask client, of mpi4py.futures, of executorlib,
@@ -106,7 +106,7 @@ def sweep(
         raise InputError(f"[sweep]: t_start = {wanted.t_start:g} must lie before the end of the "
                          f"run, t_end = {base.t_end:g}.")
     functions_for(wanted.summaries, base.folder, wear_coefficient=wanted.wear_coefficient,
-                  thickness=base.body_settings.thickness)
+                  thickness=base.body.thickness)
     work = _Work.of(base, wanted, plan(wanted))
     place = Path(folder) if folder is not None else base.results / f"{base.name}-sweep"
     store = Store(place, files=wanted.keep != "none")
@@ -147,7 +147,7 @@ class _Work:
     study: Study
     settings: SweepSettings
     plan: Plan
-    cases: tuple[Case, ...]
+    cases: tuple[SweepCase, ...]
 
     @classmethod
     def of(cls, study: Study, settings: SweepSettings, cases: Plan) -> "_Work":
@@ -157,7 +157,7 @@ class _Work:
                    "strobe": None if settings.strobe is None else to_table(settings.strobe)}
         keys, bases = case_keys(study, cases.names, cases.rows, request)
         return cls(study, settings, cases, tuple(
-            Case(key, basis, dict(zip(cases.names, row, strict=True)))
+            SweepCase(key, basis, dict(zip(cases.names, row, strict=True)))
             for key, basis, row in zip(keys, bases, cases.rows, strict=True)))
 
     def batches(self, store: Store) -> Iterator[Batch]:

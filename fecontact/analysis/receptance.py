@@ -25,7 +25,7 @@ _CHUNK = 2_000_000  # entries of dynamic stiffness matrices at a time
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class Receptance:
     """Complex response to harmonic forces, ``response = values . force exp(i w t)``.
 
     Attributes
@@ -83,7 +83,7 @@ class FrequencyResponse:
         return np.angle(self.values)
 
 
-def frequency_response(
+def receptance(
     body: ModalBasis | ContactSystem,
     frequency_hz: ArrayLike,
     excitations: Sequence[Place],
@@ -91,7 +91,7 @@ def frequency_response(
     *,
     kind: Kind = "receptance",
     linearised_at: Initial | None = None,
-) -> FrequencyResponse:
+) -> Receptance:
     r"""Response of a body to harmonic forces at its points.
 
     .. math:: H(\omega) = (i \omega)^p\, T_r
@@ -99,7 +99,7 @@ def frequency_response(
         - \omega^2 I\big]^{-1} T_e^T
 
     with the springs c and dashpots b of the drive, whose far ends rest, and p = 0, 1, 2 for
-    receptance, mobility, accelerance. Linearised at a state, the contact's stiffness and damping
+    receptance, mobility, accelerance. CollocationLinearisation at a state, the contact's stiffness and damping
     come in by the Jacobian there; a node that sticks is held by its friction's slope
     dR/dv, as by a dashpot. An unstable state, of which the result says so, never answers a force
     in this way: what grows from it ends somewhere else.
@@ -128,7 +128,7 @@ def frequency_response(
         Where the response is infinite: at frequency zero of a body that nothing holds, or at an
         undamped eigenfrequency; and if there is no equilibrium.
     """
-    require_kind("frequency_response", (ModalBasis, ContactSystem), body=body)
+    require_kind("receptance", (ModalBasis, ContactSystem), body=body)
     basis = body.basis if isinstance(body, ContactSystem) else body
     if kind not in _POWERS:
         raise InputError(f"kind = {kind!r} must be one of {choices(_POWERS)}"
@@ -160,7 +160,7 @@ def frequency_response(
         growing = _growing(np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -damping]]))
     values = _response(2.0 * np.pi * f, terms, into, out)
     values *= ((2j * np.pi * f) ** _POWERS[kind])[:, None, None]
-    return FrequencyResponse(f, values, outputs, inputs, kind, growing)
+    return Receptance(f, values, outputs, inputs, kind, growing)
 
 
 def _growing(matrix: Array) -> NDArray[np.complex128]:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fecontact import Distribution, Range, SweepSettings
+from fecontact import Distribution, Span, SweepSettings
 from fecontact.core.errors import InputError
 from fecontact.study.study import Study
-from fecontact.sweep.plan import frozen, plan
+from fecontact.sweeps.plan import frozen, plan
 
 D = Distribution
 
@@ -17,18 +17,18 @@ def drawn(method, samples, seed=0, **axes):
 
 
 def test_grids_and_lists():
-    axes = {"a": (1, 2), "b": Range(0.0, 1.0, 3), "c": Range(1.0, 100.0, 3, "log")}
+    axes = {"a": (1, 2), "b": Span(0.0, 1.0, 3), "c": Span(1.0, 100.0, 3, "log")}
     grid = plan(SweepSettings(axes=axes))
     assert grid.shape == (2, 3, 3)
     assert len(grid.rows) == 18
     assert grid.rows[:4] == ((1, 0.0, 1.0), (1, 0.0, 10.0), (1, 0.0, 100.0), (1, 0.5, 1.0))
-    assert plan(SweepSettings(axes={"a": Range(0.6, 0.9, 16)})).rows[12] == (0.84,)
+    assert plan(SweepSettings(axes={"a": Span(0.6, 0.9, 16)})).rows[12] == (0.84,)
     both = plan(SweepSettings(axes={"a": (1, 2, 3), "b": ("x", "y", "z")}, method="list"))
     assert both.rows == ((1, "x"), (2, "y"), (3, "z"))
     assert both.shape is None
     with pytest.raises(InputError, match="8,000,000,000 cases"):
-        plan(SweepSettings(axes={name: Range(0.0, 1.0, 2000) for name in ("a", "b")} | {
-            "c": Range(0.0, 1.0, 2000)}))
+        plan(SweepSettings(axes={name: Span(0.0, 1.0, 2000) for name in ("a", "b")} | {
+            "c": Span(0.0, 1.0, 2000)}))
 
 
 @pytest.mark.parametrize(("axis", "mean", "std"), [
@@ -44,8 +44,8 @@ def test_grids_and_lists():
     # cut at one standard deviation: 1 - 2 phi(1) / (2 Phi(1) - 1)
     (D("truncated-normal", mean=3.0, std=0.5, low=2.5, high=3.5), 3.0,
      0.5 * (1.0 - 2.0 * 0.24197072451914337 / 0.6826894921370859) ** 0.5),
-    (Range(1.0, 4.0), 2.5, 3.0 / 12.0**0.5),
-    (Range(1.0, np.e, spacing="log"), np.e - 1.0,
+    (Span(1.0, 4.0), 2.5, 3.0 / 12.0**0.5),
+    (Span(1.0, np.e, spacing="log"), np.e - 1.0,
      (0.5 * (np.e**2 - 1.0) - (np.e - 1.0) ** 2) ** 0.5),
 ])
 def test_distributions_have_the_moments_of_their_definition(axis, mean, std):
@@ -59,21 +59,21 @@ def test_distributions_have_the_moments_of_their_definition(axis, mean, std):
 
 
 def test_hypercubes_sequences_seeds():
-    cube = drawn("latin-hypercube", 50, a=Range(0.0, 1.0), b=Range(0.0, 1.0))
+    cube = drawn("latin-hypercube", 50, a=Span(0.0, 1.0), b=Span(0.0, 1.0))
     assert (np.sort((cube * 50).astype(int), axis=0) == np.arange(50)[:, None]).all()
-    sequence = drawn("sobol", 64, a=Range(0.0, 1.0), b=Range(0.0, 1.0))
+    sequence = drawn("sobol", 64, a=Span(0.0, 1.0), b=Span(0.0, 1.0))
     cells = (sequence * 8).astype(int) @ [8, 1]
     assert sorted(cells.tolist()) == list(range(64))  # one point in each of 8 x 8 squares
-    assert len(drawn("sobol", 50, a=Range(0.0, 1.0))) == 50
-    again = drawn("random", 20, seed=3, a=Range(0.0, 1.0))
-    assert (again == drawn("random", 20, seed=3, a=Range(0.0, 1.0))).all()
-    assert (again != drawn("random", 20, seed=4, a=Range(0.0, 1.0))).all()
+    assert len(drawn("sobol", 50, a=Span(0.0, 1.0))) == 50
+    again = drawn("random", 20, seed=3, a=Span(0.0, 1.0))
+    assert (again == drawn("random", 20, seed=3, a=Span(0.0, 1.0))).all()
+    assert (again != drawn("random", 20, seed=4, a=Span(0.0, 1.0))).all()
     numbers = drawn("latin-hypercube", 30, a=(1, 2, 5))[:, 0]
     assert [(numbers == k).sum() for k in (1, 2, 5)] == [10, 10, 10]
 
 
 def test_samples_for_sensitivities():
-    rows = drawn("sensitivity", 16, a=Range(0.0, 1.0), b=Range(0.0, 1.0)).reshape(4, 16, 2)
+    rows = drawn("sensitivity", 16, a=Span(0.0, 1.0), b=Span(0.0, 1.0)).reshape(4, 16, 2)
     A, B, first, second = rows
     assert (first == np.column_stack([B[:, 0], A[:, 1]])).all()
     assert (second == np.column_stack([A[:, 0], B[:, 1]])).all()
@@ -95,7 +95,7 @@ friction.law = ["exponential", "constant"]
 """
     study = Study.from_toml(text)
     assert study.sweep.axes == {
-        "ground.speed": (0.1, 2), "load.normal": Range(1.0, 9.0, spacing="log"),
+        "ground.speed": (0.1, 2), "load.normal": Span(1.0, 9.0, spacing="log"),
         "friction.static_coefficient": D("normal", mean=0.5, std=0.05),
         "friction.law": ("exponential", "constant")}
     assert Study.from_toml(study.to_toml()) == study

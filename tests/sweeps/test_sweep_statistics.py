@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fecontact import Range, SweepSettings, SweepTable, sobol_indices, statistics
+from fecontact import Span, SweepSettings, SweepTable, sobol_indices, statistics
 from fecontact.core.errors import InputError
-from fecontact.sweep.plan import plan
-from fecontact.sweep.statistics import indices_of
+from fecontact.sweeps.plan import plan
+from fecontact.sweeps.statistics import indices_of
 
 
 def test_moments_and_quantiles():
@@ -47,7 +47,7 @@ def ishigami(x):
 
 
 def ishigami_table(samples, seed=2):
-    angle = Range(-np.pi, np.pi)
+    angle = Span(-np.pi, np.pi)
     found = plan(SweepSettings(axes={"a": angle, "b": angle, "c": angle}, method="sensitivity",
                                samples=samples, seed=seed))
     x = np.array(found.rows)

@@ -8,9 +8,9 @@ from systems import belt
 from test_continuation import Plane
 
 from fecontact import simulate
-from fecontact.bifurcation.continuation.branch import Status
-from fecontact.bifurcation.continuation.follow import follow
-from fecontact.bifurcation.continuation.problem import Settings
+from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.orbits.branches import Collocation, Shooting, orbit_branch
@@ -28,8 +28,8 @@ def test_a_hairpin_is_gone_round(sharpness, side):
     hairpin = Plane(lambda x, p: 1.0 - p - sharpness * (x - p) ** 2,
                     lambda x, p: (-2.0 * sharpness * (x - p), 2.0 * sharpness * (x - p) - 1.0))
     start = np.array([0.2 + side * (0.8 / sharpness) ** 0.5, 0.2])
-    branch = follow(hairpin, start, Settings(bounds=(0.0, 2.0)))
-    assert branch.status is Status.BOUND
+    branch = continue_branch(hairpin, start, ContinuationOptions(bounds=(0.0, 2.0)))
+    assert branch.status is BranchStatus.BOUND
     assert branch.parameter[-1] == pytest.approx(0.0, abs=1e-12)
     fold, = branch.special
     assert fold.kind == "fold"
@@ -95,14 +95,14 @@ def folds():
         branch = orbit_branch(field, (run.time[-500:], run.states[-500:]), "ground.speed",
                               method=Shooting(), width=0.25, bounds=(start - 5e-3, 0.25),
                               scales=1.5 * MASS**0.5 * np.array([0.007, 0.23]),
-                              settings=Settings(step=2e-3))
+                              options=ContinuationOptions(step=2e-3))
         found[slope] = branch, fold_speed(slope, speeds, slips)
     return found
 
 
 def test_orbits_that_just_touch_sticking(folds):
     for branch, expected in folds.values():
-        assert branch.status is Status.BOUND
+        assert branch.status is BranchStatus.BOUND
         fold, = branch.special
         assert fold.kind == "fold"
         assert fold.parameter == pytest.approx(expected, rel=1e-6)
@@ -166,8 +166,8 @@ def test_collocation_goes_round_where_friction_is_less_steep():
                                  direction=-1.0)
     hopf, = sliding.special
     branch = orbit_branch(field, hopf, method=Collocation(intervals=100), bounds=(2e-3, 0.12),
-                          settings=Settings(step=5e-3, points=400))
-    assert branch.status is Status.BOUND
+                          options=ContinuationOptions(step=5e-3, points=400))
+    assert branch.status is BranchStatus.BOUND
     assert branch.parameter[-1] == pytest.approx(2e-3)
     fold, = branch.special
     assert fold.kind == "fold"

@@ -10,7 +10,7 @@ from fecontact import __version__
 from fecontact.core.errors import InputError
 from fecontact.core.tables import shown
 from fecontact.study.study import Study
-from fecontact.sweep.case import BASIS_SECTIONS
+from fecontact.sweeps.case import BASIS_SECTIONS
 
 _DIGITS = 24  # of a hash that are kept: 96 bits
 _NOT_OF_THE_RUN = ("output", "render", "sweep")

@@ -15,8 +15,8 @@ from fecontact.cli import execute
 from fecontact.cli.commands import sweep as command
 from fecontact.cli.sweep_progress import clock, note
 from fecontact.core.errors import InputError
-from fecontact.sweep import executors, plots
-from fecontact.sweep.statistics import Estimate, SobolIndices
+from fecontact.sweeps import executors, plots
+from fecontact.sweeps.statistics import Estimate, SobolIndices
 
 SWEEP = """
 [sweep]

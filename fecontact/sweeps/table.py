@@ -15,7 +15,7 @@ from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, html_table, listed, span
-from fecontact.sweep.store import write_whole
+from fecontact.sweeps.store import write_whole
 
 _BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
 _SHOWN_CASES = 12  # in a notebook

@@ -18,8 +18,8 @@ from fecontact.core.locks import locked
 from fecontact.core.stored import DamagedError, from_json, reading
 from fecontact.output.files.hdf5 import write_basis
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.sweep.batch import case_file
-from fecontact.sweep.case import Row
+from fecontact.sweeps.batch import case_file
+from fecontact.sweeps.case import Row
 
 _SUFFIXES = {"shards": ".json", "cases": ".vtkhdf", "bases": ".h5"}
 _OURS = re.compile(r"[0-9a-f]{24}")  # hashes, of rows, cases and bases

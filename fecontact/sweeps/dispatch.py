@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fecontact.core.errors import AnalysisError, FecontactError
-from fecontact.sweep.batch import Batch
-from fecontact.sweep.executors import Pool
+from fecontact.sweeps.batch import Batch
+from fecontact.sweeps.executors import Pool
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from fecontact.core.errors import AnalysisError
 from fecontact.output.files.hdf5 import read_basis
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.study import Study
-from fecontact.sweep.batch import Batch, make_basis, packed, run_batch
-from fecontact.sweep.dispatch import Job, LostError
-from fecontact.sweep.store import Store
+from fecontact.sweeps.batch import Batch, make_basis, packed, run_batch
+from fecontact.sweeps.dispatch import Job, LostError
+from fecontact.sweeps.store import Store
 
 
 class Bases:
@@ -46,7 +46,7 @@ class Bases:
             if self.store.basis_file(key).exists():
                 self._put(key, read_basis(self.store.basis_file(key)), batch)
             elif self.only:
-                self._put(key, self.study.with_(**batch.cases[0].basis_changes).basis(), batch)
+                self._put(key, self.study.with_(**batch.cases[0].basis_changes).modal_basis(), batch)
             else:
                 jobs.append(Job(make_basis, batch))
         return jobs + self._released()

@@ -18,7 +18,7 @@ class Row(TypedDict):
 
 
 @dataclass(frozen=True)
-class Case:
+class SweepCase:
     """A case of a sweep: its key, that of its modal basis, what it changes in the study."""
 
     key: str

@@ -127,7 +127,7 @@ def test_a_dask_worker_is_killed_and_nothing_is_lost(tmp_path, undisturbed, clus
 
 
 def test_a_scheduler_that_does_not_answer(tmp_path, monkeypatch, capsys):
-    from fecontact.sweep import executors
+    from fecontact.sweeps import executors
 
     path = write_study(tmp_path, SWEEP)
     monkeypatch.setattr(executors, "PATIENCE", 0.5)

@@ -13,9 +13,9 @@ from fecontact.core.units import suitable_unit
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS, distinct_colours
 from fecontact.study.study import Study
-from fecontact.sweep.statistics import SobolIndices
-from fecontact.sweep.summaries import unit_of
-from fecontact.sweep.table import SweepTable, is_numeric
+from fecontact.sweeps.statistics import SobolIndices
+from fecontact.sweeps.summaries import unit_of
+from fecontact.sweeps.table import SweepTable, is_numeric
 from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
@@ -260,7 +260,7 @@ def plot_sobol(
                               xerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
                               fmt="none", ecolor="#303030", elinewidth=0.9, capsize=2)
             axes.set_yticks(places, [parameter_label(key, Study) for key in parameters])
-            axes.grid(False, axis="y")
+            axes.grid(False, component="y")
             axes.set_title(name.replace("_", " "), loc="left")
         grid[-1].set_xlabel("part of the variance")
         grid[-1].set_xlim(left=min(0.0, grid[-1].get_xlim()[0]))
@@ -287,7 +287,7 @@ def _label(axes: "Axes", name: str, values: Array) -> float:
 
 
 def _places(values: Sequence[Any]) -> tuple[Array, list[str] | None]:
-    """Numbers along an axis; for other values their order, and their names."""
+    """Numbers along an component; for other values their order, and their names."""
     if is_numeric(values):
         return np.array(values, dtype=float), None
     names = list(dict.fromkeys(_shown(value) for value in values))

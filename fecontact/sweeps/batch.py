@@ -21,9 +21,9 @@ from fecontact.output.files.hdf5 import read_basis
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import Strobing
-from fecontact.sweep.case import Case, Row
-from fecontact.sweep.strobed import strobed_rows
-from fecontact.sweep.summaries import functions_for, summarise
+from fecontact.sweeps.case import SweepCase, Row
+from fecontact.sweeps.strobed import strobed_rows
+from fecontact.sweeps.summaries import functions_for, summarise
 
 Functions = dict[str, Callable[[Trajectory], float]]
 
@@ -40,7 +40,7 @@ class Batch:
         Tables of the study that the cases change.
     path : str or None
         Its file.
-    cases : tuple of Case
+    cases : tuple of SweepCase
     bases : mapping of key to bytes, Path or str
         Modal bases as :func:`packed` gives them, files of them, or the reason why there is none;
         those that are missing are computed by the worker.
@@ -57,7 +57,7 @@ class Batch:
 
     study: Mapping[str, Any]
     path: str | None
-    cases: tuple[Case, ...]
+    cases: tuple[SweepCase, ...]
     summaries: tuple[str, ...]
     t_start: float | None = None
     wear_coefficient: float | None = None
@@ -96,7 +96,7 @@ def make_basis(batch: Batch) -> bytes | str:
     path = None if batch.path is None else Path(batch.path)
     try:
         study = Study.from_tables(batch.study, path).with_(**batch.cases[0].basis_changes)
-        return packed(study.basis(), shapes=True)
+        return packed(study.modal_basis(), shapes=True)
     except FecontactError as error:
         return str(error)
 
@@ -106,10 +106,10 @@ def packed(basis: ModalBasis, *, shapes: bool) -> bytes:
     return pickle.dumps(basis if shapes else replace(basis, field=None, quality=None))
 
 
-def _row(batch: Batch, base: Study, case: Case, summaries: dict[float, Functions]) -> Row:
+def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[float, Functions]) -> Row:
     try:
         trajectory, study = _run(batch, base, case)
-        thickness = study.body_settings.thickness
+        thickness = study.body.thickness
         if thickness not in summaries:
             summaries[thickness] = functions_for(
                 batch.summaries, study.folder, wear_coefficient=batch.wear_coefficient,
@@ -131,7 +131,7 @@ def _row(batch: Batch, base: Study, case: Case, summaries: dict[float, Functions
     return row
 
 
-def _run(batch: Batch, base: Study, case: Case) -> tuple[Trajectory, Study]:
+def _run(batch: Batch, base: Study, case: SweepCase) -> tuple[Trajectory, Study]:
     study = prepared(batch, base, case)
     with warnings.catch_warnings():
         # They go into the row.
@@ -170,7 +170,7 @@ def _present(study: Study, name: str) -> Any:
     return value
 
 
-def prepared(batch: Batch, base: Study, case: Case) -> Study:
+def prepared(batch: Batch, base: Study, case: SweepCase) -> Study:
     """The study of a case, with its modal basis."""
     study = changed(base, case.changes)
     # Not by with_: the basis may come from another process.
@@ -189,7 +189,7 @@ def _basis(batch: Batch, study: Study, key: str) -> ModalBasis:
         given = batch.bases.get(key)
         if isinstance(given, str):
             raise AnalysisError(given)
-        basis = (study.basis() if given is None else read_basis(given)
+        basis = (study.modal_basis() if given is None else read_basis(given)
                  if isinstance(given, Path) else pickle.loads(given))
         _bases[mark] = basis
         while len(_bases) > _BASES_KEPT:
@@ -202,7 +202,7 @@ def case_file(folder: Path, key: str) -> Path:
     return folder / f"{key}.vtkhdf"
 
 
-def _write(batch: Batch, case: Case, study: Study, trajectory: Trajectory) -> None:
+def _write(batch: Batch, case: SweepCase, study: Study, trajectory: Trajectory) -> None:
     from fecontact.output.files.case import write_case
 
     assert batch.files is not None

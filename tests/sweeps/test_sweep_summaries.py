@@ -15,7 +15,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.sweep.summaries import SUMMARIES, functions_for, summarise, unit_of
+from fecontact.sweeps.summaries import SUMMARIES, functions_for, summarise, unit_of
 from fecontact.system.contact_system import ContactSystem
 
 V, STIFFNESS, DEPTH, MU = 0.02, 3e5, 4e-5, 0.3

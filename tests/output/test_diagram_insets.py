@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from systems import impact_oscillator
 
-from fecontact import Axis, InputError, basins, brute_force
+from fecontact import Axis, InputError, basins, poincare_scan
 from fecontact.bifurcation.attractors.basins import Attractor, Basins
-from fecontact.bifurcation.attractors.poincare_scan import BruteForce
+from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.output.plots.basins import plot_basins
@@ -28,7 +28,7 @@ def test_sections_over_runs():
     r = system.basis.T[0, 1]
     up = np.zeros((3, 2, 4))
     up[..., 0] = np.array([[1.0, 2.0], [1.5, 2.5], [1.0, 3.0]]) / r[0]
-    runs = BruteForce(system, "w", np.array([1.0, 2.0, 3.0]), up, up[:0])
+    runs = PoincareScan(system, "w", np.array([1.0, 2.0, 3.0]), up, up[:0])
     axis = plot_branches([BRANCH], "observed_section", beneath=runs,
                          observe=("B", "y")).axes[0]
     dots, *curves = axis.lines
@@ -73,7 +73,7 @@ def test_basins_of_a_system(tmp_path):
                    (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient_periods=60, keep=4)
     plot_basins(found, path=tmp_path / "basins.png")
     assert (tmp_path / "basins.png").stat().st_size > 5_000
-    runs = brute_force(impact_oscillator(2), "drive.angular_frequency", [64.0, 65.0],
+    runs = poincare_scan(impact_oscillator(2), "drive.angular_frequency", [64.0, 65.0],
                        transient_periods=60, keep=2, initial=np.zeros(4))
     assert len(plot_branches([BRANCH], "observed_section", beneath=runs,
                              observe=("B", "y")).axes[0].lines) == 4
