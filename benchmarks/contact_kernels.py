@@ -8,15 +8,8 @@ import timeit
 
 import numpy as np
 
-from fecontact import (
-    ContactSystem,
-    Drive,
-    ExponentialFriction,
-    Ground,
-    Load,
-    ModalBasis,
-    RoughSurface,
-)
+from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
+from fecontact.laws import ExponentialFriction, RoughSurface
 
 
 def system(nodes: int, modes: int) -> ContactSystem:

@@ -16,19 +16,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fecontact import (
-    ContactSystem,
-    Ground,
-    PrescribedForce,
-    ProductFriction,
-    basis_from_matrices,
+from fecontact import ContactSystem, Ground, basis_from_matrices
+from fecontact.bifurcation import (
+    Branch,
+    Collocation,
+    ContinuationOptions,
+    VectorField,
+    contact_field,
+    equilibrium_branch,
+    orbit_branch,
 )
-from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.laws import PrescribedForce, ProductFriction
 
 AUTO = {50: 0.13, 100: 0.25, 200: 0.49}
 AUTO_POINTS = 139

@@ -10,8 +10,7 @@ import time
 import numpy as np
 from scipy.sparse.linalg import eigsh
 
-from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.mesh import Mesh
+from fecontact import ElasticBody, Mesh
 from fecontact.reduction.eigenmodes import backward_error, eigenmodes
 
 MODES = 20

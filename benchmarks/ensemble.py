@@ -20,7 +20,7 @@ from integrator_problems import Problem, diagram
 from numba import carray, cfunc, njit
 from numpy.typing import NDArray
 
-from fecontact import strobe
+from fecontact.integrate import strobe
 
 Array = NDArray[np.float64]
 

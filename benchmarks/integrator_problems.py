@@ -10,17 +10,14 @@ from fecontact import (
     ContactSystem,
     Drive,
     ElasticBody,
-    ExponentialFriction,
     Ground,
     Load,
     Material,
     Mesh,
     ModalBasis,
-    PrescribedForce,
-    RoughSurface,
     modal_basis,
 )
-from fecontact.laws.signals.harmonic import Constant
+from fecontact.laws import Constant, ExponentialFriction, PrescribedForce, RoughSurface
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fecontact.laws.base import FrictionLaw, NodeLaw, NormalLaw
-from fecontact.laws.friction.stribeck import ConstantFriction
-from fecontact.laws.normal.linear import LinearContact
+from fecontact import ContactSystem, ModalBasis
+from fecontact.laws import ConstantFriction, FrictionLaw, LinearContact, NormalLaw
+from fecontact.laws.base import NodeLaw
 from fecontact.laws.registry import law_class, law_names
-from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import right_hand_side
 
 NODES, MODES = 400, 40

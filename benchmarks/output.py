@@ -7,18 +7,22 @@ from pathlib import Path
 
 import numpy as np
 
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.fem.generate import Beam, generate
-from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.output.files.case import read_case, write_case
-from fecontact.output.files.pvd import export_pvd
-from fecontact.output.render.movie import render
+from fecontact import (
+    Beam,
+    ContactSystem,
+    ElasticBody,
+    Ground,
+    Material,
+    Trajectory,
+    generate,
+    modal_basis,
+    read_case,
+    render,
+    write_case,
+)
+from fecontact.io import export_pvd
+from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.output.render.offscreen import can_render
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.system.contact_system import ContactSystem
 
 FRAMES = 200
 
@@ -57,7 +61,7 @@ def frames_per_second(trajectory: Trajectory, path: Path, size: tuple[int, int],
 def main(quick: bool = False) -> None:
     frames, times = (5, 1) if quick else (FRAMES, 3)
     trajectory = bouncing_beam(0.01) if quick else bouncing_beam()
-    field = trajectory.system.basis.field
+    field = trajectory.system.basis.mode_shapes
     _ = trajectory.normal_force
     print(f"{len(field.nodes)} nodes, {len(field.cells)} cells, {frames} frames")
     with tempfile.TemporaryDirectory() as folder:

@@ -10,9 +10,8 @@ import time
 import numpy as np
 from eigen import rectangle
 
+from fecontact import ElasticBody, Mesh
 from fecontact.fem.contact_face import contact_nodes
-from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.mesh import Mesh
 from fecontact.reduction.eigenmodes import FreeSystem, free_modes
 from fecontact.reduction.residual_vectors import Flexibility, modal_compliance, residual_modes
 

@@ -14,7 +14,8 @@ import time
 
 import numpy as np
 
-from fecontact import Span, Study, SweepSettings, simulate, sweep
+from fecontact import Study, simulate, sweep
+from fecontact.study import Span, SweepSettings
 from fecontact.sweeps.executors import cores, one_thread_each
 from fecontact.sweeps.summaries import functions_for, summarise
 

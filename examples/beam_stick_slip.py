@@ -18,9 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.bifurcation import (
+    Branch,
+    BranchPoint,
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    Shooting,
+    contact_field,
+    equilibrium_branch,
+    observe,
+    orbit_branch,
+    periodic_motion,
+)
 from fecontact.integrate.initial_state import initial_state
+from fecontact.laws import Constant, ExponentialFriction, RoughSurface
 
 SPEED = "ground.speed"
 PULL = 9.5  # N, of the spring on the beam where it is not displaced
@@ -38,17 +50,17 @@ def beam(speed: float = 0.05, nodes: int = 40, modes: int = 20) -> fc.ContactSys
     basis = fc.modal_basis(body, modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
                            damping=0.01)
     return fc.ContactSystem(
-        basis, normal=fc.RoughSurface(0.3e6, 5.2e-6, 6.0),
-        friction=fc.ExponentialFriction(0.8, 0.55, 1000.0, 1e6),
+        basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
+        friction=ExponentialFriction(0.8, 0.55, 1000.0, 1e6),
         ground=fc.Ground(speed=speed), load=fc.Load(normal=14.0),
         drive=fc.Drive(stiffness_x=5610.0, damping_x=0.768,
-                       motion_x=fc.Constant(-PULL / 5610.0)))
+                       motion_x=Constant(-PULL / 5610.0)))
 
 
-def sliding(lowest: float = 2e-3, highest: float = 0.5) -> fc.Branch:
+def sliding(lowest: float = 2e-3, highest: float = 0.5) -> Branch:
     """Steady sliding over the speed of the belt, from fast to slow."""
-    field = fc.contact_field(beam(highest), {SPEED: highest})
-    return fc.equilibrium_branch(field, bounds=(lowest, highest), direction=-1.0,
+    field = contact_field(beam(highest), {SPEED: highest})
+    return equilibrium_branch(field, bounds=(lowest, highest), direction=-1.0,
                                  options=ContinuationOptions(step=5e-3, points=300))
 
 
@@ -62,34 +74,34 @@ def stuck(system: fc.ContactSystem) -> NDArray[np.float64]:
     return state
 
 
-def stick_slip(speed: float, transient: float = 2.0) -> fc.PeriodicMotion:
+def stick_slip(speed: float, transient: float = 2.0) -> PeriodicMotion:
     """The motion on which a run that begins stuck settles."""
     system = beam(speed)
-    return fc.periodic_motion(system, initial=stuck(system), transient=transient,
+    return periodic_motion(system, initial=stuck(system), transient=transient,
                               longest_period=0.3, rtol=1e-7)
 
 
-def orbits(motion: fc.PeriodicMotion, speed: float, bounds: tuple[float, float],
-           points: int = 100, both: bool = True) -> fc.Branch:
+def orbits(motion: PeriodicMotion, speed: float, bounds: tuple[float, float],
+           points: int = 100, both: bool = True) -> Branch:
     """Stick-slip orbits by shooting from that of a run on, to slow and to fast belts."""
-    return fc.orbit_branch(
-        fc.contact_field(beam(speed), {SPEED: speed}), motion,
-        method=fc.Shooting(segments=1, rtol=1e-8, derivative_rtol=1e-2), bounds=bounds,
+    return orbit_branch(
+        contact_field(beam(speed), {SPEED: speed}), motion,
+        method=Shooting(segments=1, rtol=1e-8, derivative_rtol=1e-2), bounds=bounds,
         scales=scales(motion), width=0.4, both=both, options=settings(points))
 
 
-def slipping(branch: fc.Branch, fastest: float, points: int = 200) -> fc.Branch:
+def slipping(branch: Branch, fastest: float, points: int = 200) -> Branch:
     """Orbits without stick that are born where steady sliding ends, by collocation.
 
     They are smooth, and by far too unstable to be run once round.
     """
-    field = fc.contact_field(beam(fastest), {SPEED: fastest})
+    field = contact_field(beam(fastest), {SPEED: fastest})
     hopf, = branch.of_kind("Hopf")
-    return fc.orbit_branch(field, hopf, method=fc.Collocation(intervals=60), bounds=(2e-3, fastest),
+    return orbit_branch(field, hopf, method=Collocation(intervals=60), bounds=(2e-3, fastest),
                            options=ContinuationOptions(step=0.01, largest_step=0.03, points=points))
 
 
-def scales(motion: fc.PeriodicMotion) -> NDArray[np.float64]:
+def scales(motion: PeriodicMotion) -> NDArray[np.float64]:
     """What counts as one in the length of a step: all displacements alike, all velocities alike."""
     size = np.ptp(motion.states, axis=0) / 2.0
     modes = len(size) // 2
@@ -98,12 +110,13 @@ def scales(motion: fc.PeriodicMotion) -> NDArray[np.float64]:
 
 def settings(points: int) -> ContinuationOptions:
     """Steps of the branches: short ones find the folds; they end where only tiny ones go on."""
-    return ContinuationOptions(step=0.01, smallest_step=5e-4, largest_step=0.03, points=points, locate=False)
+    return ContinuationOptions(step=0.01, smallest_step=5e-4, largest_step=0.03, points=points,
+                               locate=False)
 
 
-def seen(branch: fc.Branch) -> fc.Branch:
+def seen(branch: Branch) -> Branch:
     """The branch with the extremes of point B."""
-    return fc.observe(fc.contact_field(beam(), {SPEED: 0.05}), branch, "B")
+    return observe(contact_field(beam(), {SPEED: 0.05}), branch, "B")
 
 
 def amplitude(point: BranchPoint) -> float:
@@ -112,25 +125,25 @@ def amplitude(point: BranchPoint) -> float:
     return 500.0 * (float(values["observed_maximum"]) - float(values["observed_minimum"]))
 
 
-def run_amplitude(motion: fc.PeriodicMotion) -> float:
+def run_amplitude(motion: PeriodicMotion) -> float:
     """The same of a run [mm]."""
-    row = fc.contact_field(beam(), {}).displacement_row("B")
+    row = contact_field(beam(), {}).displacement_row("B")
     return 500.0 * float(np.ptp(motion.states @ row))
 
 
-def side_by_side(branch: fc.Branch, speed: float) -> list[fc.PeriodicMotion]:
+def side_by_side(branch: Branch, speed: float) -> list[PeriodicMotion]:
     """Runs at a speed, begun on orbits before and behind the unstable part of the branch."""
     unstable = np.flatnonzero(~branch.column("stable").astype(bool))
     if len(unstable) == 0:
         return []
     parts = branch.points[: unstable[0]], branch.points[unstable[-1] + 1 :]
     starts = (min(part, key=lambda point: abs(point.parameter - speed)).u[:-2] for part in parts)
-    return [fc.periodic_motion(beam(speed), initial=np.ascontiguousarray(start), transient=3.0,
+    return [periodic_motion(beam(speed), initial=np.ascontiguousarray(start), transient=3.0,
                                longest_period=0.3, rtol=1e-7) for start in starts]
 
 
-def draw(path: Path, stuck_slip: fc.Branch, free: fc.Branch, hopf: BranchPoint,
-         runs: list[tuple[float, fc.PeriodicMotion]]) -> None:
+def draw(path: Path, stuck_slip: Branch, free: Branch, hopf: BranchPoint,
+         runs: list[tuple[float, PeriodicMotion]]) -> None:
     """Amplitude and period over the speed of the belt: stable solid, unstable dashed, runs dots."""
     import matplotlib.pyplot as plt
 

@@ -18,16 +18,15 @@ from fecontact import (
     ContactSystem,
     Drive,
     ElasticBody,
-    ExponentialFriction,
     Ground,
     Load,
     Patch,
-    RoughSurface,
     generate,
     modal_basis,
     simulate,
     static_equilibrium,
 )
+from fecontact.laws import ExponentialFriction, RoughSurface
 
 LENGTH, HEIGHT = 0.2, 0.02
 

@@ -20,15 +20,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
+from fecontact.analysis import amplitude_spectrum, periodicity
 from fecontact.analysis.spectra import Peak
+from fecontact.laws import (
+    ExponentialFriction,
+    FourierSeries,
+    PrescribedForce,
+    RandomRoughness,
+    RoughSurface,
+)
+from fecontact.plot import plot_contact_map, plot_friction_work, plot_spectrogram
 
 MASS, DRIVE_FREQUENCY, BELT_SPEED, NORMAL_FORCE = 5.632, 13.8, 1e-3, 14.0  # kg, rad/s, m/s, N
 PERIOD = 2.0 * math.pi / DRIVE_FREQUENCY
 ELASTIC_HZ, ELASTIC_DAMPING, AT_DRIVE, AT_CONTACT = 30.0, 0.01, 0.5, -0.5
 
 LAWS: dict[str, Any] = {
-    "normal": fc.RoughSurface(stiffness=10e6, roughness_height=10e-6, damping=40.0),
-    "friction": fc.ExponentialFriction(static_coefficient=0.8, kinetic_coefficient=0.55,
+    "normal": RoughSurface(stiffness=10e6, roughness_height=10e-6, damping=40.0),
+    "friction": ExponentialFriction(static_coefficient=0.8, kinetic_coefficient=0.55,
                                        decay=1000.0, smoothing_slope=1e6),
     "drive": fc.Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
                       angular_frequency=DRIVE_FREQUENCY),
@@ -61,25 +70,25 @@ def prescribed(modes: int = 1) -> fc.ContactSystem:
     resting = oscillator(2)
     state = np.concatenate([fc.static_equilibrium(resting), np.zeros(2)])
     force = resting.contact_history(np.zeros(1), state[None])[0, 0, 0]
-    return oscillator(modes, normal=fc.PrescribedForce(float(force)), load=fc.Load())
+    return oscillator(modes, normal=PrescribedForce(float(force)), load=fc.Load())
 
 
 def spectrum_of_waves(seed: int = 2) -> fc.Ground:
     """Belt with a wave spectrum down to waves of 1 mm, half as steep as the single wave."""
-    return fc.Ground(speed=BELT_SPEED, profile=fc.RandomRoughness(
+    return fc.Ground(speed=BELT_SPEED, profile=RandomRoughness(
         rms_height=60e-6, hurst_exponent=1.0, roll_off_wavelength=5e-3,
         cut_off_wavelength=1e-3, length=50e-3, seed=seed))
 
 
 def fourier_waves() -> fc.Ground:
     """Belt with four waves of a Fourier series."""
-    return fc.Ground(speed=BELT_SPEED, profile=fc.FourierSeries(
+    return fc.Ground(speed=BELT_SPEED, profile=FourierSeries(
         wavelength=5e-3, amplitudes=(100e-6, 150e-6, 40e-6, 20e-6), phases=(0.3, 0.0, 2.0, 4.0)))
 
 
 def random_friction(seed: int = 1) -> fc.Ground:
     """Level belt whose coefficient of friction varies at random, by 8 % in the mean square."""
-    return fc.Ground(speed=BELT_SPEED, friction_variation=fc.RandomRoughness(
+    return fc.Ground(speed=BELT_SPEED, friction_variation=RandomRoughness(
         rms_height=0.08, hurst_exponent=0.8, roll_off_wavelength=5e-3, cut_off_wavelength=0.5e-3,
         length=50e-3, seed=seed))
 
@@ -141,7 +150,7 @@ def ringing(run: fc.Trajectory, point: str | int = "B") -> Peak:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], sticking.astype(int), [0]])))
     first, last = max(zip(edges[::2], edges[1::2], strict=True), key=lambda ends: np.diff(ends))
     t, v = run.time[first:last], run.velocity(point)[first:last, 0]
-    found = fc.amplitude_spectrum(t, np.diff(v, prepend=v[0]) / (t[1] - t[0]))
+    found = amplitude_spectrum(t, np.diff(v, prepend=v[0]) / (t[1] - t[0]))
     peak = next(peak for peak in found.peaks(20, least=1e-6) if peak.frequency_hz > 10.0)
     # Of the acceleration, in which the motion with the belt and the drive is small.
     return peak._replace(value=peak.value / (2.0 * math.pi * peak.frequency_hz))
@@ -197,7 +206,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
           f"ringing at B")
     for name, run in runs.items():
         lengths = 1e3 * np.array([slip.distance for slip in slips(run)])
-        periods = fc.periodicity(run, t_start=run.time[0], largest=8).periods or "-"
+        periods = periodicity(run, t_start=run.time[0], largest=8).periods or "-"
         peak = ringing(run) if run.system.basis.modes > 2 else None
         rings = f"{peak.frequency_hz:.2f} Hz, {1e3 * peak.value:.2f} mm/s" if peak else "-"
         print(f"{name:30s} {periods!s:>7s} {len(lengths):6d} {different(lengths):9d}   "
@@ -208,7 +217,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     shown = {name: run.between(run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
     figure({n: shown[n] for n in names[:3]}, folder / "phase.png")
     figure({n: shown[n] for n in names[3:]}, folder / "irregular.png")
-    fc.plot_spectrogram(shown[names[1]], piece=0.25, highest_hz=60.0,
+    plot_spectrogram(shown[names[1]], piece=0.25, highest_hz=60.0,
                         path=folder / "spectrogram.png")
 
     block = soft_block()
@@ -218,8 +227,8 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     parts = (run.contact_state == fc.ContactState.SLIP).mean(axis=1)
     print(f"Part of the time in which only a part of its face slips: "
           f"{((parts > 0.0) & (parts < 1.0)).mean():.0%}")
-    fc.plot_contact_map(run.between(0.8 * end), path=folder / "block-contact.png")
-    fc.plot_friction_work(run, path=folder / "block-friction-work.png")
+    plot_contact_map(run.between(0.8 * end), path=folder / "block-contact.png")
+    plot_friction_work(run, path=folder / "block-friction-work.png")
 
 
 if __name__ == "__main__":

@@ -19,9 +19,9 @@ from impact_oscillator import FREQUENCIES, settled, start, two_mode_system
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from fecontact import ContactSystem
-from fecontact.analysis.periodicity import count_periods
+from fecontact.analysis import count_periods
 from fecontact.cli.console import progress_bar
-from fecontact.integrate.ensemble import strobe
+from fecontact.integrate import strobe
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS
 

@@ -24,10 +24,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.core.errors import FecontactError
+from fecontact import FecontactError
+from fecontact.bifurcation import (
+    Branch,
+    BranchPoint,
+    ContactField,
+    ContinuationOptions,
+    PoincareScan,
+    Shooting,
+    contact_field,
+    orbit_branch,
+    periodic_motion,
+    poincare_scan,
+)
+from fecontact.laws import RoughSurface
+from fecontact.plot import phase_inset, plot_branches
 
 Array = NDArray[np.float64]
 
@@ -62,54 +73,55 @@ def oscillator(w: float = 64.32) -> fc.ContactSystem:
     basis = fc.ModalBasis(frequencies, np.diag(2.0 * BENDING_DAMPING * frequencies), T,
                           np.zeros((3, 2)), np.ones(1))
     return fc.ContactSystem(
-        basis, normal=fc.RoughSurface(stiffness=0.3e6, roughness_height=5.2e-6, damping=6.0),
+        basis, normal=RoughSurface(stiffness=0.3e6, roughness_height=5.2e-6, damping=6.0),
         drive=fc.Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
                        angular_frequency=w))
 
 
 def field_at(w: float) -> ContactField:
     """The oscillator as a function of the drive's frequency."""
-    return fc.contact_field(oscillator(w), {FREQUENCY: w})
+    return contact_field(oscillator(w), {FREQUENCY: w})
 
 
-def runs(quick: bool = False) -> fc.PoincareScan:
+def runs(quick: bool = False) -> PoincareScan:
     """States once per period, up and down; more values where motions change quickly."""
     values = np.concatenate([np.arange(5.0, 12.0, 0.5), np.arange(12.0, 46.0, 0.2),
                              np.arange(46.0, 80.5, 0.5)])
     if quick:
         values = np.arange(44.0, 52.0, 2.0)
-    return fc.poincare_scan(oscillator(), FREQUENCY, values, transient_periods=100, keep=24,
-                          initial=np.zeros(4))
+    return poincare_scan(oscillator(), FREQUENCY, values, transient_periods=100, keep=24,
+                            initial=np.zeros(4))
 
 
 def orbits(
     w: float, bounds: tuple[float, float], *, initial: Array | None = None, points: int = 60,
-) -> fc.Branch:
+) -> Branch:
     """The branch through the orbit on which a run at w settles, to both sides."""
     field = field_at(w)
-    motion = fc.periodic_motion(
+    motion = periodic_motion(
         field.system(), initial=np.zeros(4) if initial is None else initial,
         transient=None if initial is None else 2.0 * np.pi / w, longest_period=8 * 2.0 * np.pi / w)
-    return fc.orbit_branch(
-        field, motion, method=fc.Shooting(segments=motion.periods, rtol=RTOL), bounds=bounds,
+    return orbit_branch(
+        field, motion, method=Shooting(segments=motion.periods, rtol=RTOL), bounds=bounds,
         both=True, scales=SIZE * np.ptp(motion.states, axis=0) / 2.0, width=WIDTH,
         options=ContinuationOptions(step=1e-3, largest_step=0.01, points=points))
 
 
-def doubled(branch: fc.Branch, doubling: BranchPoint, points: int) -> fc.Branch | None:
+def doubled(branch: Branch, doubling: BranchPoint, points: int) -> Branch | None:
     """The branch of twice the period that begins at a doubling, if it is found."""
     # Close to the single orbit the runs are not exact enough, far from it the guess is not.
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4):
         try:
-            return fc.orbit_branch(field_at(doubling.parameter), doubling, bounds=(25.0, 80.0),
-                                   options=ContinuationOptions(step=step, largest_step=0.02, points=points))
+            return orbit_branch(field_at(doubling.parameter), doubling, bounds=(25.0, 80.0),
+                                   options=ContinuationOptions(step=step, largest_step=0.02,
+                                                               points=points))
         except FecontactError as error:
             why = error
     print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {why}")
     return None
 
 
-def periods(branch: fc.Branch) -> int:
+def periods(branch: Branch) -> int:
     """Periods of the drive in one of the orbit."""
     return int(branch.attributes["periods"])
 
@@ -130,9 +142,9 @@ def known(point: BranchPoint, others: Sequence[Array]) -> bool:
     return any(bool((np.abs(place(point) - other) < 1.0).all()) for other in others)
 
 
-def all_orbits(found: fc.PoincareScan, starts: Sequence[Start] = STARTS) -> list[fc.Branch]:
+def all_orbits(found: PoincareScan, starts: Sequence[Start] = STARTS) -> list[Branch]:
     """Branches from the starts, those that double there, and those that double on these."""
-    def begun(start: Start) -> fc.Branch | None:
+    def begun(start: Start) -> Branch | None:
         index = int(np.argmin(np.abs(found.values - start.w)))
         states = found.up if start.way == "up" else found.down
         try:
@@ -152,16 +164,16 @@ def all_orbits(found: fc.PoincareScan, starts: Sequence[Start] = STARTS) -> list
 
 
 def all_doubled(
-    pool: ThreadPoolExecutor, branches: Sequence[fc.Branch], points: int
-) -> list[fc.Branch]:
+    pool: ThreadPoolExecutor, branches: Sequence[Branch], points: int
+) -> list[Branch]:
     """Branches from all doublings of others; inside the chaos below 26 rad/s there are too many."""
-    doublings: list[tuple[fc.Branch, BranchPoint]] = []
+    doublings: list[tuple[Branch, BranchPoint]] = []
     for branch in branches:
         for point in branch.of_kind("period doubling"):
             if point.parameter > 26.0 and not known(point, [place(one) for _, one in doublings]):
                 doublings.append((branch, point))
     tried = pool.map(lambda pair: doubled(*pair, points), doublings)
-    found: list[fc.Branch] = []
+    found: list[Branch] = []
     reached: list[Array] = []
     for (_, doubling), branch in zip(doublings, tried, strict=True):
         # A branch that ends at this doubling is the same.
@@ -171,7 +183,7 @@ def all_doubled(
     return found
 
 
-def special(branches: Sequence[fc.Branch]) -> Iterator[tuple[int, BranchPoint]]:
+def special(branches: Sequence[Branch]) -> Iterator[tuple[int, BranchPoint]]:
     """Periods and point of all special points, once each."""
     told: list[Array] = []
     for branch in branches:
@@ -181,7 +193,7 @@ def special(branches: Sequence[fc.Branch]) -> Iterator[tuple[int, BranchPoint]]:
                 yield periods(branch), point
 
 
-def covered(found: fc.PoincareScan, branches: Sequence[fc.Branch]) -> tuple[int, list[float]]:
+def covered(found: PoincareScan, branches: Sequence[Branch]) -> tuple[int, list[float]]:
     """Runs that repeat after up to 4 periods on an orbit that is known, and where others are."""
     count, others = 0, []
     for states in (found.up, found.down):
@@ -198,7 +210,7 @@ def covered(found: fc.PoincareScan, branches: Sequence[fc.Branch]) -> tuple[int,
     return count, sorted(set(others))
 
 
-def _meets(branch: fc.Branch, w: float, y: Array) -> bool:
+def _meets(branch: Branch, w: float, y: Array) -> bool:
     """Whether a branch has an orbit with this section at w, by chords between its points."""
     for one, other in pairwise(branch.points):
         if (one.parameter - w) * (other.parameter - w) <= 1e-12:
@@ -210,7 +222,7 @@ def _meets(branch: fc.Branch, w: float, y: Array) -> bool:
     return False
 
 
-def pieces(branch: fc.Branch, low: float, high: float, marked: bool) -> list[fc.Branch]:
+def pieces(branch: Branch, low: float, high: float, marked: bool) -> list[Branch]:
     """What of a branch lies within a range, with its section; doublings stand on single orbits."""
     found: list[list[BranchPoint]] = [[]]
     for point in branch.points:
@@ -225,7 +237,7 @@ def pieces(branch: fc.Branch, low: float, high: float, marked: bool) -> list[fc.
 
 
 def draw(
-    path: Path, branches: Sequence[fc.Branch], found: fc.PoincareScan, low: float, high: float,
+    path: Path, branches: Sequence[Branch], found: PoincareScan, low: float, high: float,
     chosen: Sequence[tuple[int, float]], marked: bool = False,
 ) -> None:
     """The diagram of a range, with phase planes of orbits of so many periods near some places."""
@@ -239,10 +251,10 @@ def draw(
             continue
         point, branch = min(there, key=lambda pair: abs(pair[0].parameter - w))
         kind = "" if point.values["stable"] else ", unstable"
-        insets.append(fc.phase_inset(field_at(w), branch, point, float(section(point)[0]),
+        insets.append(phase_inset(field_at(w), branch, point, float(section(point)[0]),
                                      ("B", "y"), f"{point.parameter:.2f} rad/s{kind}"))
     part = (low <= found.values) & (found.values <= high)
-    fc.plot_branches(shown, "observed_section",
+    plot_branches(shown, "observed_section",
                      x_label="angular frequency of the drive [rad/s]",
                      y_label="displacement once per period [m]",
                      names=[f"period {periods(branch)}" for branch in shown],

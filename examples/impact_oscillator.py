@@ -18,19 +18,19 @@ from typing import Any
 import numpy as np
 
 from fecontact import (
-    ConstantFriction,
     ContactSystem,
     Drive,
-    RoughSurface,
     Study,
     Trajectory,
     basis_from_matrices,
-    lyapunov_exponents,
     sensitivity,
     simulate,
 )
-from fecontact.analysis.impacts import Impacts, Rest, find_impacts, find_rests
-from fecontact.analysis.periodicity import Periodicity, drive_period, periodicity
+from fecontact.analysis import Impacts, Periodicity, find_impacts, find_rests, periodicity
+from fecontact.analysis.impacts import Rest
+from fecontact.analysis.periodicity import drive_period
+from fecontact.bifurcation import lyapunov_exponents
+from fecontact.laws import ConstantFriction, RoughSurface
 
 STUDY = Path(__file__).with_suffix(".toml")
 REDUCED_MASS = 0.092  # kg

@@ -19,9 +19,16 @@ from typing import ClassVar
 import numpy as np
 
 import fecontact as fc
+from fecontact.laws import (
+    ExponentialFriction,
+    FrictionLaw,
+    PerNode,
+    RoughSurface,
+    friction_law,
+)
 
 
-@fc.friction_law
+@friction_law
 def _logarithmic(v, F, p):  # type: ignore[no-untyped-def]
     coefficient, effect, reference, slope = p[0], p[1], p[2], p[3]
     smooth = math.tanh(slope * v)
@@ -31,15 +38,15 @@ def _logarithmic(v, F, p):  # type: ignore[no-untyped-def]
 
 
 @dataclass(frozen=True)
-class LogarithmicFriction(fc.FrictionLaw):
+class LogarithmicFriction(FrictionLaw):
     """Friction that grows with the logarithm of slip velocity; v_0 in m/s, slope in s/m."""
 
     kernel: ClassVar = _logarithmic
 
-    coefficient: fc.PerNode = 0.1
-    rate_effect: fc.PerNode = 0.01
-    reference_velocity: fc.PerNode = 1e-4
-    smoothing_slope: fc.PerNode = 1e4
+    coefficient: PerNode = 0.1
+    rate_effect: PerNode = 0.01
+    reference_velocity: PerNode = 1e-4
+    smoothing_slope: PerNode = 1e4
 
     @property
     def velocity_scale(self) -> float:
@@ -51,9 +58,9 @@ def main(end: float = 1.0) -> None:
     """Steady sliding with the law above, and with the falling law of the package."""
     body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)), thickness=0.01)
     basis = fc.modal_basis(body, 12, contact_nodes=20, damping=0.01)
-    for friction in (LogarithmicFriction(), fc.ExponentialFriction(0.2, 0.12, smoothing_slope=1e4)):
+    for friction in (LogarithmicFriction(), ExponentialFriction(0.2, 0.12, smoothing_slope=1e4)):
         system = fc.ContactSystem(
-            basis, fc.RoughSurface(stiffness=0.3e6, roughness_height=5.2e-6, damping=6.0),
+            basis, RoughSurface(stiffness=0.3e6, roughness_height=5.2e-6, damping=6.0),
             friction=friction, ground=fc.Ground(speed=0.01), load=fc.Load(normal=14.0),
             drive=fc.Drive(stiffness_x=5610.0, damping_x=5.0))
         run = fc.simulate(system, end, outputs=2001)

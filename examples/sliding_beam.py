@@ -17,6 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
+from fecontact.laws import ExponentialFriction, RoughSurface
+from fecontact.plot import (
+    plot_contact_map,
+    plot_energies,
+    plot_friction_work,
+    plot_history,
+)
 
 Array = NDArray[np.float64]
 
@@ -37,8 +44,8 @@ def system(beam: fc.ElasticBody, nodes: int = 40, modes: int = 12, **basis: Any
         fc.modal_basis(beam, modes, contact_nodes=nodes, B=fc.Patch("B", 0.004),
                        C=fc.Patch("C", 0.01), points={"end": (LENGTH, HEIGHT / 2)},
                        damping=0.02, **basis),
-        normal=fc.RoughSurface(stiffness=5e7, roughness_height=20e-6, damping=2e3),
-        friction=fc.ExponentialFriction(static_coefficient=0.5, kinetic_coefficient=0.35,
+        normal=RoughSurface(stiffness=5e7, roughness_height=20e-6, damping=2e3),
+        friction=ExponentialFriction(static_coefficient=0.5, kinetic_coefficient=0.35,
                                         decay=2.0, smoothing_slope=1e4),
         ground=fc.Ground(speed=2.0, amplitude=30e-6, wavelength=0.12),
         drive=fc.Drive(stiffness_x=2e5, damping_x=50.0, amplitude_x=0.3e-3,
@@ -102,10 +109,10 @@ def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
     # Archard's k of 1e-14 m^2/N, of steel on steel in mild wear, over the coefficient of friction.
     depth = complete.wear_depth(1e-14 / 0.35, THICKNESS)[-1]
     print(f"In mild wear this takes off {1e9 * depth.min():.3f} to {1e9 * depth.max():.3f} nm.")
-    fc.plot_energies(complete, path=folder / "energies.png")
-    fc.plot_contact_map(complete, path=folder / "contact.png")
-    fc.plot_friction_work(complete, path=folder / "friction-work.png")
-    fc.plot_history(complete, ("B", "C", "end"), path=folder / "history.png")
+    plot_energies(complete, path=folder / "energies.png")
+    plot_contact_map(complete, path=folder / "contact.png")
+    plot_friction_work(complete, path=folder / "friction-work.png")
+    plot_history(complete, ("B", "C", "end"), path=folder / "history.png")
     fc.render(complete, folder / "sliding-beam.mp4", frames=2 if quick else 90, colour="von_mises",
               title="Steel beam sliding over waves")
 

@@ -17,10 +17,12 @@ from pathlib import Path
 import numpy as np
 
 import fecontact as fc
+from fecontact.laws import Bound
+from fecontact.sweeps import dask_executor
 
 STUDY = Path(__file__).with_name("sweep_stick_slip.toml")
-AXES = {"ground.speed": fc.Bound(1e-3, 12e-3, 12),
-        "friction.static_coefficient": fc.Bound(0.6, 0.9, 5)}
+AXES = {"ground.speed": Bound(1e-3, 12e-3, 12),
+        "friction.static_coefficient": Bound(0.6, 0.9, 5)}
 
 
 def start(folder: str, *command: str) -> "subprocess.Popen[bytes]":
@@ -53,7 +55,7 @@ def main(quick: bool = False) -> None:
             print(f"{done} of {total} cases are done; one of the two workers is killed")
 
     try:
-        with fc.dask_executor(address, 30.0) as executor:
+        with dask_executor(address, 30.0) as executor:
             table = fc.sweep(study, axes, executor, folder=f"{folder}/sweep", progress=show)
     finally:
         for process in (*workers, scheduler):

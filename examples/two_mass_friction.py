@@ -19,31 +19,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact import (
+from fecontact import ContactSystem, Ground, ModalBasis, basis_from_matrices, simulate
+from fecontact.bifurcation import (
     Axis,
     Basins,
     Branch,
-    ContactSystem,
-    Crossing,
-    Ground,
-    ModalBasis,
-    PrescribedForce,
-    ProductFriction,
+    Collocation,
+    ContactField,
+    ContinuationOptions,
+    amplitude,
     basins,
-    basis_from_matrices,
     contact_field,
     equilibrium_branch,
     find_equilibrium,
-    simulate,
+    orbit_branch,
 )
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
-from fecontact.bifurcation.orbits.samples import amplitude
-from fecontact.output.plots.basins import plot_basins
-from fecontact.output.plots.bifurcation_diagram import plot_branches
+from fecontact.integrate import Crossing
+from fecontact.laws import PrescribedForce, ProductFriction
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS
+from fecontact.plot import plot_basins, plot_branches
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -99,7 +94,8 @@ def doubled(
     field: ContactField, orbits: Branch, bounds: tuple[float, float], name: str,
 ) -> dict[str, Branch]:
     """Orbits of twice the period from each doubling of a branch, those once that lie on several."""
-    settings, found = ContinuationOptions(step=0.005, largest_step=0.04, points=300), dict[str, Branch]()
+    settings = ContinuationOptions(step=0.005, largest_step=0.04, points=300)
+    found: dict[str, Branch] = {}
     for point in orbits.of_kind("period doubling"):
         if not any(abs(place.parameter - point.parameter) < 1e-5
                    for other in found.values() for place in other.special):
@@ -128,7 +124,8 @@ def diagram_over_damping(B: float) -> dict[str, Branch]:
     found = {"steady sliding": sliding}
     for name, point in zip(names, sliding.of_kind("Hopf"), strict=True):
         found[name] = orbit_branch(field, point, method=Collocation(intervals=100), bounds=bounds,
-                                   options=ContinuationOptions(step=0.005, points=600), scales=LARGE)
+                                   options=ContinuationOptions(step=0.005, points=600),
+                                   scales=LARGE)
     return found
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fecontact.fem.mesh import Mesh
+from fecontact import Mesh
 
 
 def grid(xs, ys, *, triangles=False, warp=None, points=None, reverse=(), split=()):

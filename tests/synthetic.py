@@ -3,12 +3,9 @@
 import numpy as np
 import scipy.sparse as sp
 
-from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.modal_basis import Field, ModalBasis
-from fecontact.system.contact_system import ContactSystem
+from fecontact import ContactSystem, Ground, ModalBasis, Trajectory
+from fecontact.laws import ExponentialFriction, RoughSurface
+from fecontact.reduction.modal_basis import ModeShapes
 
 YOUNGS_MODULUS = 2.1e11
 
@@ -74,7 +71,7 @@ def basis(length=0.2, height=0.02, columns=40, rows=6, contact_nodes=5, triangle
         T=T[:, :, order],
         positions=places,
         tributary=np.full(contact_nodes, length / contact_nodes),
-        field=Field(nodes, cells, outline, shapes[:, :, order].copy(),
+        mode_shapes=ModeShapes(nodes, cells, outline, shapes[:, :, order].copy(),
                     stress[:, :, order].copy(), restriction),
     )
 

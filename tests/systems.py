@@ -4,24 +4,25 @@ import numpy as np
 from meshes_for_tests import rectangle
 
 from fecontact import (
-    ConstantFriction,
     ContactSystem,
     Drive,
     ElasticBody,
-    ExponentialFriction,
     Ground,
-    LinearContact,
     Load,
     Material,
     ModalBasis,
+    basis_from_matrices,
+    modal_basis,
+)
+from fecontact.bifurcation import contact_field, vector_field
+from fecontact.laws import (
+    ConstantFriction,
+    ExponentialFriction,
+    LinearContact,
     PrescribedForce,
     ProductFriction,
     RoughSurface,
-    basis_from_matrices,
-    modal_basis,
-    vector_field,
 )
-from fecontact.bifurcation.fields.contact_field import contact_field
 
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 

@@ -15,6 +15,8 @@ ROOMS = ("core", "fem", "laws", "reduction", "system", "integrate", "analysis", 
          "output", "study", "sweeps", "cli")
 # Rooms that do not know each other, although the one stands above the other.
 STRANGERS = {("laws", "fem"), ("study", "output")}
+# Modules that hold nothing but public names under which people look for them.
+NAMESPACES = {"plot", "io"}
 LARGEST, MOST_FILES = 450, 16
 
 MODULES = {
@@ -50,7 +52,8 @@ def test_there_is_nothing_beside_the_rooms():
     folders = {path.name for path in PACKAGE.iterdir() if path.is_dir()} - {"__pycache__"}
     files = {path.name for path in PACKAGE.iterdir() if path.is_file()}
     assert folders == set(ROOMS)
-    assert files == {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
+    assert files == {"__init__.py", "__init__.pyi", "__main__.py", "py.typed",
+                     *(f"{name}.{ending}" for name in NAMESPACES for ending in ("py", "pyi"))}
 
 
 @pytest.mark.parametrize("name", ROOMS)

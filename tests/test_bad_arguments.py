@@ -12,11 +12,9 @@ import pytest
 from systems import friction_oscillator
 
 import fecontact
-from fecontact import modal_basis
-from fecontact.bifurcation.continuation.branch import Branch, BranchPoint
+from fecontact import ElasticBody, FecontactError, InputError, modal_basis
+from fecontact.bifurcation import Branch, BranchPoint
 from fecontact.core import memory
-from fecontact.core.errors import FecontactError, InputError
-from fecontact.fem.elastic_body import ElasticBody
 
 CALLS = """
 Beam(None)
@@ -275,7 +273,7 @@ equilibrium_branch(contact_field(osc,["ground.speed"]),parameter="ground.speed",
 equilibrium_branch(field,parameter=3)
 equilibrium_branch(field,"ground.speed")
 equilibrium_branch(field,"ground.speed","x")
-equilibrium_branch(field,settings=3)
+equilibrium_branch(field,options=3)
 equilibrium_branch(field,scales="a")
 equilibrium_branch(field,scales=[1,2,3])
 equilibrium_branch(field,width="a")
@@ -298,7 +296,7 @@ orbit_branch(field,branch)
 orbit_branch(field,branch.points[0])
 orbit_branch(field,point,method="shooting")
 orbit_branch(field,point,direction=None)
-orbit_branch(field,point,settings=3)
+orbit_branch(field,point,options=3)
 orbit_branch(field,([0],[0]))
 orbit_branch(field,([0,1],None))
 orbit_branch(field,(None,None),method=Shooting())
@@ -459,8 +457,8 @@ def names():
     mesh = fecontact.generate(fecontact.Beam(0.1, 0.01, element_size=0.01))
     body = ElasticBody(mesh)
     basis = modal_basis(body, 5, contact_nodes=4)
-    system = fecontact.ContactSystem(basis, fecontact.RoughSurface(0.3e6, 5.2e-6, 6.0),
-                                     fecontact.ExponentialFriction(),
+    system = fecontact.ContactSystem(basis, fecontact.laws.RoughSurface(0.3e6, 5.2e-6, 6.0),
+                                     fecontact.laws.ExponentialFriction(),
                                      ground=fecontact.Ground(speed=0.1),
                                      load=fecontact.Load(normal=10.0))
     oscillator = friction_oscillator(2)
@@ -469,7 +467,7 @@ def names():
     return known | {
         "np": np, "nan": float("nan"), "mesh": mesh, "body": body, "basis": basis,
         "system": system, "osc": oscillator,
-        "field": fecontact.contact_field(oscillator, ["ground.speed"]), "point": point,
+        "field": fecontact.bifurcation.contact_field(oscillator, ["ground.speed"]), "point": point,
         "branch": Branch("ground.speed", (point,)),
         "run": fecontact.simulate(oscillator, 0.1, outputs=51)}
 
@@ -504,12 +502,12 @@ DATA = Path(__file__).parent / "data"
 MATRICES = ("block_mass.mtx", "block_mass.npy", "block_mass.npz", "block.mat", "block_v73.mat",
             "block_MASS1.mtx")
 READERS = {
-    **dict.fromkeys(MATRICES, fecontact.read_matrix), "block.uff": fecontact.read_uff,
+    **dict.fromkeys(MATRICES, fecontact.io.read_matrix), "block.uff": fecontact.io.read_uff,
     "part.msh": fecontact.read_mesh, "part.inp": fecontact.read_mesh,
     "part.med": fecontact.read_mesh, "part.vtk": fecontact.read_mesh,
     "part.vtu": fecontact.read_mesh, "part.bdf": fecontact.read_mesh,
-    "run.vtkhdf": fecontact.read_case, "basis.h5": fecontact.read_basis,
-    "branches.h5": fecontact.read_branches, "index.csv": fecontact.read_table,
+    "run.vtkhdf": fecontact.read_case, "basis.h5": fecontact.io.read_basis,
+    "branches.h5": fecontact.io.read_branches, "index.csv": fecontact.io.read_table,
 }
 
 
@@ -521,7 +519,7 @@ def whole(names, tmp_path_factory):
         shutil.copy(DATA / name, folder)
     fecontact.write_mesh(names["mesh"], folder / "part.msh")
     fecontact.write_case(folder / "run.vtkhdf", names["run"])
-    fecontact.write_basis(folder / "basis.h5", names["basis"])
+    fecontact.io.write_basis(folder / "basis.h5", names["basis"])
     return folder
 
 

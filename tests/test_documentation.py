@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 import fecontact as fc
+from fecontact import Study
 from fecontact.cli import execute
 from fecontact.cli.app import COMMANDS, app
+from fecontact.laws import check_law
 from fecontact.output.render.offscreen import can_render
-from fecontact.study.study import Study
+from fecontact.reduction import BasisReport
+from fecontact.study import Span
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -69,8 +72,8 @@ def orbits_setup(folder):
 def sensitivity(names):
     """The table of a sweep for Sobol indices, of which the page speaks by then."""
     names["table"] = fc.sweep(
-        "study.toml", {"ground.speed": fc.Span(1e-3, 4e-3, 2),
-                       "load.normal": fc.Span(10.0, 20.0, 2)},
+        "study.toml", {"ground.speed": Span(1e-3, 4e-3, 2),
+                       "load.normal": Span(10.0, 20.0, 2)},
         method="sensitivity", samples=8, summaries=["friction_power"], folder="sensitivity")
 
 
@@ -80,7 +83,7 @@ SETUP = {"laws.md": laws_setup, "sweeps.md": sweeps_setup, "orbits.md": orbits_s
 
 def check_readme(names, printed, folder):
     assert "The run reached its end." in printed
-    assert "right to" in fc.BasisReport(names["basis"]).recommendation
+    assert "right to" in BasisReport(names["basis"]).recommendation
     assert names["run"].energies.imbalance < 2e-5
     assert set(names["run"].contact_state.ravel().tolist()) == {0, 1, 2}
     assert (folder / "contact.png").stat().st_size > 10_000
@@ -148,7 +151,7 @@ def check_laws(names, printed, folder):
     # mu_0 + a ln(1 + v / v_0) times F = 5 N, with the sign of slip.
     force = law.kernel.python(-0.1, 5.0, law.table(np.ones(1))[0])[0]
     assert force == pytest.approx(-5.0 * (0.2 + 0.03 * np.log1p(0.1 / 1e-4)), rel=1e-9)
-    fc.check_law(law)
+    check_law(law)
     assert names["system"].friction.static_coefficient == 0.6
 
 

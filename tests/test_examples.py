@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scripts_for_tests import ROOT, check_numbers, run_script
 
+from fecontact import read_case
 from fecontact.cli import execute
-from fecontact.output.files.case import read_case
 from fecontact.output.render.offscreen import can_render
 
 # Spring of the drive and elastic mode with the contact held: w^2 of the one motion that is left.

@@ -7,9 +7,12 @@ import pytest
 from synthetic import basis, run
 
 import fecontact as fc
-from fecontact.bifurcation.continuation.branch import BranchPoint
+from fecontact.bifurcation import Branch, BranchPoint
 from fecontact.bifurcation.equilibria.stability_map import StabilityMap
 from fecontact.core.units import html_table, listed, span
+from fecontact.integrate import Ensemble
+from fecontact.laws import LinearContact
+from fecontact.sweeps import SweepTable
 
 TRICKY = "<b>\"left\" & 'right'</b>"
 TOML = """
@@ -69,11 +72,11 @@ def branch(name="ground.speed", points=40):
         return BranchPoint(np.array([0.0, p]), np.array([0.0, 1.0]), {"stable": p < 1.0}, kind)
 
     several = [at(p) for p in np.linspace(0.5, 2.0, points)]
-    return fc.Branch(name, (*several[:10], at(1.0, "Hopf"), *several[10:], at(2.0, "fold")))
+    return Branch(name, (*several[:10], at(1.0, "Hopf"), *several[10:], at(2.0, "fold")))
 
 
 def table(name="load.normal"):
-    return fc.SweepTable(
+    return SweepTable(
         {name: tuple(np.linspace(1.0, 4.0, 20)), "friction.law": ("a", "b") * 10},
         {"friction_power": np.where(np.arange(20) == 3, np.nan, np.arange(20.0))},
         [f"{k}" for k in range(20)], ["fell <over>" if k == 3 else "" for k in range(20)])
@@ -105,7 +108,7 @@ SHOWN = {
                            "friction.law of 2 values", "friction_power")),
     "Study": (lambda: fc.Study.from_toml(TOML), ("Beam", "modes: 6", "RoughSurface", "50 ms",
                                                  "1.2 m/s")),
-    "Ensemble": (lambda: fc.Ensemble(np.array([[0.0, 0.1, 0.2]] * 3), np.zeros((3, 3, 4)),
+    "Ensemble": (lambda: Ensemble(np.array([[0.0, 0.1, 0.2]] * 3), np.zeros((3, 3, 4)),
                                      (fc.Status.FINISHED, fc.Status.FAILED, fc.Status.FINISHED),
                                      np.array([7, 9, 8])),
                  ("runs: 3", "2 finished, 1 failed", "0 ... 0.2 s", "7 ... 9")),
@@ -175,7 +178,7 @@ def test_matrices_and_groups_are_named():
     both = fc.ContactSystem(
         fc.ModalBasis(plain.angular_frequencies, plain.damping, plain.T, plain.positions,
                       plain.tributary, groups=(("left", 2), ("right", 3))),
-        normal={"left": system.normal, "right": fc.LinearContact(stiffness=1e8)},
+        normal={"left": system.normal, "right": LinearContact(stiffness=1e8)},
         friction=system.friction, load=fc.Load(normal=800.0),
         ground=fc.Ground(speed=-0.5, amplitude=1e-6, wavelength=0.01))
     line = repr(both)

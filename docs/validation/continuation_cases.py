@@ -5,20 +5,18 @@ from comparison import Comparison, comparisons
 from scipy.integrate import solve_ivp
 from single_masses import mass_in_plane
 
-from fecontact import (
+from fecontact import Ground, Load
+from fecontact.bifurcation import (
     Branch,
     Collocation,
-    ConstantFriction,
-    Ground,
-    LinearContact,
-    Load,
+    ContinuationOptions,
     contact_field,
     equilibrium_branch,
     find_equilibrium,
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.laws import ConstantFriction, LinearContact
 
 CASCADE = (("asymmetric orbit", 229.407, 0.480867), ("doubled orbit", 218.210, 0.987949),
            ("twice doubled orbit", 215.966, 1.98675))
@@ -84,7 +82,8 @@ def lorenz() -> list[Comparison]:
                  Comparison(f"Lorenz, {name}: period there", period, doubling.values["period"])]
         if number < 2:
             branch = orbit_branch(field, doubling, bounds=(215.0, 230.0),
-                                  settings=ContinuationOptions(step=0.01, stop_at=("period doubling",)))
+                                  options=ContinuationOptions(step=0.01,
+                                                              stop_at=("period doubling",)))
     return rows
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 from comparison import Comparison, comparisons
 
-from fecontact import Beam, ElasticBody, Material, Mesh, eigenfrequencies_hz, generate
+from fecontact import Beam, ElasticBody, Material, Mesh, generate
+from fecontact.reduction import eigenfrequencies_hz
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 FREE = (53.14689, 146.40358, 286.72805)

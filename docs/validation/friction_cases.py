@@ -5,20 +5,14 @@ from comparison import Comparison, comparisons
 from scipy.optimize import brentq
 from single_masses import in_plane, mass_in_plane
 
-from fecontact import (
+from fecontact import ContactSystem, Drive, Ground, Load, simulate, static_equilibrium
+from fecontact.integrate import Rodas5P, SetValued
+from fecontact.laws import (
     ConstantFriction,
-    ContactSystem,
-    Drive,
     ExponentialFriction,
-    Ground,
     HyperbolicFriction,
     LinearContact,
-    Load,
-    Rodas5P,
     RoughSurface,
-    SetValued,
-    simulate,
-    static_equilibrium,
 )
 
 GENTLE = RoughSurface(1e5, 1e-4, 0.0)

@@ -7,7 +7,9 @@ import numpy as np
 from comparison import Comparison, comparisons, table
 from pictures import save
 
-from fecontact import Scipy, Trajectory, periodicity, simulate
+from fecontact import Trajectory, simulate
+from fecontact.analysis import periodicity
+from fecontact.integrate import Scipy
 
 FIGURES = {
     "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop with one slip, which "

@@ -4,15 +4,9 @@ import numpy as np
 from comparison import Comparison, comparisons
 from single_masses import above, mass_above
 
-from fecontact import (
-    LinearContact,
-    Load,
-    NormalLaw,
-    PowerContact,
-    RoughSurface,
-    find_impacts,
-    simulate,
-)
+from fecontact import Load, simulate
+from fecontact.analysis import find_impacts
+from fecontact.laws import LinearContact, NormalLaw, PowerContact, RoughSurface
 
 MASS, SPEED, STIFFNESS, ROUGHNESS = 0.1, 0.05, 1e6, 1e-4
 DEEPEST = (3.0 * MASS * SPEED**2 * ROUGHNESS / STIFFNESS) ** (1.0 / 3.0)

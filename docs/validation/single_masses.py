@@ -2,12 +2,8 @@
 
 import numpy as np
 
-from fecontact import (
-    ContactSystem,
-    RoughSurface,
-    basis_from_matrices,
-    static_equilibrium,
-)
+from fecontact import ContactSystem, basis_from_matrices, static_equilibrium
+from fecontact.laws import RoughSurface
 
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 

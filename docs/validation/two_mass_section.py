@@ -9,7 +9,8 @@ from comparison import Comparison, comparisons, table
 from pictures import save
 from scipy.optimize import brentq
 
-from fecontact import Branch, amplitude, plot_basins, plot_branches
+from fecontact.bifurcation import Branch, amplitude
+from fecontact.plot import plot_basins, plot_branches
 
 SPEED = 3.8  # between the folds
 KINDS = (("Hopf", "Hopf points of steady sliding"), ("fold", "turning points of the orbits"),

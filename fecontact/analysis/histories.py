@@ -57,8 +57,8 @@ def history(
     Raises
     ------
     InputError
-        For a quantity, a point or an component that does not exist, and for a quantity of contact nodes
-        at a point that is none.
+        For a quantity, a point or a component that does not exist, and for a quantity of contact
+        nodes at a point that is none.
     """
     require_kind("history", Trajectory, trajectory=trajectory)
     if quantity not in QUANTITIES:
@@ -78,10 +78,11 @@ def history(
                        f"{title} of {point_name(point)}")
     motion = getattr(trajectory, quantity)(point)
     if component not in _AXES or _AXES[component] >= motion.shape[1]:
-        raise InputError(f"axis = {axis!r} is not one of {point_name(point)}; choose from "
-                         f"{choices(list(_AXES)[: motion.shape[1]])}.")
+        raise InputError(f"component = {component!r} is not one of {point_name(point)}; choose "
+                         f"from {choices(list(_AXES)[: motion.shape[1]])}.")
     unit = _OF_POINTS[quantity]
-    return History(motion[:, _AXES[component]], unit.replace("m", "rad") if component == "phi" else unit,
+    unit = unit.replace("m", "rad") if component == "phi" else unit
+    return History(motion[:, _AXES[component]], unit,
                    f"{title} {component} of {point_name(point)}")
 
 

@@ -99,7 +99,7 @@ def receptance(
         - \omega^2 I\big]^{-1} T_e^T
 
     with the springs c and dashpots b of the drive, whose far ends rest, and p = 0, 1, 2 for
-    receptance, mobility, accelerance. CollocationLinearisation at a state, the contact's stiffness and damping
+    receptance, mobility, accelerance. Linearised at a state, the contact's stiffness and damping
     come in by the Jacobian there; a node that sticks is held by its friction's slope
     dR/dv, as by a dashpot. An unstable state, of which the result says so, never answers a force
     in this way: what grows from it ends somewhere else.

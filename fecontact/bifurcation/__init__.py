@@ -1,1 +1,5 @@
 """Equilibria, periodic orbits, their stability and bifurcations, followed over parameters."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, BranchStatus
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import observe
@@ -85,7 +85,8 @@ def follow_branches(
         shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
     # Found out after a long computation, a wrong name would be found out too late.
     basis.point_index(shown)
-    result = Branches(contact_field(system, {wanted.name: wanted.first}), (shown, wanted.component))
+    result = Branches(contact_field(system, {wanted.checked_parameter: wanted.first}),
+                      (shown, wanted.component))
     tasks = deque(_first_tasks(result.contact_field, wanted, initial))
     while tasks:
         task = tasks.popleft()
@@ -116,7 +117,7 @@ def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
     values = np.array(branch.attributes["parameter_values"], dtype=float)
     for place in np.unique(np.linspace(0, len(branch) - 1, _LOOKS).astype(int)):
         point = branch.points[place]
-        values[field.index(branch.name)] = point.parameter
+        values[field.index(branch.parameter_name)] = point.parameter
         if "period" in point.values:
             motion = point.orbit(field)
             times, states = motion.times, motion.states
@@ -124,7 +125,8 @@ def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
             times, states = np.zeros(1), np.atleast_2d(point.values["state"])
         found = limits_exceeded(field.system(values), times, states)
         if found:
-            yield from (f"at {branch.name} = {point.parameter:.6g} {one}" for one in found)
+            yield from (f"at {branch.parameter_name} = {point.parameter:.6g} {one}"
+                        for one in found)
             return
 
 
@@ -133,7 +135,7 @@ class _Task(NamedTuple):
 
     title: str
     generation: int
-    follow: Callable[[Settings], Branch]
+    follow: Callable[[ContinuationOptions], Branch]
 
 
 def _settings(
@@ -147,10 +149,10 @@ def _settings(
 
 
 def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[_Task]:
-    low, high = wanted.bounds
+    low, high = wanted.checked_bounds
     if wanted.kind != "orbits":
         yield _Task(_EQUILIBRIA, 0, lambda options: equilibrium_branch(
-            field, parameter=wanted.name, options=_fine(options),
+            field, parameter=wanted.checked_parameter, options=_fine(options),
             direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
     if wanted.kind != "equilibria":
         yield _Task("orbits of the run", 0, partial(_orbits, field, wanted, initial))
@@ -180,11 +182,11 @@ def _orbits(
     from fecontact.bifurcation.orbits.branches import orbit_branch
     from fecontact.bifurcation.orbits.from_run import periodic_motion
 
-    low, high = wanted.bounds
+    low, high = wanted.checked_bounds
     motion = periodic_motion(field.system(), initial=initial, transient=wanted.transient,
                              longest_period=wanted.longest_period)
     return orbit_branch(
-        field, motion, wanted.name, method=_method(wanted), options=options,
+        field, motion, wanted.checked_parameter, method=_method(wanted), options=options,
         # So that a step is one of the parameter rather than of the orbit, which may grow.
         scales=_SIZE * motion.amplitudes,
         direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high)

@@ -15,7 +15,9 @@ _SWITCHES = ("Hopf", "period doubling", "branch point")
 
 @dataclass(frozen=True)
 class BranchSettings:
-    """``[branch]``: solutions over a parameter; see :func:`fecontact.equilibrium_branch`.
+    """``[branch]``: solutions over a parameter.
+
+    See :func:`fecontact.bifurcation.equilibrium_branch`.
 
     Parameters
     ----------
@@ -94,8 +96,8 @@ class BranchSettings:
             raise InputError(f"BranchSettings: generations = {self.generations} must be zero or "
                              f"above.")
         if self.poincare_scan < 0 or self.poincare_scan == 1:
-            raise InputError(f"BranchSettings: poincare_scan = {self.poincare_scan} must be zero, for "
-                             f"none, or at least 2.")
+            raise InputError(f"BranchSettings: poincare_scan = {self.poincare_scan} must be zero, "
+                             f"for none, or at least 2.")
         if self.step > self.largest_step:
             raise InputError(f"BranchSettings: step = {self.step:g} must not be above largest_step "
                              f"= {self.largest_step:g}.")
@@ -113,24 +115,24 @@ class BranchSettings:
         if self.bounds is None:
             return
         low, high = self.bounds
-        require_finite("BranchSettings: the range", low=low, high=high)
+        require_finite("BranchSettings: the bounds", low=low, high=high)
         if not low < high:
-            raise InputError(f"BranchSettings: range = {list(self.bounds)} must be two values, the "
-                             f"smaller one first.")
+            raise InputError(f"BranchSettings: bounds = {list(self.bounds)} must be two values, "
+                             f"the smaller one first.")
         if self.start is not None and not low <= self.start <= high:
             raise InputError(f"BranchSettings: start = {self.start:g} must lie in the bounds, "
                              f"{low:g} to {high:g}.")
 
     @property
-    def bounds(self) -> tuple[float, float]:
-        """The range; InputError where there is none."""
+    def checked_bounds(self) -> tuple[float, float]:
+        """The bounds; InputError where there are none."""
         if self.bounds is None:
-            raise InputError("[branch] lacks the key 'range', the least and largest value of the "
-                             "parameter; give it, or --from and --to.")
+            raise InputError("[branch] lacks the key 'bounds', the least and largest value of the "
+                             "parameter; give it, or --bounds LOW HIGH.")
         return self.bounds
 
     @property
-    def name(self) -> str:
+    def checked_parameter(self) -> str:
         """The parameter; InputError where there is none."""
         if self.parameter is None:
             raise InputError("[branch] lacks the key 'parameter', the dotted name of the number "
@@ -140,11 +142,12 @@ class BranchSettings:
     @property
     def first(self) -> float:
         """Value at which the first branch begins."""
-        return self.bounds[0] if self.start is None else self.start
+        return self.checked_bounds[0] if self.start is None else self.start
 
     def options(self) -> "ContinuationOptions":
         """How branches are followed."""
         from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
-        return ContinuationOptions(step=self.step, largest_step=self.largest_step, points=self.points,
-                        bounds=self.bounds)
+        return ContinuationOptions(step=self.step, largest_step=self.largest_step,
+                                   points=self.points,
+                                   bounds=self.checked_bounds)

@@ -60,9 +60,10 @@ def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any
 
     from fecontact.bifurcation.attractors.poincare_scan import poincare_scan
 
-    values = np.linspace(*wanted.bounds, wanted.poincare_scan)
+    values = np.linspace(*wanted.checked_bounds, wanted.poincare_scan)
     with progress_bar("Running at each value", 2.0 * len(values)) as show:
-        return poincare_scan(system, wanted.name, values, initial=initial, progress=show)
+        return poincare_scan(system, wanted.checked_parameter, values, initial=initial,
+                             progress=show)
 
 
 def branches_csv(branches: Mapping[str, Branch]) -> str:
@@ -96,7 +97,7 @@ def special_table(branch: Branch) -> Any:
         period = _period(point)
         rows.append((point.kind or ("start" if index == 0 else "end"), f"{point.parameter:.7g}",
                      "" if period is None else f"{1.0 / period:.5g}", _remark(point)))
-    return table("point", branch.name, "frequency [Hz]", "", rows=rows)
+    return table("point", branch.parameter_name, "frequency [Hz]", "", rows=rows)
 
 
 def _period(point: BranchPoint) -> float | None:

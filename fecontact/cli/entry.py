@@ -7,7 +7,7 @@ from typing import Any
 from cyclopts import CycloptsError
 
 from fecontact.cli.app import app
-from fecontact.cli.console import INTERRUPTED, fail, ending_signals, interrupted_code
+from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code
 from fecontact.core.errors import FecontactError, ModelWarning
 
 
@@ -63,14 +63,14 @@ def _execute(tokens: list[str]) -> int:
         if debug:
             raise
         return fail(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}.",
-                         1)
+                    1)
     except Exception as error:
         if _was_interrupted(error):
             return fail("interrupted.", INTERRUPTED)
         if debug:
             raise
         return fail(f"this should not happen ({type(error).__name__}: {error}); run it again "
-                         f"with --debug and report what it prints.", 1)
+                    f"with --debug and report what it prints.", 1)
 
 
 def _was_interrupted(error: BaseException | None) -> bool:

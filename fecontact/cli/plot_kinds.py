@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.receptance import Place, receptance
 from fecontact.analysis.histories import Point, usual_axis
+from fecontact.analysis.receptance import Place, receptance
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots import analysis

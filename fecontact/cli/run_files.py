@@ -160,6 +160,6 @@ def convergence_of(study: "Study", progress: Callable[[float], None]) -> "ModeCo
     settings = replace(study.basis, select=None)
     body = study.elastic_body()
     return mode_convergence(
-        body, lambda part, count: replace(settings, modes=count).basis(part), settings.modes,
+        body, lambda part, count: replace(settings, modes=count).modal_basis(part), settings.modes,
         levels=4 if body.mass.shape[0] < 4000 else 3,
         progress=lambda done, steps: progress(done / steps))

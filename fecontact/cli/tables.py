@@ -61,8 +61,8 @@ def _events(events: "Events") -> str:
 def largest_displacement(trajectory: "Trajectory") -> tuple[float, str]:
     """Largest displacement [m] of the body at all output times, and where it occurs."""
     basis, q = trajectory.system.basis, trajectory.modal_coordinates
-    if basis.field is not None:
-        shapes, places = basis.field.shapes, basis.field.nodes
+    if basis.mode_shapes is not None:
+        shapes, places = basis.mode_shapes.shapes, basis.mode_shapes.nodes
     else:
         used = np.abs(basis.T).any(axis=(1, 2))
         shapes, places = basis.T[used, :2], basis.positions[used]

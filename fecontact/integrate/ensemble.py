@@ -18,7 +18,7 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, span
-from fecontact.integrate.events import Events, AnyEvent, as_events
+from fecontact.integrate.events import AnyEvent, Events, as_events
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, start

@@ -269,16 +269,16 @@ class Trajectory(Summarised):
         basis = self.system.basis
         if isinstance(point, str | int | np.integer):
             return basis.T[basis.point_index(point if isinstance(point, str) else int(point))]
-        if basis.field is None:
+        if basis.mode_shapes is None:
             raise InputError(f"The point {point} cannot be found: the modal basis holds no shapes "
                              f"over the body; use a named point or a contact node.")
-        distance = np.linalg.norm(basis.field.nodes - np.asarray(point, dtype=float), axis=1)
+        distance = np.linalg.norm(basis.mode_shapes.nodes - np.asarray(point, dtype=float), axis=1)
         nearest_node = int(np.argmin(distance))
-        reach = np.ptp(basis.field.nodes, axis=0).max()
+        reach = np.ptp(basis.mode_shapes.nodes, axis=0).max()
         if distance[nearest_node] > 0.1 * reach:
             raise InputError(f"The point {point} lies outside the body, {distance.min():.3g} m "
                              f"away from it.")
-        return basis.field.shapes[nearest_node]
+        return basis.mode_shapes.shapes[nearest_node]
 
     @cached_property
     def _contact(self) -> Array:

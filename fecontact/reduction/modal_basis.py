@@ -13,7 +13,7 @@ from fecontact.core.units import Summarised, listed, span
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class ModeShapes:
     """Modes over the whole body: what is needed to draw it and to load it anywhere.
 
     Attributes
@@ -43,7 +43,7 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
-class Quality:
+class ReductionQuality:
     """How a basis relates to the finite-element body that it came from.
 
     Attributes
@@ -93,9 +93,9 @@ class ModalBasis(Summarised):
         Length of the contact face that each contact node stands for [m].
     extra : tuple of str
         Names of the points after the contact nodes.
-    field : Field or None
+    mode_shapes : ModeShapes or None
         Modes over the whole body; None for a basis without geometry.
-    quality : Quality or None
+    quality : ReductionQuality or None
         How the basis relates to the body; None for a basis without one.
     groups : tuple of (str, int)
         Names of the contact groups and their numbers of nodes, in the order of the nodes; one
@@ -114,8 +114,8 @@ class ModalBasis(Summarised):
     positions: Array
     tributary: Array
     extra: tuple[str, ...] = ()
-    field: Field | None = None
-    quality: Quality | None = None
+    mode_shapes: ModeShapes | None = None
+    quality: ReductionQuality | None = None
     groups: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
@@ -155,8 +155,8 @@ class ModalBasis(Summarised):
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 else "")),
             ("points", listed(["B", "C", *self.extra])),
-            ("shapes over the body", "none" if self.field is None
-             else f"at {len(self.field.nodes)} nodes"),
+            ("shapes over the body", "none" if self.mode_shapes is None
+             else f"at {len(self.mode_shapes.nodes)} nodes"),
         ]
 
     @property
@@ -267,14 +267,14 @@ class ModalBasis(Summarised):
                 chosen[-1] >= self.modes):
             raise InputError(f"modes {list(modes)} must be different numbers from 0 to "
                              f"{self.modes - 1}, at least one.")
-        field, quality = self.field, self.quality
+        given, quality = self.mode_shapes, self.quality
         return replace(
             self,
             angular_frequencies=self.angular_frequencies[chosen],
             damping=self.damping[np.ix_(chosen, chosen)],
             T=self.T[:, :, chosen],
-            field=None if field is None else replace(
-                field, shapes=field.shapes[..., chosen], stress=field.stress[..., chosen]),
+            mode_shapes=None if given is None else replace(
+                given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
             quality=None if quality is None else replace(
                 quality, residuals=quality.residuals[chosen],
                 participation=quality.participation[:, chosen],

@@ -14,7 +14,7 @@ from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
-from fecontact.reduction.modal_basis import Field, ModalBasis, Quality
+from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
 from fecontact.reduction.residual_vectors import Flexibility, residual_modes
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
@@ -112,7 +112,7 @@ def modal_basis(
                             *(row.position for row in further)]),
         tributary=face.tributary,
         extra=tuple(points),
-        field=Field(
+        mode_shapes=ModeShapes(
             nodes=body.nodes,
             cells=linear_cells(body),
             outline=_halved(body.edge_nodes(body.mesh.outline)),
@@ -146,10 +146,10 @@ def _modes(
 def _quality(
     body: ElasticBody, system: FreeSystem, flexibility: Flexibility, w: Array, shapes: Array,
     vibration: int,
-) -> Quality:
+) -> ReductionQuality:
     inertia = system.mass @ shapes
     ones = np.eye(2)[np.arange(2 * len(body.nodes)) % 2]
-    return Quality(
+    return ReductionQuality(
         mass=float(body.mesh.area * body.thickness * body.material.density),
         vibration_modes=vibration,
         residuals=backward_error(system.stiffness, system.mass, w**2, shapes),

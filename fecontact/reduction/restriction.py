@@ -99,7 +99,7 @@ def stack_restriction(rows: Mapping[str, Any], d: int) -> Restriction:
     restriction = sp.csr_array(sp.vstack(
         [*ends, contact, *(_point_block(name, rows[name], d) for name in extra)]))
     return Restriction(restriction, contact.shape[0] // 3, extra,
-                     tuple((name, block.shape[0] // 3) for name, block in blocks.items()))
+                       tuple((name, block.shape[0] // 3) for name, block in blocks.items()))
 
 
 def _unit_rows(d: int, places: Sequence[tuple[str, Place]]) -> Any:

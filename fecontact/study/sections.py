@@ -76,7 +76,7 @@ class BodySettings:
                              f"give {choices(values.keys() - given.keys())} too, or a material.")
         return replace(Material.named(self.material or "steel"), **given)
 
-    def body(self, mesh: Mesh) -> ElasticBody:
+    def elastic_body(self, mesh: Mesh) -> ElasticBody:
         """The elastic body on a mesh."""
         return ElasticBody(mesh, self.elastic_material, thickness=self.thickness,
                            plane=self.plane, degree=self.degree, fixed=self.fixed)
@@ -170,7 +170,7 @@ class BasisSettings:
                 raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
                                  f"go by number; choose a name with a letter.")
 
-    def basis(self, body: ElasticBody) -> ModalBasis:
+    def modal_basis(self, body: ElasticBody) -> ModalBasis:
         """The modal basis of a body."""
         given = self.damping
         damping: Damping = LossFactor(given.loss_factor) if isinstance(given, Loss) else given

@@ -60,8 +60,6 @@ _SECTIONS: Mapping[str, type] = {
     "simulation": SimulationSettings, "branch": BranchSettings, "output": OutputSettings,
     "render": RenderSettings,
 }
-_ATTRIBUTES = {name: name for name in _SECTIONS} | {"body": "body",
-                                                     "basis": "basis"}
 # What a study has made once, and the sections that it depends on.
 _MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body"),
               "_basis": ("geometry", "body", "basis")}
@@ -194,7 +192,7 @@ class Study(Summarised):
             sweep=from_table(SweepSettings, flat_axes(tables["sweep"]), f"{title}: [sweep]")
             if "sweep" in tables else None,
             path=path,
-            **{_ATTRIBUTES[name]: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
+            **{name: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items() if name in tables or name != "normal"},
         )
 
@@ -223,9 +221,9 @@ class Study(Summarised):
 
     def tables(self, *, defaults: bool = True) -> dict[str, Any]:
         """All sections as tables for TOML, with or without values equal to the defaults."""
-        sections = {name: to_table(getattr(self, attribute), defaults=defaults)
-                    for name, attribute in _ATTRIBUTES.items()
-                    if getattr(self, attribute) is not None}
+        sections = {name: to_table(getattr(self, name), defaults=defaults)
+                    for name in _SECTIONS
+                    if getattr(self, name) is not None}
         contact = {"contact": plain(self.contact)} if self.contact else {}
         if self.sweep is not None:
             sections["sweep"] = to_table(self.sweep, defaults=defaults)
@@ -282,11 +280,11 @@ class Study(Summarised):
         """The mesh, generated or read; the same object at every call, as in all of these."""
         return self._mesh
 
-    def body(self) -> ElasticBody:
+    def elastic_body(self) -> ElasticBody:
         """The elastic body."""
         return self._body
 
-    def basis(self) -> ModalBasis:
+    def modal_basis(self) -> ModalBasis:
         """The modal basis."""
         return self._basis
 
@@ -337,13 +335,13 @@ class Study(Summarised):
     def _body(self) -> ElasticBody:
         mesh = self.mesh()
         with located(f"{_title(self.path)}: [body]:", "ElasticBody"):
-            return self.body.body(mesh)
+            return self.body.elastic_body(mesh)
 
     @cached_property
     def _basis(self) -> ModalBasis:
         body = self.elastic_body()
         with located(f"{_title(self.path)}: [basis]:"):
-            return self.basis.basis(body)
+            return self.basis.modal_basis(body)
 
 
 def _number(text: str, items: list[Any], name: str, title: str) -> int:

@@ -238,7 +238,7 @@ def flat_axes(table: Any) -> Any:
 def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = []
     for key, value in table.items():
-        # An component that is a table holds numbers and texts alone.
+        # An axis that is a table holds numbers and texts alone.
         if isinstance(value, Mapping) and any(isinstance(item, Mapping | list)
                                               for item in value.values()):
             found += _leaves(value, f"{prefix}{key}.")

@@ -1,1 +1,5 @@
 """Many cases of one study: which ones, run by any executor, kept in a folder, as one table."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -21,7 +21,7 @@ from fecontact.output.files.hdf5 import read_basis
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import Strobing
-from fecontact.sweeps.case import SweepCase, Row
+from fecontact.sweeps.case import Row, SweepCase
 from fecontact.sweeps.strobed import strobed_rows
 from fecontact.sweeps.summaries import functions_for, summarise
 
@@ -103,7 +103,7 @@ def make_basis(batch: Batch) -> bytes | str:
 
 def packed(basis: ModalBasis, *, shapes: bool) -> bytes:
     """A modal basis as bytes, without shapes over the body unless they are wanted."""
-    return pickle.dumps(basis if shapes else replace(basis, field=None, quality=None))
+    return pickle.dumps(basis if shapes else replace(basis, mode_shapes=None, quality=None))
 
 
 def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[float, Functions]) -> Row:

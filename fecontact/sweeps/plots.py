@@ -231,7 +231,7 @@ def plot_sobol(
     Parameters
     ----------
     found : mapping of summary to SobolIndices
-        What :func:`fecontact.sobol_indices` found.
+        What :func:`fecontact.sweeps.sobol_indices` found.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -260,7 +260,7 @@ def plot_sobol(
                               xerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
                               fmt="none", ecolor="#303030", elinewidth=0.9, capsize=2)
             axes.set_yticks(places, [parameter_label(key, Study) for key in parameters])
-            axes.grid(False, component="y")
+            axes.grid(False, axis="y")
             axes.set_title(name.replace("_", " "), loc="left")
         grid[-1].set_xlabel("part of the variance")
         grid[-1].set_xlim(left=min(0.0, grid[-1].get_xlim()[0]))
@@ -287,7 +287,7 @@ def _label(axes: "Axes", name: str, values: Array) -> float:
 
 
 def _places(values: Sequence[Any]) -> tuple[Array, list[str] | None]:
-    """Numbers along an component; for other values their order, and their names."""
+    """Numbers along an axis; for other values their order, and their names."""
     if is_numeric(values):
         return np.array(values, dtype=float), None
     names = list(dict.fromkeys(_shown(value) for value in values))

@@ -46,7 +46,8 @@ class Bases:
             if self.store.basis_file(key).exists():
                 self._put(key, read_basis(self.store.basis_file(key)), batch)
             elif self.only:
-                self._put(key, self.study.with_(**batch.cases[0].basis_changes).modal_basis(), batch)
+                self._put(key, self.study.with_(**batch.cases[0].basis_changes).modal_basis(),
+                          batch)
             else:
                 jobs.append(Job(make_basis, batch))
         return jobs + self._released()
@@ -75,4 +76,4 @@ class Bases:
         self.held = [(keys, batch) for keys, batch in self.held if not keys <= self.ready.keys()]
         return [Job(run_batch, replace(batch, bases={
             key: self.ready[key] for case in batch.cases if (key := case.basis) in self.ready}))
-            for batch in free]
+                for batch in free]

@@ -119,9 +119,9 @@ def sobol_indices(
     require_kind("sobol_indices", SweepTable, table=table)
     names = tuple(table.parameters)
     first, total, samples = indices_of(table.column(name), len(names), confidence=confidence,
-                                          seed=seed)
+                                       seed=seed)
     return SobolIndices(dict(zip(names, first, strict=True)), dict(zip(names, total, strict=True)),
-                       samples)
+                        samples)
 
 
 def indices_of(

@@ -12,7 +12,7 @@ from fecontact.integrate.initial_state import initial_state
 from fecontact.integrate.trajectory import Status
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import Strobing
-from fecontact.sweeps.case import SweepCase, Row
+from fecontact.sweeps.case import Row, SweepCase
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 

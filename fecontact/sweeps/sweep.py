@@ -16,7 +16,7 @@ from fecontact.core.types import Array
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import SweepSettings, flat_axes
 from fecontact.sweeps.batch import Batch, make_basis
-from fecontact.sweeps.case import SweepCase, Row
+from fecontact.sweeps.case import Row, SweepCase
 from fecontact.sweeps.case_key import case_keys
 from fecontact.sweeps.dispatch import LostError, results
 from fecontact.sweeps.executors import opened, worker_count

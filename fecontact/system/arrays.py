@@ -13,7 +13,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.kernels import SystemArrays
 
-_DIRECTIONS = ("x", "y", "moment")
+_COMPONENTS = ("x", "y", "phi")
 
 
 LawGroup = tuple[slice, Array, Any]
@@ -42,7 +42,7 @@ def system_arrays(
     memory = [np.full(nodes.stop - nodes.start, law.memory, dtype=np.int64)
               for nodes, _, law in friction_groups]
     loads = load.forces
-    load_shapes = [basis.T[basis.point_index(force.point), _DIRECTIONS.index(force.direction)]
+    load_shapes = [basis.T[basis.point_index(force.point), _COMPONENTS.index(force.component)]
                    for force in loads]
     scale = ground.friction_scale_kernel
     return SystemArrays(
@@ -85,11 +85,11 @@ def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
                                   ("y", "damping_y", drive.damping_y)) if value]
     if load.normal:
         acting.append((f"Load: normal = {load.normal!r}", "C", "y"))
-    acting += [(f"Load: a force at {force.point!r} in direction {force.direction!r}", force.point,
-                force.direction) for force in load.forces]
-    for what, point, direction in acting:
-        if not basis.T[basis.point_index(point), _DIRECTIONS.index(direction)].any():
-            turn = "turns" if direction == "moment" else f"moves along {direction}"
+    acting += [(f"Load: a force at {force.point!r} with component {force.component!r}", force.point,
+                force.component) for force in load.forces]
+    for what, point, component in acting:
+        if not basis.T[basis.point_index(point), _COMPONENTS.index(component)].any():
+            turn = "turns" if component == "phi" else f"moves along {component}"
             raise InputError(f"{what} has no effect, as {point!r} {turn} in no mode of the basis; "
                              f"leave it out, or give the basis rows for that point.")
 

@@ -54,8 +54,8 @@ def _too_far(system: ContactSystem, states: Array) -> str | None:
     basis = system.basis
     used = np.abs(basis.T).any(axis=(1, 2))
     places = basis.positions[used]
-    if basis.field is not None:
-        places = np.vstack([places, basis.field.nodes])
+    if basis.mode_shapes is not None:
+        places = np.vstack([places, basis.mode_shapes.nodes])
     size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
     # Masses without places have no size to compare with.
     if size == 0.0:

@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fecontact.analysis.impacts import find_impacts, find_rests
-from fecontact.core.errors import AnalysisError, InputError
-from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import SetValued
-from fecontact.laws.excitation import Drive, Load
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.linear import LinearContact
-from fecontact.laws.normal.power import PowerContact
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.system.contact_system import ContactSystem
+from fecontact import (
+    AnalysisError,
+    ContactSystem,
+    Drive,
+    Ground,
+    InputError,
+    Load,
+    basis_from_matrices,
+    simulate,
+)
+from fecontact.analysis import find_impacts, find_rests
+from fecontact.integrate import SetValued
+from fecontact.laws import ExponentialFriction, LinearContact, PowerContact, RoughSurface
 
 MASS, C, R, V0 = 0.1, 1e6, 1e-4, 0.05
 DEEPEST = (3.0 * MASS * V0**2 * R / C) ** (1.0 / 3.0)

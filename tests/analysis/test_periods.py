@@ -3,14 +3,10 @@
 import numpy as np
 import pytest
 
-from fecontact.analysis.periodicity import count_periods, drive_period, periodicity, strobed_states
-from fecontact.core.errors import InputError
-from fecontact.integrate.simulate import simulate
-from fecontact.laws.excitation import Drive
-from fecontact.laws.friction.stribeck import ConstantFriction
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.contact_system import ContactSystem
+from fecontact import ContactSystem, Drive, InputError, ModalBasis, simulate
+from fecontact.analysis import count_periods, periodicity, strobed_states
+from fecontact.analysis.periodicity import drive_period
+from fecontact.laws import ConstantFriction, RoughSurface
 
 
 def logistic(r, count=400, start=0.3, skip=2000):

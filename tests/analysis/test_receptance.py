@@ -4,22 +4,25 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.analysis.receptance import receptance
+from fecontact import (
+    AnalysisError,
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    Ground,
+    InputError,
+    Load,
+    Material,
+    PointLoad,
+    basis_from_matrices,
+    modal_basis,
+    simulate,
+    static_equilibrium,
+)
+from fecontact.analysis import receptance
 from fecontact.cli.plot_kinds import PlotRequest, redraw
-from fecontact.core.errors import AnalysisError, InputError
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.integrate.simulate import simulate
-from fecontact.laws.excitation import Drive, Load, PointLoad
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.linear import LinearContact
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.laws.signals.harmonic import Harmonic
-from fecontact.output.plots.analysis import plot_receptance
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.statics import static_equilibrium
+from fecontact.laws import ExponentialFriction, Harmonic, LinearContact, RoughSurface
+from fecontact.plot import plot_receptance
 
 MASS = 2.0
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
@@ -116,7 +119,7 @@ def test_run_in_time_moves_as_the_response_says():
         drive=system.drive, load=Load(50.0, (PointLoad("C", "y", signal=Harmonic(
             force, 2.0 * np.pi * f)),)))
     response = receptance(pushed, f, [("C", "y")], [(0, "x"), ("B", "y")],
-                                  linearised_at="sliding").values[0, :, 0]
+                          linearised_at="sliding").values[0, :, 0]
     times = np.concatenate([[0.0], np.linspace(20.0, 21.0, 601) / f])
     run = simulate(pushed, times[-1], initial="sliding", outputs=times, rtol=1e-9)
     turn = np.exp(-2j * np.pi * f * run.time[1:-1])

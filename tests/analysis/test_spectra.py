@@ -3,14 +3,9 @@
 import numpy as np
 import pytest
 
-from fecontact.analysis.histories import history
-from fecontact.analysis.spectra import (
-    amplitude_spectrum,
-    evenly_sampled,
-    power_spectral_density,
-    spectrogram,
-)
-from fecontact.core.errors import InputError
+from fecontact import InputError
+from fecontact.analysis import amplitude_spectrum, history, power_spectral_density, spectrogram
+from fecontact.analysis.spectra import evenly_sampled
 
 T = np.linspace(0.0, 4.0, 4001)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation import vector_field
 
 
 def lorenz(t, x, p, out):

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from fecontact import Study, periodic_motion, read_branch, read_branches
-from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact import Study
+from fecontact.bifurcation import BranchStatus, periodic_motion
 from fecontact.cli import execute
+from fecontact.io import read_branch, read_branches
 
 STUDY = """
 geometry = { shape = "block", contact_length = 0.08, element_size = 0.02 }
@@ -30,7 +31,8 @@ def study(tmp_path, monkeypatch):
 
 def test_block_on_a_belt(study, capsys):
     """Near the closed form of one mass, 8.3365 mm/s."""
-    assert execute(["branch", str(study), "ground.speed", "--from", "12e-3", "--to", "7e-3"]) == 0
+    assert execute(["branch", str(study), "ground.speed", "--bounds", "7e-3", "12e-3", "--start",
+                    "12e-3"]) == 0
     said = capsys.readouterr().out
     found = read_branch("results/block-branch.h5")
     hopf, = found.of_kind("Hopf")
@@ -42,9 +44,9 @@ def test_block_on_a_belt(study, capsys):
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["ground.sped", "--from", "1", "--to", "2"], "did you mean 'ground.speed'"),
-    (["ground.speed", "--from", "1", "--to", "1"], "--from and --to are both 1"),
-    (["ground.speed", "--from", "0.01", "--to", "0.02", "--set", "drive.amplitude_x=1e-3",
+    (["ground.sped", "--bounds", "1", "2"], "did you mean 'ground.speed'"),
+    (["ground.speed", "--bounds", "1", "1"], "bounds = [1.0, 1.0] must be two values"),
+    (["ground.speed", "--bounds", "0.01", "0.02", "--set", "drive.amplitude_x=1e-3",
       "--set", "drive.angular_frequency=10.0"], "take the drive's amplitude"),
 ])
 def test_errors_are_one_line(study, capsys, arguments, message):

@@ -5,13 +5,12 @@ import csv
 import numpy as np
 import pytest
 
-from fecontact import InputError, read_branch, simulate
+from fecontact import InputError, Study, simulate
 from fecontact.bifurcation import diagram as module
 from fecontact.bifurcation.diagram import follow_branches
 from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.cli import execute
-from fecontact.output.files.branches import read_branches, write_branches
-from fecontact.study.study import Study
+from fecontact.io import read_branch, read_branches, write_branches
 
 # The friction oscillator of section 4.3 without excitation, as a block of 5.632 kg.
 STUDY = """
@@ -57,7 +56,7 @@ normal = 14.0
 
 [branch]
 parameter = "ground.speed"
-range = [6e-3, 14e-3]
+bounds = [6e-3, 14e-3]
 start = 14e-3
 switch = ["Hopf"]
 show = "amplitude"
@@ -86,7 +85,7 @@ def test_sliding_and_the_orbits_of_its_hopf_point(study, capsys):
     hopf, = found["steady sliding"].of_kind("Hopf")
     assert hopf.parameter == pytest.approx(8.336533e-3, rel=1e-5)
     assert f"{hopf.parameter:.7g}" in said
-    assert read_branch(results / "block-branch.h5").name == "ground.speed"
+    assert read_branch(results / "block-branch.h5").parameter_name == "ground.speed"
     for name in ("block-branch.png", "block-stability.png"):
         assert (results / name).stat().st_size > 10_000
     rows = rows_of(results / "block-branch.csv")
@@ -119,7 +118,7 @@ def test_the_unstable_orbit_parts_sliding_from_stick_slip(study):
 
 def test_stick_slip_of_a_run(study):
     """Period and range at 1 mm/s are known from an independent calculation."""
-    settings = ["branch.kind=orbits", "branch.range=[1e-3, 1.1e-3]", "branch.start=1e-3",
+    settings = ["branch.kind=orbits", "branch.bounds=[1e-3, 1.1e-3]", "branch.start=1e-3",
                 "branch.method=shooting", "branch.transient=10", "branch.longest_period=2",
                 "branch.segments=2", "branch.step=0.05", "branch.largest_step=0.5",
                 "branch.points=4"]
@@ -151,12 +150,12 @@ def test_branches_that_cannot_be_followed_are_named(study, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["--set", "branch.range=[2, 1]"], "[branch]: range = [2.0, 1.0] must be two values"),
-    (["--set", "branch.start=1.0"], "start = 1 must lie in the range, 0.006 to 0.014"),
+    (["--set", "branch.bounds=[2, 1]"], "[branch]: bounds = [2.0, 1.0] must be two values"),
+    (["--set", "branch.start=1.0"], "start = 1 must lie in the bounds, 0.006 to 0.014"),
     (["--set", 'branch.switch=["hopf"]'], "switch = 'hopf' is not known"),
     (["--set", "branch.point=D"], "'D'"),
     (["--set", "branch.parameter=ground.sped"], "did you mean 'ground.speed'"),
-    (["--from", "1e-2"], "--from and --to belong together"),
+    (["--bounds", "1e-2"], "--bounds"),
     (["--set", "branch.kind=orbits"], "give transient"),
     (["--set", "drive.damping_x=300.0", "--set", "branch.kind=orbits", "--set",
       "branch.transient=20.0", "--set",
@@ -171,11 +170,11 @@ def test_errors_are_one_line(study, capsys, arguments, message):
 
 
 def test_settings_without_their_parts():
-    with pytest.raises(InputError, match="lacks the key 'range'"):
-        BranchSettings(parameter="ground.speed").bounds  # noqa: B018
+    with pytest.raises(InputError, match="lacks the key 'bounds'"):
+        BranchSettings(parameter="ground.speed").checked_bounds  # noqa: B018
     with pytest.raises(InputError, match="lacks the key 'parameter'"):
-        BranchSettings().name  # noqa: B018
-    assert BranchSettings(range=(1.0, 2.0)).first == 1.0
+        BranchSettings().checked_parameter  # noqa: B018
+    assert BranchSettings(bounds=(1.0, 2.0)).first == 1.0
 
 
 def test_no_branches_no_file(tmp_path):

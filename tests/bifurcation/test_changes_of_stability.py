@@ -13,15 +13,18 @@ from systems import (
 )
 from test_continuation import CUBIC
 
-from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation import (
+    BranchStatus,
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    contact_field,
+    equilibrium_branch,
+    orbit_branch,
+    vector_field,
+)
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.output.plots.stability import plot_eigenvalues
+from fecontact.plot import plot_eigenvalues
 
 CHANGES = {"fold": {-1, 1}, "branch point": {-1, 0, 1}, "period doubling": {-1, 1},
            "Hopf": {-2, 2}, "Neimark-Sacker": {-2, 2}}

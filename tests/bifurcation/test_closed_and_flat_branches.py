@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 from systems import two_mass_field, two_mass_jacobian
 
-from fecontact import read_branch, write_branch
-from fecontact.bifurcation.continuation.branch import BranchStatus
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.equilibria.codim2 import hopf_curve
-from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
-from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation import (
+    BranchStatus,
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    equilibrium_branch,
+    find_equilibrium,
+    hopf_curve,
+    orbit_branch,
+    vector_field,
+)
 from fecontact.cli.branch_results import special_table
+from fecontact.io import read_branch, write_branch
 
 
 def island(t, x, p, out):
@@ -147,7 +150,8 @@ def test_folds_of_a_mesh_too_coarse_for_a_canard_are_marked(bounds, largest, poi
     rest = equilibrium_branch(field, [1.2, 1.2**3 / 3.0 - 1.2], "a", bounds=(0.8, 1.3),
                               direction=-1.0)
     orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=50),
-                          bounds=bounds, options=ContinuationOptions(points=points, largest_step=largest))
+                          bounds=bounds,
+                          options=ContinuationOptions(points=points, largest_step=largest))
     assert_none_unmarked(orbits, tmp_path)
 
 
@@ -156,7 +160,8 @@ def test_special_points_of_a_mesh_too_coarse_for_a_pendulum_are_marked(intervals
     field = vector_field(pendulum, {"a": 0.1}, 2)
     rest = equilibrium_branch(field, parameter="a", bounds=(-0.5, 0.5), direction=-1.0)
     orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=intervals),
-                          bounds=(-0.5, 0.5), options=ContinuationOptions(points=90, largest_step=0.1))
+                          bounds=(-0.5, 0.5),
+                          options=ContinuationOptions(points=90, largest_step=0.1))
     assert_none_unmarked(orbits, tmp_path)
 
 

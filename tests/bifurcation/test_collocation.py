@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from collocation_fields import settled
 
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact import AnalysisError, InputError
+from fecontact.bifurcation import (
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    orbit_branch,
+    vector_field,
+)
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
-from fecontact.bifurcation.fields.function_field import vector_field
 from fecontact.bifurcation.linalg import condensation as elimination
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.mesh import (
     equidistributed,
@@ -19,9 +24,7 @@ from fecontact.bifurcation.orbits.mesh import (
     node_times,
     rule,
 )
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.starts import corrected, from_samples
-from fecontact.core.errors import AnalysisError, InputError
 
 
 def stuart_landau(t, x, p, out):
@@ -265,7 +268,7 @@ def test_kind_errors(landau):
         orbit_branch(landau, PeriodicMotion(t, circle, parameter_values=[-0.5, 2.0]), "r")
     drifting = vector_field(drift, {"r": 0.5}, 2)
     with pytest.raises(AnalysisError, match=r"at r = 0\.5, from the period 5 s: the "
-                                            r"iteration ends without any motion"):
+                       r"iteration ends without any motion"):
         orbit_branch(drifting, PeriodicMotion(t, circle, period=5.0), "r",
                      method=Collocation(intervals=20))
 
@@ -275,5 +278,5 @@ def test_no_convergence_is_told_with_what_to_try():
     field = vector_field(belt, {"slope": 1e5, "V": 0.2}, 2)
     times, states = settled(field, 60.0, [1.0, 0.2], 12.0)
     with pytest.raises(AnalysisError, match=r"at slope = 100000, from the period 11\.\d+ s: "
-                                            r"Newton's method does not converge .* 3 intervals"):
+                       r"Newton's method does not converge .* 3 intervals"):
         orbit_branch(field, (times, states), "slope", method=Collocation(intervals=3, degree=2))

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from fecontact import write_branch
-from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact import AnalysisError, InputError
+from fecontact.bifurcation import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.pseudo_arclength import Problem, ContinuationOptions, continuation
-from fecontact.core.errors import AnalysisError, InputError
-from fecontact.output.files.branches import read_branch
+from fecontact.bifurcation.continuation.pseudo_arclength import Problem, continuation
+from fecontact.io import read_branch, write_branch
 
 
 class Linear:
@@ -41,7 +40,8 @@ FOLD = 2.0 / 27.0**0.5
 
 
 def test_s_shaped_curve_and_its_folds():
-    branch = continue_branch(CUBIC, np.array([-1.5, -1.87]), ContinuationOptions(bounds=(-2.0, 2.0)), name="p")
+    branch = continue_branch(CUBIC, np.array([-1.5, -1.87]),
+                             ContinuationOptions(bounds=(-2.0, 2.0)), name="p")
     assert branch.status is BranchStatus.BOUND
     assert branch.parameter[-1] == pytest.approx(2.0, rel=1e-12)
     x, p = branch.column("x"), branch.parameter
@@ -80,7 +80,8 @@ class Helix(Problem):
 
 def test_a_branch_that_passes_by_its_start_goes_on():
     """Much closer than the cubic between two of its points is accurate."""
-    branch = continue_branch(Helix(), np.array([1.0, 0.0, 0.0]), ContinuationOptions(largest_step=0.1, points=200))
+    branch = continue_branch(Helix(), np.array([1.0, 0.0, 0.0]),
+                             ContinuationOptions(largest_step=0.1, points=200))
     assert branch.status is BranchStatus.POINTS
     assert branch.points[-1].values["w"] > 4.0 * np.pi
     assert len(branch.of_kind("fold")) == round(branch.points[-1].values["w"] / np.pi)
@@ -89,7 +90,7 @@ def test_a_branch_that_passes_by_its_start_goes_on():
 @pytest.mark.parametrize("turn", [0.3, 0.6])
 def test_turns_between_points_are_limited(turn):
     branch = continue_branch(CIRCLE, np.array([1.0, 0.0]),
-                    ContinuationOptions(step=1.0, largest_step=1.0, largest_turn=turn))
+                             ContinuationOptions(step=1.0, largest_step=1.0, largest_turn=turn))
     turns = [np.arccos(min(1.0, before.tangent @ after.tangent))
              for before, after in zip(branch.points[:-1], branch.points[1:], strict=True)]
     assert 0.5 * turn < max(turns) <= turn
@@ -128,7 +129,7 @@ def test_poles_are_no_special_points():
             return {"pole": 1.0 / (u[0] - 0.123), "zero": u[0] + 0.321}
 
     branch = continue_branch(Pole(CUBIC.function, CUBIC.slopes), np.array([-1.0, 0.0]),
-                    ContinuationOptions(bounds=(-2.0, 2.0)))
+                             ContinuationOptions(bounds=(-2.0, 2.0)))
     assert sorted(point.kind for point in branch.special) == ["fold", "fold", "zero"]
     assert branch.of_kind("zero")[0].u[0] == pytest.approx(-0.321, rel=1e-12)
 
@@ -143,7 +144,8 @@ def test_crossings_that_hide_each_other_are_told_apart():
             return {"Hopf": (u[1] - 0.5) * (u[1] - 0.52)}
 
     line = TwoPairs(lambda x, p: x, lambda x, p: (1.0, 0.0))
-    branch = continue_branch(line, np.zeros(2), ContinuationOptions(step=0.2, largest_step=0.2, bounds=(-1.0, 1.0)))
+    branch = continue_branch(
+        line, np.zeros(2), ContinuationOptions(step=0.2, largest_step=0.2, bounds=(-1.0, 1.0)))
     assert [point.parameter for point in branch.special] == pytest.approx([0.5, 0.52], rel=1e-10)
 
 
@@ -153,7 +155,8 @@ def test_end_of_existence_keeps_the_branch():
             raise AnalysisError("There is nothing beyond 0.5.")
         return x - p
 
-    branch = continue_branch(Plane(root, lambda x, p: (1.0, -1.0)), np.zeros(2), ContinuationOptions())
+    branch = continue_branch(Plane(root, lambda x, p: (1.0, -1.0)), np.zeros(2),
+                             ContinuationOptions())
     assert branch.status is BranchStatus.STALLED
     assert branch.message == "There is nothing beyond 0.5."
     assert 0.4999 < branch.parameter[-1] <= 0.5
@@ -180,7 +183,8 @@ def test_corners_of_the_branch_itself_are_passed():
 
 
 def test_points_come_one_by_one():
-    steps = continuation(CIRCLE, np.array([1.0, 0.0]), ContinuationOptions(points=5), direction=-1.0)
+    steps = continuation(CIRCLE, np.array([1.0, 0.0]), ContinuationOptions(points=5),
+                         direction=-1.0)
     points = [next(steps) for _ in range(5)]
     assert all(point.u[1] < 0.0 for point in points[1:])
     with pytest.raises(StopIteration) as stop:
@@ -214,10 +218,11 @@ def test_files(tmp_path):
             return {"vector": np.array([1.0, 2j]), "note": "as expected"}
 
     branch = continue_branch(Ragged(CUBIC.function, CUBIC.slopes), np.array([-1.2, -0.5]),
-                    ContinuationOptions(bounds=(-1.0, 1.0)), name="p", attributes={"who": ["a", "b"]})
+                             ContinuationOptions(bounds=(-1.0, 1.0)), name="p",
+                             attributes={"who": ["a", "b"]})
     path = write_branch(tmp_path / "branch.h5", branch)
     found = read_branch(path)
-    assert (found.name, found.status, len(found)) == ("p", branch.status, len(branch))
+    assert (found.parameter_name, found.status, len(found)) == ("p", branch.status, len(branch))
     for mine, theirs in zip(branch, found, strict=True):
         assert (mine.u == theirs.u).all()
         assert (mine.tangent == theirs.tangent).all()

@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 from systems import friction_slope, lorenz_field, two_mass_field, two_mass_jacobian
 
-from fecontact.bifurcation.continuation.branch import BranchStatus
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.equilibria.codim2 import fold_curve, hopf_curve
-from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, find_equilibrium
-from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.core.errors import InputError
+from fecontact import InputError
+from fecontact.bifurcation import (
+    BranchStatus,
+    ContinuationOptions,
+    Equilibrium,
+    equilibrium_branch,
+    find_equilibrium,
+    fold_curve,
+    hopf_curve,
+    vector_field,
+)
 
 BOX = {"b": (-2.0, 2.0), "c": (-2.0, 2.0)}
 

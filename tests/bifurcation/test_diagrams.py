@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from systems import mode_coupling, two_mass_field
 
-from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.equilibria.stability_map import stability_map
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.core.errors import InputError
-from fecontact.output.plots.bifurcation_diagram import plot_branches
-from fecontact.output.plots.stability import plot_eigenvalues, plot_stability_map
+from fecontact import InputError
+from fecontact.bifurcation import (
+    Branch,
+    BranchPoint,
+    contact_field,
+    equilibrium_branch,
+    stability_map,
+)
+from fecontact.plot import plot_branches, plot_eigenvalues, plot_stability_map
 
 
 def point(p, x, stable, kind=None):

@@ -12,24 +12,20 @@ from systems import (
 )
 
 from fecontact import (
-    ConstantFriction,
+    AnalysisError,
     ContactSystem,
     Drive,
     ElasticBody,
     Ground,
+    InputError,
     Load,
     Material,
     Mesh,
-    RoughSurface,
     modal_basis,
     simulate,
-    vector_field,
 )
-from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
-from fecontact.bifurcation.equilibria.stability_map import stability_map
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.core.errors import AnalysisError, InputError
-from fecontact.laws.signals.harmonic import Constant
+from fecontact.bifurcation import contact_field, find_equilibrium, stability_map, vector_field
+from fecontact.laws import Constant, ConstantFriction, RoughSurface
 
 
 def test_lorenz_equilibria():

@@ -14,22 +14,16 @@ from systems import (
     two_mass_jacobian,
 )
 
-from fecontact import (
-    ConstantFriction,
-    ContactSystem,
-    Ground,
-    LinearContact,
-    Load,
-    LuGreFriction,
-    basis_from_matrices,
+from fecontact import AnalysisError, ContactSystem, Ground, InputError, Load, basis_from_matrices
+from fecontact.bifurcation import (
+    BranchStatus,
+    ContinuationOptions,
+    contact_field,
+    equilibrium_branch,
+    find_equilibrium,
     vector_field,
 )
-from fecontact.bifurcation.continuation.branch import BranchStatus
-from fecontact.bifurcation.continuation.pseudo_arclength import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact.laws import ConstantFriction, LinearContact, LuGreFriction
 
 
 def reactor(t, x, p, out):
@@ -76,7 +70,8 @@ def test_reactor():
 def test_predator_and_prey():
     field = vector_field(predator, {"p1": 0.0, "p2": 3.0, "p3": 5.0, "p4": 3.0}, 2)
     settings = ContinuationOptions(bounds=(0.01, 1.0))
-    trivial = equilibrium_branch(field, parameter="p1", options=ContinuationOptions(bounds=(0.0, 1.0)))
+    trivial = equilibrium_branch(field, parameter="p1",
+                                 options=ContinuationOptions(bounds=(0.0, 1.0)))
     assert parameters(trivial, "branch point") == pytest.approx([0.6], rel=1e-12)
     assert [point.kind for point in trivial.special] == ["branch point"]
     prey = equilibrium_branch(field, trivial.special[0], options=settings)
@@ -201,7 +196,7 @@ def test_belt(slope, speed):
         w = np.sqrt(5610.0 / 5.632)
         e = 14.0 * 0.25 * 1000.0**3 * np.exp(-1000.0 * speed) / (6.0 * 5.632**2)
         assert hopf.first_lyapunov == pytest.approx(1.5 * e * w / (1.0 + w * w),
-                                                               rel=1e-6)
+                                                    rel=1e-6)
 
 
 def test_mode_coupling_with_damping():

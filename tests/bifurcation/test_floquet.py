@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fecontact.bifurcation.fields.function_field import vector_field
+from fecontact.bifurcation import vector_field
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet
@@ -11,7 +11,7 @@ from fecontact.bifurcation.orbits.mesh import node_times
 
 
 def planted(multipliers, factors, seed=1):
-    """CondensedFactors (N, d, d) with eigenvalues of their product given as real numbers or pairs."""
+    """Factors (N, d, d) with eigenvalues of their product given as real numbers or pairs."""
     rng = np.random.default_rng(seed)
     blocks, roots = [], []
     for mu in multipliers:

@@ -11,11 +11,14 @@ import numba
 import numpy as np
 import pytest
 
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
-from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact import AnalysisError, InputError
+from fecontact.bifurcation import (
+    Collocation,
+    equilibrium_branch,
+    find_equilibrium,
+    orbit_branch,
+    vector_field,
+)
 
 size_of = numba.njit(lambda x: abs(x))
 

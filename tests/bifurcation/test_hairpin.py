@@ -7,16 +7,18 @@ from scipy.optimize import brentq
 from systems import belt
 from test_continuation import Plane
 
-from fecontact import simulate
-from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact import InputError, sensitivity, simulate
+from fecontact.bifurcation import (
+    BranchStatus,
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    Shooting,
+    contact_field,
+    equilibrium_branch,
+    orbit_branch,
+)
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.orbits.branches import Collocation, Shooting, orbit_branch
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.core.errors import InputError
-from fecontact.integrate.sensitivity import sensitivity
 
 MASS = 5.632
 

@@ -5,10 +5,9 @@ import impact_orbits
 import numpy as np
 import pytest
 
-from fecontact import ContactEvents, simulate, strobe
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.orbits.branches import orbit_branch
-from fecontact.integrate.sensitivity import sensitivity
+from fecontact import sensitivity, simulate
+from fecontact.bifurcation import ContinuationOptions, orbit_branch
+from fecontact.integrate import ContactEvents, strobe
 
 # States near orbits of one period, from which Newton's method finds them.
 NEAR_SINGLE = np.array([5.1745e-5, 6.98e-7, -5.14e-4, -8.89e-4])    # 39.2 rad/s

@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 from collocation_fields import lorenz_field, settled, two_masses_field
 
-from fecontact import write_branch
-from fecontact.bifurcation.continuation.branch import BranchStatus
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact import InputError
+from fecontact.bifurcation import (
+    BranchStatus,
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    equilibrium_branch,
+    orbit_branch,
+    vector_field,
+)
 from fecontact.bifurcation.orbits.restored import restored
-from fecontact.core.errors import InputError
-from fecontact.output.files.branches import read_branch
+from fecontact.io import read_branch, write_branch
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +28,8 @@ def asymmetric(lorenz):
     """The asymmetric family, from rho = 280 down to 225."""
     times, states = settled(lorenz, 40.0, [1.0, 2.0, 250.0], 0.45)
     return orbit_branch(lorenz, (times, states), "rho", method=Collocation(intervals=60),
-                        bounds=(225.0, 330.0), direction=-1.0, options=ContinuationOptions(largest_step=0.03))
+                        bounds=(225.0, 330.0), direction=-1.0,
+                        options=ContinuationOptions(largest_step=0.03))
 
 
 def test_lorenz_cascade(lorenz, asymmetric):
@@ -41,7 +44,8 @@ def test_lorenz_cascade(lorenz, asymmetric):
         assert point.values["trivial_error"] < 1e-10
         if rho > 217.0:
             branch = orbit_branch(lorenz, point, bounds=(215.0, 230.0),
-                                  options=ContinuationOptions( step=0.01, stop_at=("period doubling",)))
+                                  options=ContinuationOptions( step=0.01,
+                                                              stop_at=("period doubling",)))
             assert branch.status is BranchStatus.STOPPED
 
 

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from collocation_fields import two_masses_field
 
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
-from fecontact.bifurcation.orbits.codim2 import orbit_curve
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.core.errors import InputError
+from fecontact import InputError
+from fecontact.bifurcation import (
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    equilibrium_branch,
+    orbit_branch,
+    orbit_curve,
+    vector_field,
+)
 
 
 def first_branch(**changes):

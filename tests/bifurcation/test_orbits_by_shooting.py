@@ -13,20 +13,20 @@ from systems import (
     with_force,
 )
 
-from fecontact import simulate, strobe
-from fecontact.bifurcation.continuation.branch import BranchStatus
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.orbits.branches import (
+from fecontact import AnalysisError, InputError, simulate
+from fecontact.bifurcation import (
+    BranchStatus,
     Collocation,
+    ContinuationOptions,
     Shooting,
+    contact_field,
+    equilibrium_branch,
+    observe,
     orbit_branch,
+    periodic_motion,
 )
-from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.bifurcation.orbits.restored import restored_shooting
-from fecontact.bifurcation.orbits.samples import observe
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact.integrate import strobe
 
 FEW = ContinuationOptions(step=5e-3, largest_step=0.05, points=60)
 
@@ -70,7 +70,7 @@ def test_events_agree_with_collocation(two_masses):
     beyond = min((at for at in orbits.points if at.parameter > 7.7), key=lambda at: at.parameter)
     wanted = (near.values["period"] + beyond.values["period"]) / 2.0
     settings = ContinuationOptions(step=0.02, points=10, stop_at=["period"],
-                        events={"period": lambda values: values["period"] - wanted})
+                                   events={"period": lambda values: values["period"] - wanted})
     places = [orbit_branch(field, near.orbit(field, 2000), "B", method=method, bounds=(7.0, 8.3),
                            options=settings).of_kind("period")[0].parameter
               for method in (Shooting(), Collocation(intervals=100))]
@@ -157,7 +157,7 @@ def test_orbits_in_another_phase_are_met_again(two_masses):
 
 def test_driven_orbits_a_period_of_the_drive_later_are_the_same():
     motion = periodic_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
-                            longest_period=8 * 2.0 * np.pi / 30.9)
+                             longest_period=8 * 2.0 * np.pi / 30.9)
     assert motion.periods == 2
     field = impact_orbits.field_at(30.9)
     branch = orbit_branch(field, motion, method=Shooting(segments=3), bounds=(30.0, 32.0),
@@ -173,17 +173,17 @@ def test_driven_orbits_a_period_of_the_drive_later_are_the_same():
 
 def test_periodic_motions():
     motion = periodic_motion(belt(speed=1e-3), initial=np.zeros(2), transient=6.0,
-                            longest_period=2.0)
+                             longest_period=2.0)
     # Known from an independent calculation.
     assert motion.period == pytest.approx(1.264348, abs=2e-5)
     driven = periodic_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
-                            longest_period=8 * 2.0 * np.pi / 30.9)
+                             longest_period=8 * 2.0 * np.pi / 30.9)
     assert driven.periods == 2
     assert driven.period == pytest.approx(4.0 * np.pi / 30.9, rel=1e-12)
     assert np.abs(driven.states[-1] - driven.states[0]).max() < 1e-3 * np.ptp(driven.states)
     with pytest.raises(AnalysisError, match=r"(does not repeat|has not settled) within 4 periods"):
         periodic_motion(impact_orbits.oscillator(23.63), initial=np.zeros(4), transient=10.0,
-                       longest_period=4 * 2.0 * np.pi / 23.63)
+                        longest_period=4 * 2.0 * np.pi / 23.63)
     with pytest.raises(InputError, match="give transient"):
         periodic_motion(belt(speed=1e-3))
 

@@ -5,24 +5,18 @@ import pytest
 from systems import basis, impact_oscillator
 
 from fecontact import (
-    Axis,
-    ConstantFriction,
+    AnalysisError,
     ContactSystem,
-    Crossing,
     Drive,
     Ground,
     InputError,
     Load,
-    PrescribedForce,
-    ProductFriction,
-    basins,
-    poincare_scan,
-    lyapunov_exponents,
     sensitivity,
     simulate,
-    strobe,
 )
-from fecontact.core.errors import AnalysisError
+from fecontact.bifurcation import Axis, basins, lyapunov_exponents, poincare_scan
+from fecontact.integrate import Crossing, strobe
+from fecontact.laws import ConstantFriction, PrescribedForce, ProductFriction
 
 
 def test_exponents_of_a_linear_oscillator():
@@ -75,7 +69,7 @@ def test_brute_force_meets_single_runs():
     system = impact_oscillator(2)
     values = np.linspace(60.0, 65.0, 5)
     found = poincare_scan(system, "drive.angular_frequency", values, transient_periods=60, keep=4,
-                        initial=np.zeros(4), chains=2)
+                          initial=np.zeros(4), chains=2)
     assert found.up.shape == found.down.shape == (5, 4, 4)
     alone = strobe(system.with_(**{"drive.angular_frequency": 60.0}), transient_periods=60, keep=4,
                    initial=np.zeros(4), rtol=1e-5)
@@ -94,7 +88,7 @@ def test_brute_force_meets_single_runs():
         return system.with_(**{"drive.angular_frequency": value})
 
     same = poincare_scan(system, faster, values, transient_periods=60, keep=4, initial=np.zeros(4),
-                       chains=2, down=False)
+                         chains=2, down=False)
     assert same.parameter == "faster"
     assert (same.up == found.up).all()
     assert len(same.down) == 0

@@ -9,20 +9,19 @@ import numpy as np
 import pytest
 from systems import lorenz_field, two_mass_field
 
-from fecontact import (
+from fecontact import InputError
+from fecontact.bifurcation import (
+    BranchStatus,
     Collocation,
+    ContinuationOptions,
     HopfPoint,
     PeriodicMotion,
     Shooting,
     equilibrium_branch,
     orbit_branch,
-    read_branch,
     vector_field,
-    write_branch,
 )
-from fecontact.bifurcation.continuation.branch import BranchStatus
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.core.errors import InputError
+from fecontact.io import read_branch, write_branch
 
 
 def landau(t, x, p, out):
@@ -141,7 +140,7 @@ def test_orbits_at_a_value(field, kept):
 
 def test_an_orbit_is_followed_over_another_parameter(field, kept):
     over = orbit_branch(field, kept.at(field, 0.25), "w", bounds=(2.0, 3.0))
-    assert over.name == "w"
+    assert over.parameter_name == "w"
     assert over.points[-1].values["period"] == pytest.approx(2.0 * np.pi / 3.0, rel=1e-7)
     assert over.column("maximum")[:, 0] == pytest.approx(np.full(len(over), 0.5), rel=1e-6)
 
@@ -197,7 +196,8 @@ def test_shooting_goes_on_and_is_solved_at_a_value():
     assert shot.points[0].by_shooting
     with pytest.raises(InputError, match="give the field"):
         shot.points[0].orbit()
-    on = orbit_branch(field, shot.points[-1], options=ContinuationOptions(step=0.05), bounds=(5.9, 6.3))
+    on = orbit_branch(field, shot.points[-1], options=ContinuationOptions(step=0.05),
+                      bounds=(5.9, 6.3))
     assert on.attributes["segments"] == 2
     assert on.parameter[-1] == pytest.approx(6.3, rel=1e-12)
     found = on.at(field, 6.2)

@@ -7,17 +7,19 @@ import pytest
 from collocation_fields import settled, two_masses_field
 from test_orbit_bifurcations import moebius, torus
 
-from fecontact import write_branch
+from fecontact.bifurcation import (
+    Branch,
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    equilibrium_branch,
+    orbit_branch,
+    vector_field,
+)
 from fecontact.bifurcation.continuation import sharpening
-from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.function_field import vector_field
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.normal_forms import verdict
 from fecontact.cli.branch_results import branches_csv, special_table
-from fecontact.output.files.branches import read_branch
+from fecontact.io import read_branch, write_branch
 
 
 def circle_branch(function, c, intervals):
@@ -61,7 +63,7 @@ def slow_doubling():
             field, (times, states), "D", method=Collocation(intervals=intervals),
             bounds=(0.03, 0.05), width=2.0, direction=-1.0, scales=np.full(4, 8.0),
             options=ContinuationOptions(step=0.002, largest_step=0.01, points=40,
-                              stop_at=["period doubling"]))
+                                        stop_at=["period doubling"]))
         return branch.special[0]
 
     return found

@@ -4,18 +4,21 @@ import numpy as np
 import pytest
 from systems import belt, lorenz_field, two_mass_field
 
-from fecontact import simulate
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact import AnalysisError, InputError, simulate
+from fecontact.bifurcation import (
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    Shooting,
+    contact_field,
+    equilibrium_branch,
+    orbit_branch,
+    quantity_range,
+)
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.orbits.branches import Collocation, Shooting, orbit_branch
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.restored import restored
-from fecontact.bifurcation.orbits.samples import quantity_range
 from fecontact.bifurcation.orbits.shooting import shooting_from
-from fecontact.core.errors import AnalysisError, InputError
 
 
 @pytest.fixture(scope="module")

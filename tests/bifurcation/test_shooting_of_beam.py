@@ -5,8 +5,8 @@ import beam_stick_slip as example
 import numpy as np
 import pytest
 
-from fecontact import contact_field, sensitivity, simulate
-from fecontact.core.errors import InputError
+from fecontact import InputError, sensitivity, simulate
+from fecontact.bifurcation import contact_field
 
 SPEED = 0.05
 

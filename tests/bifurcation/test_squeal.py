@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import squeal
 
-import fecontact as fc
+from fecontact.bifurcation import contact_field, find_equilibrium
 
 
 def test_border_of_flutter(tmp_path, capsys):
@@ -19,7 +19,7 @@ def test_border_of_flutter(tmp_path, capsys):
     # Points of the border, in systems made anew, have a mode without damping.
     for point in border.points[:: len(border) // 4]:
         load, friction = point.values["load.normal"], point.values[squeal.FRICTION]
-        found = fc.find_equilibrium(fc.contact_field(squeal.system(friction, load), []))
+        found = find_equilibrium(contact_field(squeal.system(friction, load), []))
         worst = np.argmin(np.abs(found.modes.damping_ratios))
         assert found.modes.damping_ratios[worst] == pytest.approx(0.0, abs=1e-9)
         assert found.modes.frequencies_hz[worst] == pytest.approx(point.values["frequency_hz"],

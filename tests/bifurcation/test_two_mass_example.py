@@ -6,7 +6,7 @@ import pytest
 import two_mass_friction as example
 
 from fecontact import simulate
-from fecontact.bifurcation.continuation.branch import BranchStatus
+from fecontact.bifurcation import BranchStatus
 
 
 def test_table_and_attractors():

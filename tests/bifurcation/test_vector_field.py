@@ -17,25 +17,30 @@ from systems import (
 )
 
 from fecontact import (
+    AnalysisError,
     ContactSystem,
     Drive,
-    ExponentialFriction,
     Ground,
-    Harmonic,
+    InputError,
     Load,
-    LuGreFriction,
     ModalBasis,
     PointLoad,
-    RoughSurface,
-    Sine,
-    MeasuredProfile,
+)
+from fecontact.bifurcation import (
+    contact_field,
     equilibrium_branch,
     find_equilibrium,
     stability_map,
     vector_field,
 )
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact.laws import (
+    ExponentialFriction,
+    Harmonic,
+    LuGreFriction,
+    MeasuredProfile,
+    RoughSurface,
+    Sine,
+)
 
 PLACES = np.random.default_rng(4).normal(size=(7, 3)) * 5.0
 TIMES = np.zeros(7)
@@ -316,7 +321,8 @@ def test_forcing_periods():
     odd = both.with_(**{"drive.angular_frequency": 4.0 * np.sqrt(2.0)})
     with pytest.raises(AnalysisError, match="no common multiple"):
         contact_field(odd, []).forcing_period(np.empty(0))
-    trace = wavy.with_(**{"ground.profile": MeasuredProfile((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.5, 0.0))})
+    trace = wavy.with_(**{
+        "ground.profile": MeasuredProfile((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.5, 0.0))})
     with pytest.raises(AnalysisError, match=r"ground\.profile does not repeat"):
         contact_field(trace, []).forcing_period(np.empty(0))
     rough = trace.with_(ground=replace(trace.ground, friction_variation=Sine(0.1, 2.0),

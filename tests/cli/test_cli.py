@@ -11,13 +11,10 @@ import tomllib
 import pytest
 from tiny_study import TINY
 
+from fecontact import Status, Study, read_case, read_mesh
 from fecontact.cli import doctor as examination
 from fecontact.cli import execute
 from fecontact.core import system_libraries
-from fecontact.fem.mesh_files import read_mesh
-from fecontact.integrate.trajectory import Status
-from fecontact.output.files.case import read_case
-from fecontact.study.study import Study
 
 
 @pytest.fixture

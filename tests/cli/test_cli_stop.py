@@ -1,8 +1,7 @@
 """A run that ends where it was told to."""
 
+from fecontact import Status, read_case
 from fecontact.cli import execute
-from fecontact.integrate.trajectory import Status
-from fecontact.output.files.case import read_case
 
 FALLING = """
 geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.01 }

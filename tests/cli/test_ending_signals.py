@@ -12,11 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from fecontact import Beam, Status, generate, read_case
 from fecontact.cli import execute
 from fecontact.cli.console import ending_signals, interrupted_code
-from fecontact.fem.generate import Beam, generate
-from fecontact.integrate.trajectory import Status
-from fecontact.output.files.case import read_case
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 

@@ -15,10 +15,11 @@ from matplotlib.image import imread
 from sweep_study import Serial, files_below, write_study
 from tiny_study import TINY
 
-from fecontact import read_case, read_table, sweep
+from fecontact import read_case, sweep
 from fecontact.cli import execute
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
+from fecontact.io import read_table
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")]

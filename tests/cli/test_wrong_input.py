@@ -4,21 +4,18 @@ import numpy as np
 import pytest
 from systems import friction_oscillator, impact_oscillator
 
-from fecontact import (
+from fecontact import AnalysisError, Event, InputError, event
+from fecontact.bifurcation import (
     Axis,
-    ContactEvents,
-    Event,
-    InputError,
+    ContinuationOptions,
     basins,
-    poincare_scan,
     contact_field,
     equilibrium_branch,
-    event,
-    plot_branches,
+    poincare_scan,
 )
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.cli.plot_kinds import PlotRequest, point_of
-from fecontact.core.errors import AnalysisError
+from fecontact.integrate import ContactEvents
+from fecontact.plot import plot_branches
 
 
 def plane(t, y, p):
@@ -36,7 +33,8 @@ def plane(t, y, p):
     (lambda: PlotRequest(highest_hz=-5.0), "highest = -5.0"),
     (lambda: PlotRequest(highest_hz=np.nan), "highest = nan"),
     (lambda: point_of("nan,0.1"), "nan,0.1"),
-    (lambda: poincare_scan(impact_oscillator(), "drive.angular_frequency", "abc"), "values must be"),
+    (lambda: poincare_scan(impact_oscillator(), "drive.angular_frequency", "abc"),
+     "values must be"),
 ])
 def test_refused(make, names):
     with pytest.raises(InputError, match=names):

@@ -14,17 +14,12 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
+from fecontact import Beam, InputError, generate, read_case, render, write_case, write_mesh
 from fecontact.cli import execute
 from fecontact.core import atomic_write
 from fecontact.core.atomic_write import clear_leftovers, replaced, replaced_folder
-from fecontact.core.errors import InputError
-from fecontact.fem.generate import Beam, generate
-from fecontact.fem.mesh_files import write_mesh
-from fecontact.output.files.case import read_case, write_case
-from fecontact.output.files.export import export_csv
+from fecontact.io import export_csv, export_pvd
 from fecontact.output.files.hdf5 import new_file
-from fecontact.output.files.pvd import export_pvd
-from fecontact.output.render.movie import render
 from fecontact.output.render.offscreen import can_render
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="locks and limits of Linux")
@@ -232,10 +227,10 @@ FULL = """
 import resource, sys
 from pathlib import Path
 from synthetic import run
-from fecontact.core.errors import InputError
-from fecontact.output.files.export import export_csv, export_mat
-from fecontact.output.plots.run import plot_history
-from fecontact.output.files.case import write_case
+from fecontact import InputError
+from fecontact.io import export_csv, export_mat
+from fecontact.plot import plot_history
+from fecontact import write_case
 trajectory = run(times=50)
 folder, said = Path(sys.argv[1]), []
 for name, write in (("a.vtkhdf", write_case), ("a.csv", export_csv), ("a.mat", export_mat),
@@ -264,7 +259,7 @@ def test_what_cannot_be_written_is_one_sentence_and_the_earlier_file_stays(tmp_p
     assert len(lines) == 4 * 3
     assert all(line.startswith(str(tmp_path)) and line.endswith(
         " cannot be written (file too large); make room on the disk, or choose another folder.")
-        for line in lines), lines
+               for line in lines), lines
     assert listed(tmp_path) == ["a.csv", "a.mat", "a.png", "a.vtkhdf"]
 
 

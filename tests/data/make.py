@@ -12,9 +12,7 @@ import pyuff
 import scipy.io
 import scipy.sparse as sp
 
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.fem.mesh import Mesh
-from fecontact.reduction.reduce_body import modal_basis
+from fecontact import ElasticBody, Material, Mesh, modal_basis
 
 HERE = Path(__file__).parent
 COLUMNS, ROWS, LENGTH, HEIGHT = 4, 2, 0.1, 0.04
@@ -69,7 +67,7 @@ def matlab_73(path, matrices):
 def universal(path, body):
     """Data sets 164, 2411 and 55: the largest component of each shape is one."""
     basis = modal_basis(body, MODES, contact="bottom")
-    shapes = basis.field.shapes
+    shapes = basis.mode_shapes.shapes
     scale = np.abs(shapes).max(axis=(0, 1))
     nodes = FIRST_NODE + np.arange(len(shapes))
     zeros = np.zeros(len(nodes))

@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError
-from fecontact.laws.excitation import Load
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.gap import Crown, gap_values
-from fecontact.system.statics import static_equilibrium
+from fecontact import (
+    ContactSystem,
+    Crown,
+    InputError,
+    Load,
+    basis_from_matrices,
+    static_equilibrium,
+)
+from fecontact.laws import RoughSurface
+from fecontact.system.gap import gap_values
 
 
 def rigid_mass(count, length):

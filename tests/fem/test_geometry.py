@@ -7,10 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError, MeshError, MissingLibraryError
-from fecontact.fem.generate import Beam, Block, Pendulum, generate
-from fecontact.fem.mesh import Mesh
-from fecontact.fem.mesh_files import read_mesh, write_mesh
+from fecontact import (
+    Beam,
+    Block,
+    InputError,
+    Mesh,
+    MeshError,
+    MissingLibraryError,
+    Pendulum,
+    generate,
+    read_mesh,
+    write_mesh,
+)
 
 try:
     import gmsh

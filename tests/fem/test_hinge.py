@@ -5,12 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.fem.generate import generate
+from fecontact import ElasticBody, InputError, Material, generate, modal_basis
 from fecontact.fem.shapes import Pendulum
-from fecontact.reduction.eigenmodes import eigenfrequencies_hz
-from fecontact.reduction.reduce_body import modal_basis
+from fecontact.reduction import eigenfrequencies_hz
 
 
 def pendulum(element: str, size: float = 0.004, radius: float = 0.002) -> ElasticBody:

@@ -3,8 +3,7 @@ import pickle
 import numpy as np
 import pytest
 
-from fecontact.core.errors import MeshError
-from fecontact.fem.mesh import Mesh
+from fecontact import Mesh, MeshError
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
 # Two quadrilaterals side by side, the second one given clockwise.

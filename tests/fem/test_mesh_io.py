@@ -8,9 +8,8 @@ import meshio
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError, MeshError
-from fecontact.fem.mesh import Mesh
-from fecontact.fem.mesh_files import read_mesh, write_fields, write_mesh
+from fecontact import InputError, Mesh, MeshError, read_mesh, write_mesh
+from fecontact.fem.mesh_files import write_fields
 
 # 3 x 2 cells of 0.1 m x 0.05 m: nodes 0 ... 3 along the bottom, 8 ... 11 along the top.
 X, Y = np.meshgrid(np.linspace(0.0, 0.3, 4), np.linspace(0.0, 0.1, 3))

@@ -5,23 +5,19 @@ import pytest
 from systems import basis, friction_oscillator, impact_oscillator
 
 from fecontact import (
-    ContactEvents,
     ContactSystem,
-    Crossing,
     Event,
     InputError,
-    JenkinsFriction,
-    LinearContact,
     Load,
-    Rodas5P,
-    Scipy,
     Status,
     event,
     read_case,
     simulate,
     write_case,
 )
+from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
+from fecontact.laws import JenkinsFriction, LinearContact
 
 
 def drop():

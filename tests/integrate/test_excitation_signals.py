@@ -4,8 +4,21 @@ import numpy as np
 import pytest
 
 import fecontact as fc
+from fecontact.integrate import Scipy
 from fecontact.integrate.reference import scipy
 from fecontact.integrate.rodas5p import driver
+from fecontact.laws import (
+    Constant,
+    ConstantFriction,
+    ExponentialFriction,
+    Harmonic,
+    PrescribedForce,
+    Pulse,
+    RoughSurface,
+    Sine,
+    SpeedRamp,
+    SweptSine,
+)
 
 MASS, STIFFNESS, DASHPOT = 2.0, 800.0, 3.0
 
@@ -15,9 +28,9 @@ def point(**parts):
     basis = fc.basis_from_matrices(
         [[MASS]], [[0.0]], {"contact": [[[1.0], [0.0], [0.0]]], "B": [[1.0], [0.0], [0.0]],
                             "C": [[1.0], [0.0], [0.0]]})
-    options = {"normal": fc.PrescribedForce(1e-12), "drive": fc.Drive(
+    options = {"normal": PrescribedForce(1e-12), "drive": fc.Drive(
         stiffness_x=STIFFNESS, damping_x=DASHPOT)} | parts
-    return fc.ContactSystem(basis, **{"friction": fc.ExponentialFriction(), **options})
+    return fc.ContactSystem(basis, **{"friction": ExponentialFriction(), **options})
 
 
 def oscillator(force, times, dashpot=DASHPOT):
@@ -44,11 +57,11 @@ def run(system, times):
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_a_load_pulse_is_not_stepped_over(method):
     """A half-sine shock of 2 ms in the middle of a run of 2 s: Duhamel's integral."""
-    pulse = fc.Pulse("half-sine", amplitude=500.0, duration=2e-3, start=0.4)
+    pulse = Pulse("half-sine", amplitude=500.0, duration=2e-3, start=0.4)
     system = point(load=fc.Load(forces=(fc.PointLoad("C", "x", signal=pulse),)))
     times = np.array([0.0, 0.3, 0.401, 0.6, 1.0])
     found = fc.simulate(system, 1.0, initial=np.zeros(2), outputs=times, rtol=1e-8,
-                        solver=fc.Scipy(method)).displacement("B")[:, 0]
+                        solver=Scipy(method)).displacement("B")[:, 0]
     s, weights = np.polynomial.legendre.leggauss(40)
     w0 = np.sqrt(STIFFNESS / MASS)
     D = DASHPOT / (2.0 * MASS * w0)
@@ -64,7 +77,7 @@ def test_a_load_pulse_is_not_stepped_over(method):
 
 
 def test_sweep_of_the_drive():
-    sweep = fc.SweptSine(amplitude=1e-3, start_frequency_hz=1.0, end_frequency_hz=6.0, duration=2.0)
+    sweep = SweptSine(amplitude=1e-3, start_frequency_hz=1.0, end_frequency_hz=6.0, duration=2.0)
     system = point(drive=fc.Drive(stiffness_x=STIFFNESS, damping_x=DASHPOT, motion_x=sweep))
     times = np.linspace(0.0, 2.0, 9)
     wanted = oscillator(lambda t: STIFFNESS * 1e-3 * np.sin(
@@ -77,9 +90,9 @@ def test_sweep_of_the_drive():
 def test_belt_that_starts_and_oscillates():
     """Viscous friction R = d (x' - V(t)): a linear oscillator driven by the belt's speed."""
     d, N = 5.0, 10.0
-    friction = fc.ConstantFriction(friction_coefficient=0.0, viscous_coefficient=d / N)
-    motion = fc.SpeedRamp(end_speed=0.3, start=0.2, duration=0.5)
-    system = point(normal=fc.PrescribedForce(N), friction=friction,
+    friction = ConstantFriction(friction_coefficient=0.0, viscous_coefficient=d / N)
+    motion = SpeedRamp(end_speed=0.3, start=0.2, duration=0.5)
+    system = point(normal=PrescribedForce(N), friction=friction,
                    ground=fc.Ground(speed=0.1, motion=motion))
     times = np.linspace(0.0, 1.5, 7)
 
@@ -97,9 +110,9 @@ def test_belt_that_starts_and_oscillates():
 
 def test_friction_varies_along_the_ground():
     """Coulomb friction on ground whose coefficient is a sine of the place: work of one wave."""
-    variation = fc.Sine(amplitude=0.5, wavelength=0.01)
-    law = fc.ConstantFriction(friction_coefficient=0.4, smoothing_slope=1e6)
-    system = point(normal=fc.PrescribedForce(10.0), friction=law,
+    variation = Sine(amplitude=0.5, wavelength=0.01)
+    law = ConstantFriction(friction_coefficient=0.4, smoothing_slope=1e6)
+    system = point(normal=PrescribedForce(10.0), friction=law,
                    ground=fc.Ground(speed=0.1, friction_variation=variation))
     history = [system.contact_history(np.array([t]), np.zeros((1, 2)))[0, 0, 1]
                for t in np.linspace(0.0, 0.1, 21)]
@@ -113,10 +126,10 @@ def test_moment_and_constant_loads_at_points():
         np.diag([2.0, 2.0, 0.01]), np.diag([0.0, 0.0, 50.0]),
         {"contact": [[[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]],
          "C": [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]], "tip": [[1.0, 0, -0.2], [0, 1, 0.1], [0, 0, 1]]})
-    system = fc.ContactSystem(basis, normal=fc.RoughSurface(1e6, 1e-5, 500.0), load=fc.Load(
+    system = fc.ContactSystem(basis, normal=RoughSurface(1e6, 1e-5, 500.0), load=fc.Load(
         normal=20.0, forces=(
-            fc.PointLoad("tip", "moment", signal=fc.Constant(0.5)),
-            fc.PointLoad("tip", "y", signal=fc.Constant(-3.0)))), friction=fc.ExponentialFriction())
+            fc.PointLoad("tip", "phi", signal=Constant(0.5)),
+            fc.PointLoad("tip", "y", signal=Constant(-3.0)))), friction=ExponentialFriction())
     start = fc.simulate(system, 1e-3, outputs=2)
     turn = (0.5 - 3.0 * 0.1) / 50.0
     assert start.displacement("C")[0, 2] == pytest.approx(turn, rel=1e-8)
@@ -133,9 +146,9 @@ def test_longest_steps_resolve_what_is_given_in_time():
     cases = {
         0.5: point(drive=fc.Drive(stiffness_x=1.0, amplitude_x=1e-3,
                                   angular_frequency=4.0 * np.pi)),
-        0.25: point(drive=fc.Drive(stiffness_x=1.0, motion_x=fc.Harmonic(1e-3, 8.0 * np.pi)),
-                    load=loaded(fc.Harmonic(1.0, np.pi))),
-        0.2: point(load=loaded(fc.Harmonic(1.0, 10.0 * np.pi))),
+        0.25: point(drive=fc.Drive(stiffness_x=1.0, motion_x=Harmonic(1e-3, 8.0 * np.pi)),
+                    load=loaded(Harmonic(1.0, np.pi))),
+        0.2: point(load=loaded(Harmonic(1.0, 10.0 * np.pi))),
         0.1: point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02)),
         # The drive does not move: its frequency does not count.
         np.inf: point(drive=fc.Drive(stiffness_x=1.0, angular_frequency=4.0 * np.pi)),
@@ -147,6 +160,6 @@ def test_longest_steps_resolve_what_is_given_in_time():
         assert scipy.longest_step(system, times, 0.02) == pytest.approx(
             min(0.02, period / 20.0))
     ramp = point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02,
-                                  motion=fc.SpeedRamp(0.8, start=1.0, duration=1.0)))
+                                  motion=SpeedRamp(0.8, start=1.0, duration=1.0)))
     assert ramp.shortest_period(0.0, 10.0) == pytest.approx(0.02 / 0.8)
     assert ramp.shortest_period(0.0, 1.0) == pytest.approx(0.1)

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import fecontact as fc
+from fecontact.analysis import periodicity
+from fecontact.integrate import Rodas5P, Scipy
 
 
 def lengths(run):
@@ -15,7 +17,7 @@ def lengths(run):
 
 def test_two_modes_close_one_loop_after_four_periods():
     run = example.settled(example.oscillator(2), 40, 24)
-    found = fc.periodicity(run, t_start=run.time[0], largest=6)
+    found = periodicity(run, t_start=run.time[0], largest=6)
     assert found.periods == 4
     assert found.misfit < 1e-3
     # One slip in these four periods, always the same.
@@ -57,7 +59,7 @@ def test_third_mode_rings_at_the_drive_after_each_slip():
 
 def test_waves_make_several_slip_loops():
     run = example.settled(example.oscillator(3, example.WAVY), 20, 80)
-    assert fc.periodicity(run, t_start=run.time[0], largest=16).periods is None
+    assert periodicity(run, t_start=run.time[0], largest=16).periods is None
     assert example.different(lengths(run), 0.05) >= 3
     assert np.ptp(lengths(run)) > 0.2 * lengths(run).max()
     # The waves lift and lower the body: its normal force is the load in the mean alone.
@@ -93,7 +95,7 @@ def test_random_friction_breaks_away_at_the_coefficient_of_the_place():
 def test_the_integrator_makes_no_difference(modes, method, tolerance):
     system = example.oscillator(modes)
     run, other = (example.settled(system, 12, 12, 200, solver=solver)
-                  for solver in (fc.Rodas5P(), fc.Scipy(method)))
+                  for solver in (Rodas5P(), Scipy(method)))
     assert lengths(other) == pytest.approx(lengths(run), rel=tolerance)
     for point in ("B", 0):
         for end in (np.min, np.max):

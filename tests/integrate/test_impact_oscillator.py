@@ -8,11 +8,10 @@ import impact_oscillator as impact
 import numpy as np
 import pytest
 
-from fecontact.analysis.periodicity import count_periods, drive_period, strobed_states
-from fecontact.fem.mesh_files import read_mesh
-from fecontact.integrate.ensemble import ensemble
-from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import Scipy
+from fecontact import ensemble, read_mesh, simulate
+from fecontact.analysis import count_periods, strobed_states
+from fecontact.analysis.periodicity import drive_period
+from fecontact.integrate import Scipy
 
 MESH = Path(__file__).parents[2] / "meshes" / "impact_pendulum.msh"
 PERIODS = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}

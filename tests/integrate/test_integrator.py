@@ -8,22 +8,30 @@ from scipy.integrate import solve_ivp
 from systems import mass_in_plane, mass_in_y
 from test_simulate import oscillator
 
-from fecontact.core.errors import InputError
+from fecontact import (
+    ContactSystem,
+    Drive,
+    Ground,
+    InputError,
+    Load,
+    ModalBasis,
+    PointLoad,
+    Trajectory,
+)
 from fecontact.integrate.rodas5p import driver as control
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
-from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.excitation import Drive, Load, PointLoad
-from fecontact.laws.friction.bristle import LuGreFriction
-from fecontact.laws.friction.maxwell_slip import JenkinsFriction
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground, HarmonicSpeed
-from fecontact.laws.normal.linear import LinearContact
-from fecontact.laws.normal.power import PowerContact
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.laws.signals.harmonic import Harmonic, Pulse
-from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.contact_system import ContactSystem
+from fecontact.laws import (
+    ExponentialFriction,
+    Harmonic,
+    HarmonicSpeed,
+    JenkinsFriction,
+    LinearContact,
+    LuGreFriction,
+    PowerContact,
+    Pulse,
+    RoughSurface,
+)
 
 
 def run_of(system, state, times, rtol=1e-7, work=True):

@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 
 import fecontact as fc
+from fecontact import Trajectory
+from fecontact.integrate import Rodas5P, Scipy, SetValued
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
-from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws import (
+    ConstantFriction,
+    PrescribedForce,
+    RoughSurface,
+    Step,
+    Tabulated,
+)
 
 MASS, STIFFNESS, AT, FORCE = 2.0, 800.0, 0.3, 5.0
 
@@ -16,7 +24,7 @@ def point(dashpot=0.0, load=None, motion=None):
     basis = fc.basis_from_matrices([[MASS]], [[0.0]], {"contact": [row], "B": row, "C": row})
     loads = () if load is None else (fc.PointLoad("C", "x", signal=load),)
     return fc.ContactSystem(
-        basis, normal=fc.PrescribedForce(1e-12), friction=fc.ConstantFriction(0.0),
+        basis, normal=PrescribedForce(1e-12), friction=ConstantFriction(0.0),
         load=fc.Load(0.0, loads), drive=fc.Drive(stiffness_x=STIFFNESS, damping_x=dashpot,
                                                  motion_x=motion))
 
@@ -32,16 +40,16 @@ def response(times, dashpot):
 TIMES = np.union1d(np.linspace(0.0, 1.0, 101), [AT])
 
 
-@pytest.mark.parametrize("solver", [fc.Rodas5P(), fc.SetValued(), fc.Scipy("Radau"),
-                                    fc.Scipy("BDF"), fc.Scipy("LSODA")], ids=lambda s: s.name)
+@pytest.mark.parametrize("solver", [Rodas5P(), SetValued(), Scipy("Radau"),
+                                    Scipy("BDF"), Scipy("LSODA")], ids=lambda s: s.name)
 @pytest.mark.parametrize("dashpot", [0.0, 10.0])
 @pytest.mark.parametrize("kind", ["load", "drive"])
 def test_step_response(solver, dashpot, kind):
     """Without damping up to twice the static displacement."""
     static = FORCE / STIFFNESS
-    system = point(dashpot, **({"load": fc.Step(AT, FORCE)} if kind == "load" else
-                               {"motion": fc.Step(AT, static)}))
-    ours = not isinstance(solver, fc.Scipy)
+    system = point(dashpot, **({"load": Step(AT, FORCE)} if kind == "load" else
+                               {"motion": Step(AT, static)}))
+    ours = not isinstance(solver, Scipy)
     rtol = 1e-8 if ours else 1e-9
     run = fc.simulate(system, TIMES[-1], initial=np.zeros(2), outputs=TIMES, rtol=rtol,
                       solver=solver)
@@ -58,7 +66,7 @@ def test_step_response(solver, dashpot, kind):
 
 @pytest.mark.parametrize("scheme", ["events", "stepping"])
 def test_step_response_of_set_valued_schemes(scheme):
-    system = point(10.0, load=fc.Step(AT, FORCE))
+    system = point(10.0, load=Step(AT, FORCE))
     run = integrate_set_valued(system, np.zeros(2), TIMES, rtol=1e-6, scheme=scheme)
     x = run.states[:, 0] * system.basis.T[0, 0, 0] * STIFFNESS / FORCE
     assert x == pytest.approx(response(TIMES, 10.0), abs=1e-4)
@@ -72,8 +80,8 @@ def test_a_sticking_mass_breaks_away_at_the_step():
     row = [[1.0], [0.0], [0.0]]
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": [row], "B": row, "C": row})
     system = fc.ContactSystem(
-        basis, normal=fc.PrescribedForce(2.0), friction=fc.ConstantFriction(0.5),
-        load=fc.Load(0.0, (fc.PointLoad("C", "x", signal=fc.Step(AT, 3.0)),)))
+        basis, normal=PrescribedForce(2.0), friction=ConstantFriction(0.5),
+        load=fc.Load(0.0, (fc.PointLoad("C", "x", signal=Step(AT, 3.0)),)))
     for scheme in ("events", "stepping"):
         run = integrate_set_valued(system, np.zeros(2), TIMES, rtol=1e-8, scheme=scheme)
         since = np.maximum(TIMES - AT, 0.0)
@@ -81,11 +89,11 @@ def test_a_sticking_mass_breaks_away_at_the_step():
         assert run.statistics["steps"] < 300
 
 
-@pytest.mark.parametrize("solver", [fc.Rodas5P(), fc.SetValued()], ids=lambda s: s.name)
+@pytest.mark.parametrize("solver", [Rodas5P(), SetValued()], ids=lambda s: s.name)
 def test_one_steep_piece_does_not_shorten_all_steps(solver):
     """A load that jumps within a microsecond, in a run of 100 s at rest."""
-    force = fc.Tabulated((0.0, 50.0, 50.000001, 100.0), (0.0, 0.0, FORCE, FORCE))
-    smooth = fc.Tabulated(np.append(np.linspace(0.0, 50.0, 51),
+    force = Tabulated((0.0, 50.0, 50.000001, 100.0), (0.0, 0.0, FORCE, FORCE))
+    smooth = Tabulated(np.append(np.linspace(0.0, 50.0, 51),
                                     np.linspace(50.000001, 100.0, 50)),
                           np.append(np.zeros(51), np.full(50, FORCE)), interpolation="cubic")
     for signal in (force, smooth):
@@ -101,8 +109,8 @@ def test_from_rest_under_point_loads():
     basis = fc.basis_from_matrices([[1.0]], [[1e4]], {"contact": [row], "C": row},
                                    damping=[[5.0]])
     system = fc.ContactSystem(
-        basis, normal=fc.RoughSurface(1e6, 1e-9, 0.0), friction=fc.ConstantFriction(0.5),
-        load=fc.Load(0.0, (fc.PointLoad("C", "x", signal=fc.Step(10.0, 3e3)),)))
+        basis, normal=RoughSurface(1e6, 1e-9, 0.0), friction=ConstantFriction(0.5),
+        load=fc.Load(0.0, (fc.PointLoad("C", "x", signal=Step(10.0, 3e3)),)))
     times = np.union1d(np.linspace(0.0, 100.0, 101), np.linspace(10.0, 11.0, 101))
     run = integrate_set_valued(system, np.zeros(2), times, rtol=1e-6)
     s, w = np.maximum(times - 10.0, 0.0), np.sqrt(1e4 - 2.5**2)

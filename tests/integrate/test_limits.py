@@ -6,23 +6,23 @@ from systems import friction_oscillator, impact_oscillator
 from test_events import START, drop
 
 from fecontact import (
-    CVODE,
-    ConstantFriction,
     ContactSystem,
-    ExponentialFriction,
     InputError,
     Load,
     ModelWarning,
-    NormalLaw,
     RigidStart,
-    RoughSurface,
-    SetValued,
     Status,
     basis_from_matrices,
-    normal_law,
     simulate,
-    smoothing_cost,
     static_equilibrium,
+)
+from fecontact.integrate import CVODE, SetValued, smoothing_cost
+from fecontact.laws import (
+    ConstantFriction,
+    ExponentialFriction,
+    NormalLaw,
+    RoughSurface,
+    normal_law,
 )
 
 

@@ -5,17 +5,8 @@ import pytest
 import scipy.linalg
 from systems import friction_oscillator, impact_oscillator
 
-from fecontact import (
-    Drive,
-    Ground,
-    InputError,
-    IwanFriction,
-    LuGreFriction,
-    Sine,
-    sensitivity,
-    simulate,
-)
-from fecontact.core.errors import AnalysisError
+from fecontact import AnalysisError, Drive, Ground, InputError, sensitivity, simulate
+from fecontact.laws import IwanFriction, LuGreFriction, Sine
 
 SMOOTH = {"friction.smoothing_slope": 3e3}
 

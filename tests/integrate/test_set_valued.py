@@ -3,27 +3,32 @@
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError
+from fecontact import (
+    ContactSystem,
+    Drive,
+    Ground,
+    InputError,
+    Load,
+    PointLoad,
+    Status,
+    Trajectory,
+    basis_from_matrices,
+    simulate,
+    static_equilibrium,
+)
+from fecontact.integrate import SetValued, smoothing_cost
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
-from fecontact.integrate.simulate import simulate
-from fecontact.integrate.smoothing_cost import smoothing_cost
-from fecontact.integrate.solvers import SetValued
-from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.laws.excitation import Drive, Load, PointLoad
-from fecontact.laws.friction.bristle import LuGreFriction
-from fecontact.laws.friction.stribeck import (
+from fecontact.laws import (
+    Constant,
     ConstantFriction,
     ExponentialFriction,
     HyperbolicFriction,
+    LinearContact,
+    LuGreFriction,
+    PrescribedForce,
+    RoughSurface,
+    SpeedRamp,
 )
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.ground.motion import SpeedRamp
-from fecontact.laws.normal.linear import LinearContact, PrescribedForce
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.laws.signals.harmonic import Constant
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.statics import static_equilibrium
 
 BOTH = pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
     ("events", 1e-11, 1e-11), ("stepping", 1e-6, 2e-6)])

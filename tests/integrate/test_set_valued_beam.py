@@ -4,19 +4,23 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.core.errors import InputError
-from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact import (
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    Ground,
+    InputError,
+    Load,
+    Material,
+    Status,
+    Trajectory,
+    modal_basis,
+    simulate,
+    static_equilibrium,
+)
+from fecontact.integrate import Scipy
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
-from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import Scipy
-from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.laws.excitation import Drive, Load
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.statics import static_equilibrium
+from fecontact.laws import ExponentialFriction, RoughSurface
 
 TIMES = np.linspace(0.0, 0.01, 201)
 

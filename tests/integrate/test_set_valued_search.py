@@ -5,8 +5,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fecontact as fc
+from fecontact import Status
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
-from fecontact.integrate.trajectory import Status
+from fecontact.laws import (
+    ConstantFriction,
+    ExponentialFriction,
+    Harmonic,
+    HarmonicSpeed,
+    HyperbolicFriction,
+    LinearContact,
+    PrescribedForce,
+    RoughSurface,
+)
 
 SIDEWAYS, UPWARDS = [[1.0], [0.0], [0.0]], [[0.0], [1.0], [0.0]]
 
@@ -15,7 +25,7 @@ def mass(row, spring=1.0, dashpot=0.0, **parts):
     """A mass of 1 kg that moves in one direction."""
     basis = fc.basis_from_matrices([[1.0]], [[spring]], {"contact": [row], "B": row, "C": row},
                                    damping=[[dashpot]])
-    return fc.ContactSystem(basis, **{"normal": fc.RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
+    return fc.ContactSystem(basis, **{"normal": RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 
 def bouncing(start, e, times):
@@ -64,7 +74,7 @@ def test_impacts_of_many_random_starts():
 
 def test_a_soft_contact_between_the_stages_is_felt():
     """A spring of 1e6 N/m, touched for some milliseconds within steps of seconds."""
-    system = mass(UPWARDS, normal=fc.LinearContact(1e6), friction=fc.ConstantFriction(0.0), gap=1.0)
+    system = mass(UPWARDS, normal=LinearContact(1e6), friction=ConstantFriction(0.0), gap=1.0)
     for end in (20.0, 200.0):
         times = np.linspace(0.0, end, 401)
         run = integrate_set_valued(system, np.array([1.001, 0.0]), times, rtol=1e-9)
@@ -132,8 +142,8 @@ def belt_reference(state, speed, times, dashpot=0.1, coefficient=falling):
 
 
 def belt(**parts):
-    return mass(SIDEWAYS, dashpot=0.1, normal=fc.PrescribedForce(1.0),
-                friction=fc.ExponentialFriction(1.0, 0.5, 2.0), **parts)
+    return mass(SIDEWAYS, dashpot=0.1, normal=PrescribedForce(1.0),
+                friction=ExponentialFriction(1.0, 0.5, 2.0), **parts)
 
 
 @pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
@@ -162,7 +172,7 @@ def test_friction_from_many_random_starts():
 
 
 def test_a_belt_of_changing_speed():
-    motion = fc.HarmonicSpeed(0.5, 3.0)
+    motion = HarmonicSpeed(0.5, 3.0)
     times = np.linspace(0.0, 6.0, 31)
     wanted, changes = belt_reference([0.3, 0.0], lambda t: 0.6 + 0.5 * np.sin(3.0 * t), times)
     assert len(changes) >= 2
@@ -175,8 +185,8 @@ def test_a_belt_of_changing_speed():
 def test_stick_let_go_for_a_moment():
     """A force that passes the limit of stick for less than a hundredth of its period."""
     for excess in (1e-3, 1e-4, 1e-5):
-        system = mass(SIDEWAYS, spring=0.5, normal=fc.PrescribedForce(1.0),
-                      friction=fc.ConstantFriction(0.4), drive=fc.Drive(
+        system = mass(SIDEWAYS, spring=0.5, normal=PrescribedForce(1.0),
+                      friction=ConstantFriction(0.4), drive=fc.Drive(
                           stiffness_x=0.5, amplitude_x=0.8 * (1.0 + excess), angular_frequency=1.5))
         run = integrate_set_valued(system, np.zeros(2), np.linspace(0.0, 20.0 * np.pi / 1.5, 201),
                                    rtol=1e-9)
@@ -192,7 +202,7 @@ def test_a_stop_let_go_for_a_moment():
     """
     for excess in (1e-3, 1e-4):
         system = mass(UPWARDS, spring=1e-9, load=fc.Load(1.0, (fc.PointLoad(
-            "C", "y", signal=fc.Harmonic(1.0 + excess, 2.0)),)))
+            "C", "y", signal=Harmonic(1.0 + excess, 2.0)),)))
         run = integrate_set_valued(system, np.zeros(2), np.linspace(0.0, 10.0 * np.pi, 201),
                                    rtol=1e-9, restitution=0.0)
         assert run.statistics["impacts"] == 10
@@ -234,8 +244,8 @@ def test_impacts_on_passing_waves():
 
 
 def test_two_events_in_a_period_of_stick_and_slip():
-    system = mass(SIDEWAYS, normal=fc.PrescribedForce(1.0), ground=fc.Ground(speed=0.2),
-                  friction=fc.HyperbolicFriction(1.0, 0.0, 1.0 / 3.0))
+    system = mass(SIDEWAYS, normal=PrescribedForce(1.0), ground=fc.Ground(speed=0.2),
+                  friction=HyperbolicFriction(1.0, 0.0, 1.0 / 3.0))
     for rtol in (1e-4, 1e-6, 1e-8, 1e-11):
         run = integrate_set_valued(system, np.array([0.5, 0.2]), np.linspace(0.0, 240.0, 3),
                                    rtol=rtol)

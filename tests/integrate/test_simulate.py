@@ -8,21 +8,28 @@ from meshes_for_tests import rectangle
 from scipy.optimize import brentq
 from systems import DRIVEN, SURFACE, beam, impact_oscillator, mass_in_plane, mass_in_y
 
-from fecontact.core.errors import AnalysisError, InputError
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.integrate.initial_state import RigidStart, initial_state
-from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import Rodas5P, Scipy
-from fecontact.integrate.trajectory import ContactState, Status, Trajectory
-from fecontact.laws.excitation import Drive, Load
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.statics import static_equilibrium
+from fecontact import (
+    AnalysisError,
+    ContactState,
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    Ground,
+    InputError,
+    Load,
+    Material,
+    ModalBasis,
+    RigidStart,
+    Status,
+    Trajectory,
+    basis_from_matrices,
+    modal_basis,
+    simulate,
+    static_equilibrium,
+)
+from fecontact.integrate import Rodas5P, Scipy
+from fecontact.integrate.initial_state import initial_state
+from fecontact.laws import ExponentialFriction, RoughSurface
 
 RTOL = 1e-6
 BALANCE = 20.0 * RTOL
@@ -355,7 +362,7 @@ def test_free_flight_of_a_body():
 def test_nodes_and_field_points():
     system = beam(**DRIVEN)
     run = simulate(system, 0.002, outputs=5, initial=RigidStart((0.0, 1e-3, 0.0)))
-    field = system.basis.field
+    field = system.basis.mode_shapes
     node = int(np.argmin(np.linalg.norm(field.nodes - [0.2, 0.02], axis=1)))
     assert run.displacement((0.2, 0.02)) == pytest.approx(
         run.modal_coordinates @ field.shapes[node].T, abs=1e-18)

@@ -8,27 +8,25 @@ import pytest
 from systems import basis
 
 from fecontact import (
-    ContactEvents,
     ContactSystem,
-    Crossing,
     Event,
-    ExponentialFriction,
     Ground,
-    HarmonicSpeed,
     InputError,
-    LinearContact,
     Load,
-    PrescribedForce,
-    Rodas5P,
-    RoughSurface,
-    Scipy,
-    SetValued,
     Status,
-    TwoSidedStop,
     ensemble,
     event,
     sensitivity,
     simulate,
+)
+from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy, SetValued
+from fecontact.laws import (
+    ExponentialFriction,
+    HarmonicSpeed,
+    LinearContact,
+    PrescribedForce,
+    RoughSurface,
+    TwoSidedStop,
 )
 from fecontact.laws.ground.profile import Profile
 from fecontact.laws.signatures import ground_profile

@@ -9,18 +9,41 @@ import pytest
 
 import fecontact as fc
 from fecontact.cli import execute
-from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws import (
+    BoucWenFriction,
+    CosineSurface,
+    ExponentialContact,
+    ExponentialFriction,
+    FrictionLaw,
+    GaussianSurface,
+    GreenwoodWilliamson,
+    JenkinsFriction,
+    LinearContact,
+    MeasuredSurface,
+    NormalLaw,
+    ParabolicSurface,
+    PowerContact,
+    PowerLawContact,
+    PrescribedForce,
+    RestitutionContact,
+    RoughSurface,
+    TwoSidedStop,
+    check_law,
+    friction_law,
+    memory_friction_law,
+    normal_law,
+)
 from fecontact.laws.registry import law_names
 from fecontact.laws.sampling import cycle_work
 
 NEEDED = {
-    fc.RoughSurface: (1e6, 1e-5, 3.0), fc.ParabolicSurface: (1e6, 1e-5, 3.0),
-    fc.CosineSurface: (1e6, 1e-5, 3.0), fc.GaussianSurface: (1e6, 1e-5, 3.0),
-    fc.MeasuredSurface: (1e6, 1e-5, 3.0),
-    fc.LinearContact: (1e6, 3.0), fc.PowerContact: (1e9, 1.5, 2.0),
-    fc.RestitutionContact: (1e9, 0.5, 1.0), fc.ExponentialContact: (10.0, 1e-6),
-    fc.PowerLawContact: (1e-4, 1e-9), fc.TwoSidedStop: (1e6, 1e-4, 1.5), fc.PrescribedForce: (3.0,),
-    fc.GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6),
+    RoughSurface: (1e6, 1e-5, 3.0), ParabolicSurface: (1e6, 1e-5, 3.0),
+    CosineSurface: (1e6, 1e-5, 3.0), GaussianSurface: (1e6, 1e-5, 3.0),
+    MeasuredSurface: (1e6, 1e-5, 3.0),
+    LinearContact: (1e6, 3.0), PowerContact: (1e9, 1.5, 2.0),
+    RestitutionContact: (1e9, 0.5, 1.0), ExponentialContact: (10.0, 1e-6),
+    PowerLawContact: (1e-4, 1e-9), TwoSidedStop: (1e6, 1e-4, 1.5), PrescribedForce: (3.0,),
+    GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6),
 }
 
 
@@ -28,16 +51,16 @@ NEEDED = {
     cls for kind in (NormalLaw, FrictionLaw) for cls in law_names()[kind].values()],
     ids=lambda cls: cls.__name__)
 def test_laws_of_the_package_pass(cls):
-    fc.check_law(cls(*NEEDED.get(cls, ())))
+    check_law(cls(*NEEDED.get(cls, ())))
 
 
 def test_parameters_per_node_and_springs_with_smoothing_pass():
-    fc.check_law(fc.RoughSurface((1e6, 2e6), 1e-6, 3.0))
-    fc.check_law(fc.JenkinsFriction((2e6, 1e6), (0.4, 0.7)))
-    fc.check_law(fc.ExponentialFriction(0.3, 0.5, viscous_coefficient=1.0, smoothing="tanh"))
+    check_law(RoughSurface((1e6, 2e6), 1e-6, 3.0))
+    check_law(JenkinsFriction((2e6, 1e6), (0.4, 0.7)))
+    check_law(ExponentialFriction(0.3, 0.5, viscous_coefficient=1.0, smoothing="tanh"))
 
 
-@fc.normal_law
+@normal_law
 def _spring(u, v, p):
     """A spring with a dashpot; p: stiffness, damping, then what is wrong with it."""
     stiffness, damping, wrong = p[0], p[1], p[2]
@@ -56,7 +79,7 @@ def _spring(u, v, p):
 
 
 @dataclass(frozen=True)
-class Spring(fc.NormalLaw):
+class Spring(NormalLaw):
     kernel: ClassVar = _spring
     penetration_scale: ClassVar = 1e-6
 
@@ -69,7 +92,7 @@ class Spring(fc.NormalLaw):
         return energy * {6.0: 1.01, 7.0: -1.0}.get(self.wrong, 1.0)
 
 
-@fc.friction_law
+@friction_law
 def _coulomb(v, F, p):
     """Coulomb with a Stribeck fall, smoothed by tanh; p: what is wrong with it."""
     wrong = p[0]
@@ -87,14 +110,14 @@ def _coulomb(v, F, p):
 
 
 @dataclass(frozen=True)
-class Coulomb(fc.FrictionLaw):
+class Coulomb(FrictionLaw):
     kernel: ClassVar = _coulomb
     velocity_scale: ClassVar = 1e-4
 
     wrong: float = 0.0
 
 
-@fc.memory_friction_law
+@memory_friction_law
 def _bristle(v, F, z, p, force, rates):
     """LuGre's law with constant friction 0.5; p: what is wrong with it."""
     wrong = p[0]
@@ -110,7 +133,7 @@ def _bristle(v, F, z, p, force, rates):
 
 
 @dataclass(frozen=True)
-class Bristle(fc.FrictionLaw):
+class Bristle(FrictionLaw):
     kernel: ClassVar = _bristle
     memory: ClassVar = 1
     velocity_scale: ClassVar = 5e-5
@@ -124,7 +147,7 @@ class Bristle(fc.FrictionLaw):
 
 @pytest.mark.parametrize("law", [Spring(), Coulomb(), Bristle()], ids=repr)
 def test_own_laws_without_mistake_pass(law):
-    fc.check_law(law)
+    check_law(law)
 
 
 @pytest.mark.parametrize(("law", "message"), [
@@ -146,19 +169,19 @@ def test_own_laws_without_mistake_pass(law):
 ], ids=lambda value: repr(value) if not isinstance(value, str) else "")
 def test_single_mistakes_are_found(law, message):
     with pytest.raises(fc.FecontactError, match=message):
-        fc.check_law(law)
+        check_law(law)
 
 
 def test_hysteresis_that_gives_energy_off_is_found():
-    law = fc.BoucWenFriction()
+    law = BoucWenFriction()
     object.__setattr__(law, "beta", -0.5)
     with pytest.raises(fc.FecontactError, match=r"BoucWenFriction: cycles of slip .* give off"):
-        fc.check_law(law)
+        check_law(law)
 
 
 def test_work_of_a_cycle_of_jenkins_element():
     """mu F times the way, less 2 mu F / k at each turn, where the spring only turns over."""
-    law = fc.JenkinsFriction(2e6, 0.4)
+    law = JenkinsFriction(2e6, 0.4)
     p = law.table(np.ones(1))[0]
     work, size = cycle_work(law.kernel.address, law.memory, p, 1.0, 1e-5, 1e-5)
     # Four turning points of the travel -cos x - 0.4 cos(3 x + 1) within a period.
@@ -178,13 +201,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 import fecontact as fc
 
-@fc.friction_law
+@friction_law
 def f(v, F, p):
     s = math.tanh(1e4 * v)
     return p[0] * s * F, p[0] * 1e4 * (1.0 - s * s) * F, p[0] * s
 
 @dataclass(frozen=True)
-class Mine(fc.FrictionLaw):
+class Mine(FrictionLaw):
     """My own friction."""
     kernel: ClassVar = f
     velocity_scale: ClassVar = 1e-4

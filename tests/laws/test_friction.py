@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.reduction.from_matrices import basis_from_matrices
+from fecontact import InputError, basis_from_matrices
+from fecontact.laws import ExponentialFriction
 
 BOOK = (0.8, 0.55, 1000.0, 1e6)
 
@@ -70,9 +69,8 @@ def test_friction_takes_energy():
 
 
 def test_compiled_function_agrees_with_the_plain_one():
-    from fecontact.laws.ground.ground import Ground
-    from fecontact.laws.normal.rough_surface import RoughSurface
-    from fecontact.system.contact_system import ContactSystem
+    from fecontact import ContactSystem, Ground
+    from fecontact.laws import RoughSurface
 
     rows = np.zeros((1, 3, 2))
     rows[0, 0, 0] = rows[0, 1, 1] = 1.0

@@ -10,18 +10,20 @@ from friction_conformance import check_friction_law
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fecontact.core.errors import InputError
-from fecontact.laws.base import PerNode, Positive, Bound
-from fecontact.laws.friction.base import MemorylessFriction
-from fecontact.laws.friction.stribeck import (
+from fecontact import InputError
+from fecontact.laws import (
+    Bound,
     ConstantFriction,
     CubicFriction,
     ExponentialFriction,
     GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
+    PerNode,
+    Positive,
     ProductFriction,
 )
+from fecontact.laws.friction.base import MemorylessFriction
 
 SMOOTHINGS = ("arctan", "tanh", "square-root")
 
@@ -29,14 +31,14 @@ CURVES = {
     ExponentialFriction: ({"static_coefficient": 0.7, "kinetic_coefficient": 0.4, "decay": 300.0},
                           lambda a: 0.4 + 0.3 * np.exp(-300.0 * a)),
     GaussianFriction: ({"static_coefficient": 0.7, "kinetic_coefficient": 0.4,
-                            "stribeck_velocity": 2e-3},
+                        "stribeck_velocity": 2e-3},
                        lambda a: 0.4 + 0.3 * np.exp(-((a / 2e-3) ** 2))),
     HyperbolicFriction: ({"static_coefficient": 0.7, "kinetic_coefficient": 0.4,
-                              "stribeck_velocity": 2e-3},
+                          "stribeck_velocity": 2e-3},
                          lambda a: 0.4 + 0.3 / (1.0 + a / 2e-3)),
     ConstantFriction: ({"friction_coefficient": 0.6}, lambda a: 0.6 + 0.0 * a),
     GalvanettoFriction: ({"static_coefficient": 0.7, "kinetic_coefficient": 0.4, "decay": 300.0,
-                              "growth": 50.0},
+                          "growth": 50.0},
                          lambda a: 0.4 + 0.3 / (1.0 + 300.0 * a) + 50.0 * a * a),
     CubicFriction: ({"static_coefficient": 0.7, "minimum_coefficient": 0.4,
                      "minimum_velocity": 5e-3},

@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fecontact.core.errors import InputError
-from fecontact.laws.excitation import Drive, Load, PointLoad
-from fecontact.laws.ground.fourier_series import FourierSeries
-from fecontact.laws.ground.ground import Ground, HarmonicSpeed, SpeedRamp
-from fecontact.laws.ground.profile import Flat, Sine
-from fecontact.laws.ground.random_roughness import RandomRoughness
-from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics, Sweep
+from fecontact import Drive, Ground, InputError, Load, PointLoad
+from fecontact.laws import (
+    Constant,
+    Flat,
+    FourierSeries,
+    Harmonic,
+    Harmonics,
+    HarmonicSpeed,
+    RandomRoughness,
+    Sine,
+    SpeedRamp,
+    SweptSine,
+)
 
 
 def profile(ground, xi):
@@ -177,9 +183,9 @@ def test_motions_of_the_drive():
 
 def test_loads_at_points():
     force = PointLoad("B", "x", signal=Harmonic(2.0, 3.0))
-    load = Load(5.0, [force, PointLoad(3, "moment", signal=Constant(1.0))])
+    load = Load(5.0, [force, PointLoad(3, "phi", signal=Constant(1.0))])
     assert load.forces[0] is force
-    assert load == Load(5.0, (force, PointLoad(3, "moment", signal=Constant(1.0))))
+    assert load == Load(5.0, (force, PointLoad(3, "phi", signal=Constant(1.0))))
     assert hash(load) == hash(Load(5.0, load.forces))
     assert (PointLoad(signal=Constant(1.0)).point, PointLoad(signal=Constant(1.0)).direction) == (
         "C", "y")

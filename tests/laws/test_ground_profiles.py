@@ -9,12 +9,9 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError
-from fecontact.laws.ground.fourier_series import FourierSeries
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.ground.measured_profile import MeasuredProfile
-from fecontact.laws.ground.profile import Flat, Profile, Sine
-from fecontact.laws.ground.random_roughness import RandomRoughness
+from fecontact import Ground, InputError
+from fecontact.laws import Flat, FourierSeries, MeasuredProfile, RandomRoughness, Sine
+from fecontact.laws.ground.profile import Profile
 from fecontact.laws.signatures import ground_profile
 
 RNG = np.random.default_rng(3)
@@ -27,7 +24,8 @@ PROFILES = {
     "sine": Sine(1e-4, 2.5e-3, 0.7),
     "fourier": FourierSeries(2.5e-3, (1e-4, 0.0, -3e-5, 1e-5), (0.3, 0.0, 2.0, -1.0)),
     "trace": MeasuredProfile(TRACE_X, TRACE_Y),
-    "periodic trace": MeasuredProfile(TRACE_X, CLOSED_Y, periodic=True, remove_mean=True, scale=2.0),
+    "periodic trace": MeasuredProfile(TRACE_X, CLOSED_Y, periodic=True, remove_mean=True,
+                                      scale=2.0),
     "random": RandomRoughness(1e-6, 0.8, 2e-3, 1e-4, 1e-2, seed=5),
 }
 
@@ -260,7 +258,8 @@ def test_traces_from_files(tmp_path, monkeypatch, content, x, y, encoding):
         trace = MeasuredProfile(file=file)
         assert trace == MeasuredProfile(x, y)
         assert trace.file is None
-    assert replace(MeasuredProfile(file="trace.csv", scale=2.0), scale=3.0) == MeasuredProfile(x, y, scale=3.0)
+    assert (replace(MeasuredProfile(file="trace.csv", scale=2.0), scale=3.0)
+            == MeasuredProfile(x, y, scale=3.0))
 
 
 @pytest.mark.parametrize(("content", "message"), [
@@ -300,7 +299,7 @@ def test_smallest_and_largest_traces_have_curves():
     for scale in (1e-60, 1e59):
         for periodic in (False, True):
             trace = MeasuredProfile((0, 1, 2, 4), (0, 1, 2, 0), periodic=periodic, scale=scale,
-                          abscissa_scale=scale)
+                                    abscissa_scale=scale)
             assert np.isfinite(trace.parameters()).all()
             assert trace.height([scale]) == pytest.approx([scale], rel=1e-12)
             assert trace.shortest_wavelength > 0.0
@@ -317,18 +316,27 @@ def test_smallest_and_largest_traces_have_curves():
     (lambda: FourierSeries(1.0, (1.0, float("inf"))), r"amplitudes\[1\] = inf must be finite"),
     (lambda: FourierSeries(1.0, (1.0, 2.0), (0.0,)), "phases has 1 values for 2 amplitudes"),
     (lambda: MeasuredProfile((0, 1, 2), (0, 1)), "heights has 2 values for 3 abscissa"),
-    (lambda: MeasuredProfile((0, 2, 1), (0, 1, 2)), r"MeasuredProfile: abscissa\[2\] = 1 must be larger"),
-    (lambda: MeasuredProfile((0, 1, 2), (0, float("nan"), 2)), r"heights\[1\] = nan must be finite; repair"),
-    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), file="a.csv"), "cannot stand beside abscissa and heigh"),
+    (lambda: MeasuredProfile((0, 2, 1), (0, 1, 2)),
+     r"MeasuredProfile: abscissa\[2\] = 1 must be larger"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, float("nan"), 2)),
+     r"heights\[1\] = nan must be finite; repair"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), file="a.csv"),
+     "cannot stand beside abscissa and heigh"),
     (lambda: MeasuredProfile(), "abscissa has 0 values; at least 3"),
-    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic=True), "begins with 0 and ends with 2; add"),
-    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=0.0), "MeasuredProfile: abscissa_scale"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic=True),
+     "begins with 0 and ends with 2; add"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=0.0),
+     "MeasuredProfile: abscissa_scale"),
     (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=1e-300),
      r"abscissa_scale = 1e-300 must be a number from 1e-60 to 1e\+60"),
-    (lambda: MeasuredProfile((0, 1, 1 + 1e-15), (0, 1, 2), abscissa_scale=1e-59), "apart; their distances"),
-    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=1.7e308), "must be a number from 1e-60"),
-    (lambda: MeasuredProfile((0, 1, 2), (0, 1, -20), scale=1e308), r"scale = 1e\+308 reaches -inf; its va"),
-    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic="yes"), "periodic = 'yes' must be true or fal"),
+    (lambda: MeasuredProfile((0, 1, 1 + 1e-15), (0, 1, 2), abscissa_scale=1e-59),
+     "apart; their distances"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), abscissa_scale=1.7e308),
+     "must be a number from 1e-60"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, -20), scale=1e308),
+     r"scale = 1e\+308 reaches -inf; its va"),
+    (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic="yes"),
+     "periodic = 'yes' must be true or fal"),
     (lambda: MeasuredProfile(file=3), "file = 3 must be the name of a file"),
     (lambda: RandomRoughness(-1.0, 0.5, 0.1, 0.01, 1.0), "RandomRoughness: rms_height"),
     (lambda: RandomRoughness(1.0, 1.5, 0.1, 0.01, 1.0), r"hurst_exponent = 1\.5 must be from 0"),

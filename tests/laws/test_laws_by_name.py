@@ -10,13 +10,18 @@ from friction_conformance import check_friction_law
 from own_law import LogarithmicFriction
 
 import fecontact as fc
+from fecontact import Study
 from fecontact.cli import execute
 from fecontact.core.tables import from_table, to_table
-from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws import (
+    ExponentialFriction,
+    FrictionLaw,
+    NormalLaw,
+    RoughSurface,
+)
 from fecontact.laws.ground.profile import Profile
 from fecontact.laws.registry import law_names
 from fecontact.laws.signals.base import Signal
-from fecontact.study.study import Study
 
 # Values for parameters that have no defaults.
 GIVEN = {
@@ -157,7 +162,7 @@ def test_mistakes_in_laws_are_one_sentence(law, message, tmp_path):
     good = """
 from dataclasses import dataclass
 from typing import ClassVar
-from fecontact import FrictionLaw, friction_law
+from fecontact.laws import FrictionLaw, friction_law
 
 @friction_law
 def f(v, F, p):
@@ -313,7 +318,7 @@ def test_example_law_conforms():
 def test_example_in_the_documentation_is_the_example():
     root = Path(__file__).parents[2]
     example = (root / "examples" / "own_law.py").read_text()
-    block = (root / "docs" / "laws.md").read_text().split("```python\n@fc.friction_law")[1]
+    block = (root / "docs" / "laws.md").read_text().split("```python\n@friction_law")[1]
     for line in block.split("```")[0].splitlines():
         if line.strip() and not line.startswith("    def "):
             assert line in example, line
@@ -324,7 +329,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 import fecontact as fc
 
-@fc.memory_friction_law
+@memory_friction_law
 def f(v, F, z, p, force, rates):
     force[0] = F * 1e5 * z[0]
     force[1] = 0.0
@@ -336,7 +341,7 @@ def f(v, F, z, p, force, rates):
     rates[0, 3] = -2e5 * abs(v)
 
 @dataclass(frozen=True)
-class Mine(fc.FrictionLaw):
+class Mine(FrictionLaw):
     kernel: ClassVar = f
     memory: ClassVar = 1
     velocity_scale: ClassVar = 1e-5
@@ -367,16 +372,16 @@ def test_own_law_with_memory_runs_is_kept_and_read(tmp_path):
     ("    force[1] = 0.0\n", "    if v > 1e9:\n        raise ValueError(v)\n",
      r"f\(v, F, z, p, force, rates\) has a raise or assert statement, which"),
     ("    force[1] = 0.0\n", "    assert F >= 0.0\n", "has a raise or assert statement, which"),
-    ("@fc.memory_friction_law\ndef f(v, F, z, p, force, rates):\n",
+    ("@memory_friction_law\ndef f(v, F, z, p, force, rates):\n",
      "import numba\n\n@numba.njit\ndef checked(F):\n    if F < 0.0:\n        raise ValueError(F)\n"
-     "\n@fc.memory_friction_law\ndef f(v, F, z, p, force, rates):\n    checked(F)\n",
+     "\n@memory_friction_law\ndef f(v, F, z, p, force, rates):\n    checked(F)\n",
      "statement in checked, which"),
     ("    memory: ClassVar = 1\n", "", "memory = 0 must be the number of internal variables"),
     ("memory: ClassVar = 1", "memory: ClassVar = -1", "memory = -1 must be"),
     ("velocity_scale: ClassVar = 1e-5", "velocity_scale: ClassVar = 0.0", "velocity_scale = 0.0"),
     ("    velocity_scale: ClassVar = 1e-5\n", "", "velocity_scale = None must be a finite number"),
-    ("@fc.memory_friction_law\n", "", "kernel must be a class variable, a function"),
-    ("@fc.memory_friction_law", "@fc.normal_law", "kernel must be a class variable, a function"),
+    ("@memory_friction_law\n", "", "kernel must be a class variable, a function"),
+    ("@memory_friction_law", "@normal_law", "kernel must be a class variable, a function"),
 ])
 def test_incomplete_own_laws_are_refused(old, new, message, tmp_path):
     assert old in MEMORY_LAW
@@ -391,8 +396,8 @@ def test_incomplete_own_laws_are_refused(old, new, message, tmp_path):
 
 def test_lists_per_node_are_counted_rightly():
     with pytest.raises(fc.FecontactError, match="stiffness has 3, roughness_height has 2"):
-        fc.RoughSurface((1e6,) * 3, (1e-6,) * 2).node_count()
+        RoughSurface((1e6,) * 3, (1e-6,) * 2).node_count()
     basis = Study.from_toml(HEAD).modal_basis()
     with pytest.raises(fc.FecontactError, match="3 values for 5 contact nodes"):
-        fc.ContactSystem(basis, normal=fc.RoughSurface((1e6,) * 3, 1e-6),
-                         friction=fc.ExponentialFriction())
+        fc.ContactSystem(basis, normal=RoughSurface((1e6,) * 3, 1e-6),
+                         friction=ExponentialFriction())

@@ -7,9 +7,14 @@ import pytest
 from friction_conformance import check_memory_law, memory_outputs, parameters
 from scipy.integrate import solve_ivp
 
-from fecontact.core.errors import InputError
-from fecontact.laws.friction.bristle import BoucWenFriction, DahlFriction, LuGreFriction
-from fecontact.laws.friction.maxwell_slip import IwanFriction, JenkinsFriction
+from fecontact import InputError
+from fecontact.laws import (
+    BoucWenFriction,
+    DahlFriction,
+    IwanFriction,
+    JenkinsFriction,
+    LuGreFriction,
+)
 
 LAWS = [
     JenkinsFriction(2e6, 0.4), JenkinsFriction((2e6, 1e6), (0.4, 0.7), 1e-7),

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fecontact.core.errors import InputError
-from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact import InputError
+from fecontact.laws import RoughSurface
 
 C, R, D = 0.3e6, 5.2e-6, 6.0
 

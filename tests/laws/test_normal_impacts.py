@@ -7,9 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fecontact.laws.normal.linear import LinearContact, TwoSidedStop
-from fecontact.laws.normal.power import PowerContact, PowerLawContact, RestitutionContact
-from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact.laws import (
+    LinearContact,
+    PowerContact,
+    PowerLawContact,
+    RestitutionContact,
+    RoughSurface,
+    TwoSidedStop,
+)
 
 
 def impact(law, mass, speed):

@@ -11,21 +11,27 @@ import pytest
 from normal_conformance import check_normal_law, force
 from scipy.integrate import quad
 
-from fecontact.core.errors import InputError
-from fecontact.laws.base import NormalLaw, PerNode
-from fecontact.laws.check import require_sound
-from fecontact.laws.normal.linear import LinearContact, PrescribedForce, TwoSidedStop
-from fecontact.laws.normal.measured_surface import MeasuredSurface
-from fecontact.laws.normal.power import PowerContact, PowerLawContact, RestitutionContact
-from fecontact.laws.normal.rough_surface import (
+from fecontact import InputError
+from fecontact.laws import (
     CosineSurface,
+    ExponentialContact,
     GaussianSurface,
+    GreenwoodWilliamson,
+    LinearContact,
+    MeasuredSurface,
+    NormalLaw,
     ParabolicSurface,
+    PerNode,
+    PowerContact,
+    PowerLawContact,
+    PrescribedForce,
+    RestitutionContact,
     RoughSurface,
+    TwoSidedStop,
+    normal_law,
 )
-from fecontact.laws.normal.statistical import ExponentialContact, GreenwoodWilliamson
+from fecontact.laws.check import require_sound
 from fecontact.laws.sampling import stored_energy
-from fecontact.laws.signatures import normal_law
 
 R = 5e-6
 TRACE = np.random.default_rng(5).normal(size=400).cumsum() * 1e-7

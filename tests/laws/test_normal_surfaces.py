@@ -8,12 +8,12 @@ import pytest
 from normal_conformance import force
 from scipy.integrate import quad
 
-from fecontact.core.errors import InputError
-from fecontact.laws.normal.linear import LinearContact
-from fecontact.laws.normal.measured_surface import MeasuredSurface
-from fecontact.laws.normal.rough_surface import (
+from fecontact import InputError
+from fecontact.laws import (
     CosineSurface,
     GaussianSurface,
+    LinearContact,
+    MeasuredSurface,
     ParabolicSurface,
     RoughSurface,
 )

@@ -10,17 +10,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fecontact.core.errors import InputError
-from fecontact.laws.signals.harmonic import (
-    Constant,
-    Harmonic,
-    Harmonics,
-    Pulse,
-    Signal,
-    Step,
-    SweptSine,
-    Tabulated,
-)
+from fecontact import InputError
+from fecontact.laws import Constant, Harmonic, Harmonics, Pulse, Step, SweptSine, Tabulated
+from fecontact.laws.signals.harmonic import Signal
 from fecontact.laws.signatures import signal
 
 RNG = np.random.default_rng(4)

@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
-from fecontact.analysis.receptance import receptance
+from fecontact import Drive, InputError, simulate, write_case
+from fecontact.analysis import receptance
 from fecontact.cli import execute, plot_kinds
-from fecontact.core.errors import InputError
-from fecontact.integrate.simulate import simulate
-from fecontact.laws.excitation import Drive
-from fecontact.output.files.case import write_case
 from fecontact.output.plots import analysis
 
 

@@ -8,21 +8,11 @@ import pytest
 from sweep_study import Serial, write_study
 from synthetic import basis, run
 
-from fecontact import (
-    Range,
-    read_basis,
-    read_branches,
-    read_table,
-    sweep,
-    write_basis,
-    write_branches,
-)
-from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
-from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.core.errors import InputError
+from fecontact import InputError, Range, read_case, sweep, write_case
+from fecontact.bifurcation import Branch, BranchPoint, BranchStatus
 from fecontact.core.stored import DamagedError, npz_arrays
-from fecontact.integrate.events import Events
-from fecontact.output.files.case import read_case, write_case
+from fecontact.integrate import Events
+from fecontact.io import read_basis, read_branches, read_table, write_basis, write_branches
 
 
 @pytest.fixture(scope="module")
@@ -135,18 +125,18 @@ DAMAGES = {
     "groups-text": attribute("basis", "group_sizes", ["x"]),
     "groups-large": attribute("basis", "group_sizes", [10**15]),
     "extra": attribute("basis", "extra", ["E"] * 5),
-    "cells": lambda file: file["basis/field/cells"].write_direct(
-        np.full(file["basis/field/cells"].shape, 10**9)),
-    "outline": lambda file: file["basis/field/outline"].write_direct(
-        np.full(file["basis/field/outline"].shape, -1)),
-    "shapes": other("basis/field/shapes", np.zeros((3, 2, 5))),
-    "restriction": lambda file: file["basis/field/restriction/indices"].write_direct(
-        np.full(file["basis/field/restriction/indices"].shape, 10**6,
-                dtype=file["basis/field/restriction/indices"].dtype)),
-    "restriction-starts": lambda file: file["basis/field/restriction/indptr"].write_direct(
-        file["basis/field/restriction/indptr"][()][::-1].copy()),
-    "restriction-shape": attribute("basis/field/restriction", "shape", [10**12, 10**12]),
-    "restriction-short": other("basis/field/restriction/data", np.zeros(1)),
+    "cells": lambda file: file["basis/mode_shapes/cells"].write_direct(
+        np.full(file["basis/mode_shapes/cells"].shape, 10**9)),
+    "outline": lambda file: file["basis/mode_shapes/outline"].write_direct(
+        np.full(file["basis/mode_shapes/outline"].shape, -1)),
+    "shapes": other("basis/mode_shapes/shapes", np.zeros((3, 2, 5))),
+    "restriction": lambda file: file["basis/mode_shapes/restriction/indices"].write_direct(
+        np.full(file["basis/mode_shapes/restriction/indices"].shape, 10**6,
+                dtype=file["basis/mode_shapes/restriction/indices"].dtype)),
+    "restriction-starts": lambda file: file["basis/mode_shapes/restriction/indptr"].write_direct(
+        file["basis/mode_shapes/restriction/indptr"][()][::-1].copy()),
+    "restriction-shape": attribute("basis/mode_shapes/restriction", "shape", [10**12, 10**12]),
+    "restriction-short": other("basis/mode_shapes/restriction/data", np.zeros(1)),
 }
 
 

@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 from systems import impact_oscillator
 
-from fecontact import Axis, InputError, basins, poincare_scan
-from fecontact.bifurcation.attractors.basins import Attractor, Basins
-from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
-from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.output.plots.basins import plot_basins
-from fecontact.output.plots.bifurcation_diagram import plot_branches
-from fecontact.output.plots.diagram_insets import Inset
+from fecontact import InputError
+from fecontact.bifurcation import (
+    Attractor,
+    Axis,
+    Basins,
+    Branch,
+    BranchPoint,
+    PoincareScan,
+    basins,
+    poincare_scan,
+)
+from fecontact.plot import Inset, plot_basins, plot_branches
 
 
 def orbit(p, section, stable=True):
@@ -74,6 +78,6 @@ def test_basins_of_a_system(tmp_path):
     plot_basins(found, path=tmp_path / "basins.png")
     assert (tmp_path / "basins.png").stat().st_size > 5_000
     runs = poincare_scan(impact_oscillator(2), "drive.angular_frequency", [64.0, 65.0],
-                       transient_periods=60, keep=2, initial=np.zeros(4))
+                         transient_periods=60, keep=2, initial=np.zeros(4))
     assert len(plot_branches([BRANCH], "observed_section", beneath=runs,
                              observe=("B", "y")).axes[0].lines) == 4

@@ -7,11 +7,10 @@ import pytest
 from scipy.io import loadmat
 from synthetic import basis, run
 
+from fecontact import InputError, write_case
 from fecontact.cli import execute
-from fecontact.core.errors import InputError
+from fecontact.io import to_xarray
 from fecontact.output.files import export
-from fecontact.output.files.case import write_case
-from fecontact.output.files.dataset import to_xarray
 
 
 @pytest.fixture(scope="module")

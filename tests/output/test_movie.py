@@ -8,17 +8,17 @@ from matplotlib import colormaps
 from matplotlib.image import imread
 from synthetic import basis, run
 
-from fecontact.core.errors import InputError, MissingLibraryError
-from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact import InputError, MissingLibraryError, render
+from fecontact.laws import ConstantFriction
 from fecontact.output.files.frames import frame_indices
 from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render import movie
 from fecontact.output.render import offscreen as probe
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion
-from fecontact.output.render.movie import picture, render
 from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.scene import NODE_COLOURS, Scene, needed_height
+from fecontact.plot import picture
 
 SMALL = (480, 270)
 
@@ -52,7 +52,7 @@ def test_scale_is_round_and_makes_the_largest_motion_visible():
         motion = motion_of(trajectory)
         digits = f"{motion.scale:.0e}"[0]
         assert digits in "125"
-        field = trajectory.system.basis.field
+        field = trajectory.system.basis.mode_shapes
         moved = max(np.linalg.norm(field.shapes @ q, axis=1).max()
                     for q in trajectory.modal_coordinates)
         assert motion.largest_colour == pytest.approx(moved)
@@ -66,7 +66,7 @@ def test_scale_is_round_and_makes_the_largest_motion_visible():
 def test_drawn_places_scale_the_displacements_and_stay_in_the_box():
     trajectory = run(times=21)
     motion = motion_of(trajectory, given_scale=400.0)
-    field = trajectory.system.basis.field
+    field = trajectory.system.basis.mode_shapes
     left, right, bottom, top = motion.box
     reached = []
     for frame, q in enumerate(trajectory.modal_coordinates):

@@ -8,17 +8,10 @@ from matplotlib import rc_context
 from synthetic import basis, run
 
 import fecontact
-from fecontact import basis_from_matrices
-from fecontact.core.errors import InputError
-from fecontact.integrate.trajectory import Energies, Trajectory
+from fecontact import InputError, Trajectory, basis_from_matrices
+from fecontact.integrate import Energies
 from fecontact.output.plots import run as plots
-from fecontact.output.plots.modes import plot_modes
-from fecontact.output.plots.run import (
-    plot_contact_map,
-    plot_energies,
-    plot_history,
-    plot_phase,
-)
+from fecontact.plot import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from fecontact.system import kernels as kernels
 
 
@@ -195,7 +188,7 @@ def test_modes_are_titled_by_their_frequencies():
     assert titles == ["mode 0: rigid", "mode 1: rigid", "mode 2: rigid", "mode 3: 2000 Hz",
                       "mode 4: 9000 Hz"]
     amplitude = mesh_values(figure.axes[4])
-    stretch = np.abs(body.field.nodes[:, 0] - 0.1) / 0.1
+    stretch = np.abs(body.mode_shapes.nodes[:, 0] - 0.1) / 0.1
     np.testing.assert_allclose(amplitude, stretch, atol=1e-12)
     assert sum(bool(axis.get_title()) for axis in plot_modes(body, count=2).axes) == 2
     with pytest.raises(InputError, match="count = 0"):

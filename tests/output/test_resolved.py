@@ -6,12 +6,13 @@ from synthetic import run as made_by_hand
 from systems import friction_oscillator, impact_oscillator
 
 import fecontact as fc
+from fecontact import read_case, write_case
 from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
-from fecontact.laws.normal.linear import LinearContact
-from fecontact.output.files.case import read_case, write_case
-from fecontact.output.plots.analysis import plot_friction_work
-from fecontact.output.plots.run import plot_contact_map, plot_history, plot_phase, thinned
+from fecontact.integrate import SetValued
+from fecontact.laws import ExponentialFriction, LinearContact, RoughSurface
+from fecontact.output.plots.run import thinned
+from fecontact.plot import plot_contact_map, plot_friction_work, plot_history, plot_phase
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 0.3
 
@@ -22,8 +23,8 @@ def point_mass(axis, **parts):
     rows["xy".index(axis)] = 1.0
     basis = fc.basis_from_matrices(
         [[MASS]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
-    return fc.ContactSystem(basis, **{"friction": fc.ExponentialFriction(),
-                                      "normal": fc.RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
+    return fc.ContactSystem(basis, **{"friction": ExponentialFriction(),
+                                      "normal": RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 
 def hit(outputs, t_end=0.05, height=1e-3, **options):
@@ -117,7 +118,7 @@ def test_set_valued_runs_are_repeated_with_what_they_were_told():
     """A ball on a rigid stop: rebounds of e, e^2 ... that are shorter than the times between."""
     system = point_mass("y", load=fc.Load(9.81 * MASS))
     run = fc.simulate(system, 0.55, initial=np.sqrt(MASS) * np.array([0.1, 0.0]), outputs=12,
-                      solver=fc.SetValued(restitution=0.5))
+                      solver=SetValued(restitution=0.5))
     found = resolved(run)
     assert not found.note
     fine, rate = found.trajectory, found.trajectory.velocity("B")[:, 1]

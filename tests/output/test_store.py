@@ -9,17 +9,13 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from fecontact import write_basis
-from fecontact.core.errors import InputError
+from fecontact import InputError, Status, Trajectory, basis_from_matrices, read_case, write_case
 from fecontact.core.units import quantity, round_125, suitable_unit
-from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.io import export_pvd, write_basis
 from fecontact.output.files import case as store
 from fecontact.output.files import pvd
-from fecontact.output.files.case import read_case, write_case
 from fecontact.output.files.frames import frame_indices, von_mises
-from fecontact.output.files.pvd import export_pvd
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.reduction.modal_basis import Field
+from fecontact.reduction.modal_basis import ModeShapes
 
 LENGTH, HEIGHT = 0.2, 0.02
 
@@ -51,7 +47,7 @@ def test_vtk_reads_grid_times_and_rigid_motion(tmp_path, triangles):
 
     reader, times = open_by_vtk(tmp_path / "case.vtkhdf")
     assert np.array_equal(times, t)
-    x, y = body.field.nodes.T
+    x, y = body.mode_shapes.nodes.T
     mesh_times = set()
     for k in (0, 7, 3, 10):
         reader.UpdateTimeStep(t[k])
@@ -65,10 +61,10 @@ def test_vtk_reads_grid_times_and_rigid_motion(tmp_path, triangles):
         assert not point_data(grid, "von_mises").any()
     assert len(mesh_times) == 1  # the grid is stored once and read once
     points = vtk_to_numpy(grid.GetPoints().GetData())
-    assert np.array_equal(points, np.column_stack([body.field.nodes, 0 * x]))
+    assert np.array_equal(points, np.column_stack([body.mode_shapes.nodes, 0 * x]))
     cells = [[grid.GetCell(k).GetPointId(j) for j in range(grid.GetCell(k).GetNumberOfPoints())]
              for k in range(grid.GetNumberOfCells())]
-    assert np.array_equal(cells, body.field.cells)
+    assert np.array_equal(cells, body.mode_shapes.cells)
     assert {grid.GetCell(k).GetClassName() for k in range(grid.GetNumberOfCells())} == \
         {"vtkTriangle" if triangles else "vtkQuad"}
 
@@ -93,7 +89,7 @@ def test_stretched_body_has_its_axial_stress_as_von_mises_stress(tmp_path):
 ])
 def test_von_mises_of_known_stress_states(components, expected):
     stress = np.array(components).reshape(1, 4, 1)
-    field = Field(np.zeros((1, 2)), None, None, np.zeros((1, 2, 1)), stress, None)
+    field = ModeShapes(np.zeros((1, 2)), None, None, np.zeros((1, 2, 1)), stress, None)
     np.testing.assert_allclose(von_mises(field, np.array([[1.0], [-2.0]]))[:, 0],
                                [expected, 2.0 * expected], rtol=1e-14)
 
@@ -104,7 +100,7 @@ def test_nodal_contact_forces_add_up_to_the_contact_forces(tmp_path):
     total = trajectory.normal_force.sum(axis=1)
     assert np.count_nonzero(total) > 10
     reader, times = open_by_vtk(tmp_path / "case.vtkhdf")
-    y = trajectory.system.basis.field.nodes[:, 1]
+    y = trajectory.system.basis.mode_shapes.nodes[:, 1]
     for k in np.flatnonzero(total):
         reader.UpdateTimeStep(times[k])
         force = point_data(reader.GetOutputDataObject(0), "contact_force").astype(float)
@@ -134,8 +130,8 @@ def test_read_case_is_equal_to_the_last_bit(tmp_path, frames):
         assert np.array_equal(getattr(read.system.basis, name),
                               getattr(written.system.basis, name)), name
     for name in ("nodes", "cells", "outline", "shapes", "stress"):
-        assert np.array_equal(getattr(read.system.basis.field, name),
-                              getattr(written.system.basis.field, name)), name
+        assert np.array_equal(getattr(read.system.basis.mode_shapes, name),
+                              getattr(written.system.basis.mode_shapes, name)), name
     assert read.system.parameters() == written.system.parameters()
     assert read.system.gap == written.system.gap
     assert (read.status, read.statistics, case.study) == (Status.INTERRUPTED, written.statistics,
@@ -155,7 +151,7 @@ def test_file_says_its_units_and_holds_the_histories(tmp_path):
         assert "study" not in file
         assert file["VTKHDF/PointData/displacement"].attrs["unit"] == "m"
         assert file["VTKHDF"].attrs["Type"] == b"UnstructuredGrid"
-        assert file["VTKHDF/Points"].shape == (len(trajectory.system.basis.field.nodes), 3)
+        assert file["VTKHDF/Points"].shape == (len(trajectory.system.basis.mode_shapes.nodes), 3)
 
 
 def test_sweeps_and_bodies_without_shapes_leave_the_frames_out(tmp_path):
@@ -170,7 +166,7 @@ def test_sweeps_and_bodies_without_shapes_leave_the_frames_out(tmp_path):
     for name in ("a.vtkhdf", "b.vtkhdf"):
         with h5py.File(tmp_path / name) as file:
             assert "VTKHDF" not in file
-    assert read_case(tmp_path / "b.vtkhdf").trajectory.system.basis.field is None
+    assert read_case(tmp_path / "b.vtkhdf").trajectory.system.basis.mode_shapes is None
 
 
 def test_frames_are_the_output_times_nearest_to_even_spacing():
@@ -241,7 +237,7 @@ def test_pvd_lists_frames_that_vtk_reads(tmp_path):
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(str(tmp_path / "folder" / "folder_0002.vtu"))
     reader.Update()
-    expected = trajectory.system.basis.field.shapes @ trajectory.modal_coordinates[20]
+    expected = trajectory.system.basis.mode_shapes.shapes @ trajectory.modal_coordinates[20]
     moved = point_data(reader.GetOutput(), "displacement")
     np.testing.assert_allclose(moved[:, :2], expected, rtol=1e-6, atol=1e-12)
     force = point_data(reader.GetOutput(), "contact_force").astype(float).sum(axis=0)

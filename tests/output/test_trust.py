@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import fecontact as fc
+from fecontact import Study
 from fecontact.cli import execute
-from fecontact.study.study import Study
 
 LAW = """
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from fecontact import NormalLaw, normal_law
+from fecontact.laws import NormalLaw, normal_law
 
 with Path(__file__).with_name("ran").open("a") as file:
     file.write("x")

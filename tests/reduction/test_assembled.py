@@ -5,15 +5,19 @@ import pytest
 import scipy.sparse as sp
 from meshes_for_tests import rectangle, skewed
 
-from fecontact.core.errors import InputError
-from fecontact.fem.elastic_body import ElasticBody
-from fecontact.reduction.damping import LossFactor, Rayleigh
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.reduction.from_modes import basis_from_modes, normalisation
-from fecontact.reduction.matrix_files import AssembledMatrix
+from fecontact import (
+    ElasticBody,
+    InputError,
+    LossFactor,
+    Rayleigh,
+    basis_from_matrices,
+    basis_from_modes,
+    modal_basis,
+)
+from fecontact.io import AssembledMatrix
+from fecontact.reduction import rows_from_dofs
+from fecontact.reduction.from_modes import normalisation
 from fecontact.reduction.null_space import null_space, relative_energies
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.reduction.restriction import rows_from_dofs
 
 SUPPORTS = {"free": {}, "hinged": {"hinge": "xy"}, "on rollers": {"left": "x"},
             "clamped": {"left": "xy"}}
@@ -25,7 +29,7 @@ def body_and_matrices(columns, rows, fixed, warp=None):
                                  points={"hinge": (0.0, 0.025), "B": (0.1, 0.05)}), fixed=fixed)
     free = np.setdiff1d(np.arange(2 * len(body.nodes)), body.fixed_dofs)
     basis = modal_basis(body, 12, contact="bottom", contact_nodes=3, damping=0.01)
-    restriction = basis.field.restriction[:, free]
+    restriction = basis.mode_shapes.restriction[:, free]
     given = {"B": restriction[:3], "C": restriction[3:6], "contact": restriction[6:]}
     return basis, body.mass[free][:, free], body.stiffness[free][:, free], given
 
@@ -342,7 +346,7 @@ def test_large_matrices_are_checked():
 def given_modes(scale):
     """A basis, and its modes over all degrees of freedom with another scale."""
     expected, M, _, rows = body_and_matrices(6, 3, {})
-    shapes = expected.field.shapes.reshape(-1, expected.modes)
+    shapes = expected.mode_shapes.shapes.reshape(-1, expected.modes)
     scales = {"mass-normalised": np.ones(12),
               "largest component one": np.abs(shapes).max(axis=0),
               "length one": np.linalg.norm(shapes, axis=0),

@@ -5,15 +5,19 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact import eigenfrequencies_hz, write_basis
-from fecontact.core.errors import InputError
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.output.files.hdf5 import read_basis
-from fecontact.reduction.damping import Rayleigh, modal_damping
+from fecontact import (
+    ElasticBody,
+    InputError,
+    Material,
+    ModalBasis,
+    Rayleigh,
+    basis_from_matrices,
+    modal_basis,
+)
+from fecontact.io import read_basis, write_basis
+from fecontact.reduction import eigenfrequencies_hz
+from fecontact.reduction.damping import modal_damping
 from fecontact.reduction.eigenmodes import fixed_signs
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.reduce_body import modal_basis
 
 NO_CONTACT = {"contact": np.zeros((1, 3, 2))}
 
@@ -266,11 +270,11 @@ def test_saved_and_loaded(tmp_path):
         assert getattr(loaded, name).dtype == getattr(basis, name).dtype
     assert loaded.extra == ("tip",)
     for name in ("nodes", "cells", "outline", "shapes", "stress"):
-        stored, given = getattr(loaded.field, name), getattr(basis.field, name)
+        stored, given = getattr(loaded.mode_shapes, name), getattr(basis.mode_shapes, name)
         assert np.array_equal(stored, given), name
         assert stored.dtype == given.dtype
-    assert loaded.field.restriction.shape == basis.field.restriction.shape
-    assert (loaded.field.restriction != basis.field.restriction).nnz == 0
+    assert loaded.mode_shapes.restriction.shape == basis.mode_shapes.restriction.shape
+    assert (loaded.mode_shapes.restriction != basis.mode_shapes.restriction).nnz == 0
     assert [path.name for path in tmp_path.iterdir()] == ["beam.h5"]
 
 
@@ -278,7 +282,7 @@ def test_saved_and_loaded_without_a_field(tmp_path):
     basis = chain()
     write_basis(str(tmp_path / "chain.h5"), basis)
     loaded = read_basis(str(tmp_path / "chain.h5"))
-    assert loaded.field is None
+    assert loaded.mode_shapes is None
     assert loaded.extra == ()
     assert np.array_equal(loaded.T, basis.T)
     assert np.array_equal(loaded.damping, basis.damping)

@@ -5,15 +5,9 @@ import pytest
 from meshes_for_tests import clamped_beam, grid, rectangle, skewed, tapered_membrane
 
 import fecontact.reduction.eigenmodes as eigen
-from fecontact.core.errors import InputError, MeshError
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.fem.mesh import Mesh
-from fecontact.reduction.eigenmodes import (
-    backward_error,
-    eigenfrequencies_hz,
-    eigenmodes,
-    rigid_modes,
-)
+from fecontact import ElasticBody, InputError, Material, Mesh, MeshError
+from fecontact.reduction import eigenfrequencies_hz
+from fecontact.reduction.eigenmodes import backward_error, eigenmodes, rigid_modes
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 

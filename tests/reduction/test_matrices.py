@@ -12,9 +12,8 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 
-from fecontact import basis_from_matrices, modal_basis
-from fecontact.core.errors import InputError
-from fecontact.reduction.matrix_files import AssembledMatrix, read_matrix
+from fecontact import InputError, basis_from_matrices, modal_basis
+from fecontact.io import AssembledMatrix, read_matrix
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -362,7 +361,8 @@ def _npy_header(shape):
 
 _READ = """
 import resource, sys
-from fecontact import InputError, read_matrix
+from fecontact import InputError
+from fecontact.io import read_matrix
 resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))
 for path in sys.argv[1:]:
     try:

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 
-from fecontact.fem.elastic_body import ElasticBody
+from fecontact import ElasticBody, modal_basis
 from fecontact.output.plots.modes import plot_convergence
-from fecontact.reduction.convergence import mode_convergence
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.reduction.report import BasisReport
+from fecontact.reduction import BasisReport, mode_convergence
 
 
 @pytest.mark.parametrize("triangles", [False, True])

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from meshes_for_tests import grid, rectangle, skewed
 
-from fecontact.core.errors import InputError, MeshError
+from fecontact import ElasticBody, InputError, Material, Mesh, MeshError, Patch, modal_basis
 from fecontact.fem.contact_face import contact_nodes
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.fem.mesh import Mesh
-from fecontact.fem.points import Patch, place_rows
+from fecontact.fem.points import place_rows
 from fecontact.reduction.eigenmodes import eigenmodes
-from fecontact.reduction.reduce_body import modal_basis
 
 MATERIAL = Material(2.1e11, 0.3, 7850.0)
 POINTS = {"corner": (0.0, 0.0), "node": (0.5, 0.2)}
@@ -389,7 +386,7 @@ def test_basis_holds_rows_in_the_books_order():
     assert [basis.point_index(j) for j in range(3)] == [2, 3, 4]
     assert basis.contact_x == pytest.approx([1 / 6, 1 / 2, 5 / 6])
     # The stored field gives the same rows, and its transpose spreads a force with its moment.
-    field = basis.field
+    field = basis.mode_shapes
     assert (field.restriction @ field.shapes.reshape(-1, 6)).reshape(-1, 3, 6) == pytest.approx(
         basis.T, abs=1e-12)
     force = np.zeros((7, 3))

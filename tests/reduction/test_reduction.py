@@ -8,13 +8,12 @@ import scipy.sparse as sp
 from meshes_for_tests import rectangle
 
 import fecontact
-from fecontact import read_basis, write_basis
-from fecontact.core.errors import InputError
-from fecontact.fem.elastic_body import ElasticBody
+from fecontact import ElasticBody, InputError
+from fecontact.io import read_basis, write_basis
+from fecontact.reduction import BasisReport, eigenfrequencies_hz
 from fecontact.reduction.craig_bampton import craig_bampton
-from fecontact.reduction.eigenmodes import FreeSystem, eigenfrequencies_hz
+from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.factorisation import SymmetricFactors
-from fecontact.reduction.report import BasisReport
 from fecontact.reduction.residual_vectors import Flexibility
 
 modal_basis = partial(fecontact.modal_basis, contact="bottom")
@@ -39,7 +38,7 @@ def elastic_flexibility(body):
 
 
 def loaded_rows(body, basis):
-    rows = basis.field.restriction[np.arange(basis.field.restriction.shape[0]) % 3 < 2]
+    rows = basis.mode_shapes.restriction[np.arange(basis.mode_shapes.restriction.shape[0]) % 3 < 2]
     return sp.csr_array(rows @ body.expansion)
 
 
@@ -111,13 +110,13 @@ def test_interface_reduction_meets_its_tolerance_and_not_by_much(tolerance):
 def test_completed_basis_is_orthonormal_in_mass_and_diagonal_in_stiffness(fixed, reduction):
     body = beam(fixed)
     basis = modal_basis(body, 8, contact_nodes=6, reduction=reduction, tolerance=0.0)
-    shapes = basis.field.shapes.reshape(-1, basis.modes)
+    shapes = basis.mode_shapes.shapes.reshape(-1, basis.modes)
     assert np.abs(shapes.T @ (body.mass @ shapes) - np.eye(basis.modes)).max() < 1e-8
     squares = basis.angular_frequencies**2
     stiffness = shapes.T @ (body.stiffness @ shapes)
     assert np.abs(stiffness - np.diag(squares)).max() < 1e-8 * squares[-1]
     np.testing.assert_allclose(basis.T.reshape(-1, basis.modes),
-                               basis.field.restriction @ shapes, atol=1e-12)
+                               basis.mode_shapes.restriction @ shapes, atol=1e-12)
     assert np.all(np.diff(basis.angular_frequencies) >= 0.0)
     assert basis.rigid_modes == FreeSystem.of(body).rigid.shape[1]
 
@@ -181,8 +180,8 @@ def test_free_body_under_a_constant_force_moves_as_the_full_model():
     rigid, elastic = np.split(np.arange(basis.modes), [3])
     w = basis.angular_frequencies[elastic]
     reduced = basis.T[:, :2, elastic] @ (modal[elastic] / w**2)
-    load = body.expansion.T @ (basis.field.restriction.T @ force.ravel())
-    exact = basis.field.restriction @ (elastic_flexibility(body) @ load)
+    load = body.expansion.T @ (basis.mode_shapes.restriction.T @ force.ravel())
+    exact = basis.mode_shapes.restriction @ (elastic_flexibility(body) @ load)
     exact = exact.reshape(-1, 3)[:, :2]
     assert np.abs(reduced - exact).max() < 1e-8 * np.abs(exact).max()
     total = force.sum(axis=0)[:2] / basis.quality.mass

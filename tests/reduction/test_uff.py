@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import pyuff
 
-from fecontact.core.errors import InputError, MissingLibraryError
-from fecontact.reduction.matrix_files.uff import read_uff
+from fecontact import InputError, MissingLibraryError
+from fecontact.io import read_uff
 
 BLOCK = Path(__file__).parents[1] / "data" / "block.uff"
 NODES = [11, 12, 40]

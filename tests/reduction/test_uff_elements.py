@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fecontact import read_uff
-from fecontact.core.errors import InputError
+from fecontact import InputError
+from fecontact.io import read_uff
 
 DATA = Path(__file__).parents[1] / "data"
 

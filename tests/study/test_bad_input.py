@@ -517,14 +517,14 @@ sweep sweep.toml --set sweep.t_start=9 | t_start
 branch none.toml | none.toml
 branch tiny.toml | parameter
 branch tiny.toml ground.speed | range
-branch tiny.toml ground.sped --from 0.1 --to 0.2 | did you mean 'ground.speed'
-branch tiny.toml ground.speed --from 1 | --to
-branch tiny.toml ground.speed --from 1 --to 1 | two ends
-branch tiny.toml ground.speed --from nan --to 1 | nan
-branch tiny.toml ground.speed --from 0.1 --to inf | range
-branch tiny.toml ground.speed --from a --to 1 | --from
-branch tiny.toml ground.speed --from 0.1 --to 0.2 --set branch.point="Q" | 'Q'
-branch tiny.toml ground.speed --from 0.1 --to 0.2 -o tiny.toml | tiny.toml
+branch tiny.toml ground.sped --bounds 0.1 0.2 | did you mean 'ground.speed'
+branch tiny.toml ground.speed --bounds 1 | --bounds
+branch tiny.toml ground.speed --bounds 1 1 | smaller one first
+branch tiny.toml ground.speed --bounds nan 1 | nan
+branch tiny.toml ground.speed --bounds 0.1 inf | bounds
+branch tiny.toml ground.speed --bounds a 1 | --bounds
+branch tiny.toml ground.speed --bounds 0.1 0.2 --set branch.point="Q" | 'Q'
+branch tiny.toml ground.speed --bounds 0.1 0.2 -o tiny.toml | tiny.toml
 keys nothing | nothing
 keys ground.nothing | nothing
 laws nothing | nothing

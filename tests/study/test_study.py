@@ -5,24 +5,29 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from fecontact import (
+    ContactSystem,
+    ElasticBody,
+    FecontactError,
+    Ground,
+    InputError,
+    Load,
+    Material,
+    MeshError,
+    Patch,
+    Rayleigh,
+    RigidStart,
+    Study,
+    generate,
+    modal_basis,
+    simulate,
+    write_mesh,
+)
 from fecontact.cli.templates import TEMPLATES, template
-from fecontact.core.errors import FecontactError, InputError, MeshError
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.fem.generate import generate
-from fecontact.fem.mesh_files import write_mesh
-from fecontact.fem.points import Patch
 from fecontact.fem.shapes import Beam, Block, Pendulum
-from fecontact.integrate.initial_state import RigidStart
-from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import SOLVERS, SetValued
-from fecontact.laws.excitation import Load
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.damping import Rayleigh
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.study.study import Study
-from fecontact.system.contact_system import ContactSystem
+from fecontact.integrate import SetValued
+from fecontact.integrate.solvers import SOLVERS
+from fecontact.laws import ExponentialFriction, RoughSurface
 
 TINY = """
 gap = 1e-6
@@ -132,10 +137,10 @@ def test_pendulum_template_is_the_impact_oscillator():
 
 
 def test_changes_by_dotted_names(tiny):
-    changed = tiny.with_(**{"ground.speed": 2, "gap": [0, 1e-6, 0, 1e-6], "basis.damping": {
-        "mass_factor": 1.0}, "simulation.initial": {"velocity": [0, 1, 0]},
-        "body.fixed.left": "x", "friction.static_coefficient": np.array([0.1, 0.2, 0.3, 0.4]),
-        "basis.C.radius": 0.02})
+    changed = tiny.with_(**{
+        "ground.speed": 2, "gap": [0, 1e-6, 0, 1e-6], "basis.damping": {"mass_factor": 1.0},
+        "simulation.initial": {"velocity": [0, 1, 0]}, "body.fixed.left": "x",
+        "friction.static_coefficient": np.array([0.1, 0.2, 0.3, 0.4]), "basis.C.radius": 0.02})
     assert changed.ground.speed == 2.0
     assert changed.gap == (0.0, 1e-6, 0.0, 1e-6)
     assert changed.basis.damping == Rayleigh(mass_factor=1.0)
@@ -172,7 +177,8 @@ def test_basis_keys_reach_the_basis(tiny):
         damped.damping, plain.damping + 2.0 * np.outer(rows[0], rows[0])
         + 5.0 * np.outer(rows[1], rows[1]), rtol=1e-12, atol=1e-12)
     assert tiny.with_(**{"basis.select": [0, 1, 3]}).modal_basis().modes == 3
-    assert tiny.with_(**{"basis.reduction": "residual", "basis.tolerance": 0.0}).modal_basis().modes > 5
+    assert tiny.with_(**{"basis.reduction": "residual",
+                         "basis.tolerance": 0.0}).modal_basis().modes > 5
     lossy = tiny.with_(**{"basis.damping": {"loss_factor": 0.04}}).modal_basis()
     np.testing.assert_allclose(lossy.damping_ratios[3:], 0.02)
 

@@ -6,11 +6,11 @@ from typing import get_args, get_type_hints
 
 import pytest
 
+from fecontact import Study
 from fecontact.cli import execute
 from fecontact.core.docstrings import documented
 from fecontact.laws.registry import is_kind, law_names
 from fecontact.study.reference_page import study_keys
-from fecontact.study.study import Study
 
 PAGE = Path(__file__).parents[2] / "docs" / "study.md"
 
@@ -56,7 +56,7 @@ def test_defaults_and_units_of_a_section():
     assert "| `speed` | a number | `0` | V, positive in +x [m/s]. |" in section
     assert "| `amplitude`, `wavelength`" not in section
     needed = study_keys("load.forces")
-    assert '| `direction` | "x", "y" or "moment" | `"y"` |' in needed
+    assert '| `component` | "x", "y" or "phi" | `"y"` |' in needed
     assert "| `signal` | a table of a law and its parameters |  | Its value in time" in needed
     contact = study_keys("contact.NAME")
     assert "totals in them are those of the group" in contact

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from sweep_study import Serial, files_below, is_alive, write_study
 
-from fecontact import Span, Study, read_case, read_table, sweep
+from fecontact import AnalysisError, InputError, Study, read_case, sweep
 from fecontact.core.atomic_write import _MARK
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact.io import read_table
+from fecontact.study import Span
 from fecontact.sweeps.batch import UnwritableError, changed
 from fecontact.sweeps.case import Row
 from fecontact.sweeps.store import Store
@@ -311,7 +312,7 @@ def test_a_full_disk_is_one_sentence_and_finished_cases_stay(study, tmp_path, mo
 
     monkeypatch.setattr(os, "replace", replace)
     with pytest.raises(InputError, match=r"\.json cannot be written \(no space left on device\); "
-                                         r".* 1 of 3 cases are kept in .*; go on with --resume"):
+                       r".* 1 of 3 cases are kept in .*; go on with --resume"):
         sweep(study, {"ground.speed": speeds}, Serial(), folder=tmp_path / "f", batch=1)
     monkeypatch.undo()
     assert len(read_table(tmp_path / "f/index.csv").missing) == 2

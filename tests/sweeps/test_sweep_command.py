@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from sweep_study import Serial, write_study
 
-from fecontact import SweepTable, plot_sobol, plot_sweep, read_table, sweep
+from fecontact import InputError, sweep
 from fecontact.cli import execute
 from fecontact.cli.commands import sweep as command
 from fecontact.cli.sweep_progress import clock, note
-from fecontact.core.errors import InputError
-from fecontact.sweeps import executors, plots
-from fecontact.sweeps.statistics import Estimate, SobolIndices
+from fecontact.io import read_table
+from fecontact.plot import plot_sobol, plot_sweep
+from fecontact.sweeps import SobolIndices, SweepTable, executors, plots
+from fecontact.sweeps.statistics import Estimate
 
 SWEEP = """
 [sweep]

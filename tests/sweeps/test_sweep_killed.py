@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 from sweep_study import Serial, files_below, is_alive, write_study
 
-from fecontact import read_table, sweep
+from fecontact import sweep
 from fecontact.cli import execute
+from fecontact.io import read_table
 
 pytest.importorskip("distributed")
 

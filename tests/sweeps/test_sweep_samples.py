@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fecontact import Distribution, Span, SweepSettings
-from fecontact.core.errors import InputError
-from fecontact.study.study import Study
+from fecontact import InputError, Study
+from fecontact.study import Distribution, Span, SweepSettings
 from fecontact.sweeps.plan import frozen, plan
 
 D = Distribution

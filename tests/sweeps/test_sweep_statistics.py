@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fecontact import Span, SweepSettings, SweepTable, sobol_indices, statistics
-from fecontact.core.errors import InputError
+from fecontact import InputError
+from fecontact.study import Span, SweepSettings
+from fecontact.sweeps import SweepTable, sobol_indices, statistics
 from fecontact.sweeps.plan import plan
 from fecontact.sweeps.statistics import indices_of
 

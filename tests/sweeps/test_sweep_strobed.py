@@ -5,9 +5,10 @@ import pytest
 from sweep_study import Serial, files_below
 from systems import impact_oscillator
 
-from fecontact import Study, plot_strobed, read_table, strobe, sweep
-from fecontact.core.errors import InputError
-from fecontact.integrate.initial_state import RigidStart
+from fecontact import InputError, RigidStart, Study, sweep
+from fecontact.integrate import strobe
+from fecontact.io import read_table
+from fecontact.plot import plot_strobed
 
 STUDY = """
 geometry = { shape = "pendulum" }

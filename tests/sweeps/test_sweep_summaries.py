@@ -9,14 +9,9 @@ import pytest
 import synthetic
 from systems import impact_oscillator
 
-from fecontact import RigidStart, simulate
-from fecontact.core.errors import InputError
-from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.friction.stribeck import ConstantFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
+from fecontact import ContactSystem, Ground, InputError, RigidStart, Trajectory, simulate
+from fecontact.laws import ConstantFriction, RoughSurface
 from fecontact.sweeps.summaries import SUMMARIES, functions_for, summarise, unit_of
-from fecontact.system.contact_system import ContactSystem
 
 V, STIFFNESS, DEPTH, MU = 0.02, 3e5, 4e-5, 0.3
 TURNS = 8  # of the oscillation in the run of 0.02 s

@@ -3,21 +3,16 @@
 import numpy as np
 import pytest
 
-from fecontact import (
+from fecontact import ContactSystem, Drive, Ground, Load, basis_from_matrices, simulate
+from fecontact.laws import (
     BoucWenFriction,
-    ContactSystem,
     DahlFriction,
-    Drive,
     ExponentialFriction,
-    Ground,
     IwanFriction,
     JenkinsFriction,
-    Load,
     LuGreFriction,
     PrescribedForce,
     RoughSurface,
-    basis_from_matrices,
-    simulate,
 )
 
 LAWS = {

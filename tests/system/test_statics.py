@@ -6,16 +6,20 @@ from meshes_for_tests import rectangle
 from model_for_tests import Model
 from scipy.optimize import brentq, minimize
 
-from fecontact.core.errors import AnalysisError, ModelWarning
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.laws.excitation import Drive, Load
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.from_matrices import basis_from_matrices
-from fecontact.reduction.reduce_body import modal_basis
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.statics import static_equilibrium
+from fecontact import (
+    AnalysisError,
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    Ground,
+    Load,
+    Material,
+    ModelWarning,
+    basis_from_matrices,
+    modal_basis,
+    static_equilibrium,
+)
+from fecontact.laws import ExponentialFriction, RoughSurface
 
 STIFFNESS, R = 10e6, 10e-6
 NORMAL = RoughSurface(STIFFNESS, R, 40.0)

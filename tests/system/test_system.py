@@ -5,17 +5,22 @@ import pytest
 from meshes_for_tests import rectangle
 from model_for_tests import Model
 
-from fecontact import basis_from_matrices, modal_basis
-from fecontact.core.errors import InputError
-from fecontact.fem.elastic_body import ElasticBody, Material
-from fecontact.integrate.initial_state import RigidStart, initial_state
-from fecontact.laws.excitation import Drive, Load
-from fecontact.laws.friction.stribeck import ExponentialFriction
-from fecontact.laws.ground.ground import Ground
-from fecontact.laws.normal.rough_surface import RoughSurface
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact import (
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    Ground,
+    InputError,
+    Load,
+    Material,
+    ModalBasis,
+    RigidStart,
+    basis_from_matrices,
+    modal_basis,
+)
+from fecontact.integrate.initial_state import initial_state
+from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.system import kernels as kernels
-from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS, powers
 
 R = 10e-6

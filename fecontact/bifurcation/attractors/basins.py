@@ -187,7 +187,7 @@ def _values(name: str, given: Any) -> Array:
         axis, values = given
         found = np.atleast_1d(np.array(values, dtype=float))
     except (TypeError, ValueError):
-        component, found = None, np.empty(0)
+        axis, found = None, np.empty(0)
     if not (isinstance(axis, Axis) and found.ndim == 1 and len(found)
             and np.isfinite(found).all()):
         raise InputError(f"{name} = {given!r} must be an Axis and a list of finite values: "

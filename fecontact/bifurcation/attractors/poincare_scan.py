@@ -50,8 +50,8 @@ class PoincareScan:
     ) -> tuple[Array, Array]:
         """A displacement [m], [rad] or velocity of a point, (V, K) up and down."""
         if component not in _AXES or of not in ("displacement", "velocity"):
-            raise InputError(f"axis = {axis!r} must be one of {choices(_AXES)}, of = {of!r} "
-                             f"'displacement' or 'velocity'.")
+            raise InputError(f"component = {component!r} must be one of {choices(_AXES)}, "
+                             f"of = {of!r} 'displacement' or 'velocity'.")
         basis = self.system.basis
         row = basis.T[basis.point_index(point), _AXES.index(component)]
         first = 0 if of == "displacement" else basis.modes
@@ -102,7 +102,7 @@ def poincare_scan(
     Raises
     ------
     InputError
-        For values that do not ascend, or as :func:`fecontact.strobe`.
+        For values that do not ascend, or as :func:`fecontact.integrate.strobe`.
     """
     require_kind("poincare_scan", ContactSystem, system=system)
     try:

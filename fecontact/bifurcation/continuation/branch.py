@@ -18,7 +18,7 @@ from fecontact.bifurcation.continuation.points import (
     PeriodDoublingPoint,
     on_branch,
 )
-from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions, BranchStatus
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
@@ -37,7 +37,7 @@ class Branch(Summarised):
 
     Attributes
     ----------
-    name : str
+    parameter_name : str
         Name of the parameter.
     points : tuple of BranchPoint
         All points, special ones in their places.
@@ -49,14 +49,14 @@ class Branch(Summarised):
         What else belongs to the branch: numbers, texts, arrays.
     """
 
-    name: str
+    parameter_name: str
     points: tuple[BranchPoint, ...]
     status: BranchStatus = BranchStatus.POINTS
     message: str = ""
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        header = BranchHeader(self.name, self.attributes)
+        header = BranchHeader(self.parameter_name, self.attributes)
         object.__setattr__(self, "points",
                            tuple(on_branch(point, header) for point in self.points))
 
@@ -72,7 +72,7 @@ class Branch(Summarised):
         known = [bool(point.values["stable"]) for point in self.points
                  if point.kind is None and "stable" in point.values]
         return [
-            ("parameter", self.name), ("range", span(self.parameter)),
+            ("parameter", self.parameter_name), ("range", span(self.parameter)),
             ("points", f"{len(self)}"),
             ("special", listed(special, 5)),
             *([("stable", f"{sum(known)} of {len(known)} regular points")] if known else []),
@@ -144,8 +144,9 @@ class Branch(Summarised):
         if not (isinstance(which, int | np.integer) and -len(passed) <= which < len(passed)):
             span = (f"from {self.parameter.min():.6g} to {self.parameter.max():.6g}" if self.points
                     else "without any point")
-            raise InputError(f"The branch, {self.name} {span}, has {len(passed)} solutions at "
-                             f"{value:.6g}, none with the number which = {which!r}.")
+            raise InputError(f"The branch, {self.parameter_name} {span}, "
+                             f"has {len(passed)} solutions at {value:.6g}, none with the number "
+                             f"which = {which!r}.")
         place, sign = passed[which]
         start = self.points[place]
         if start.parameter == value:
@@ -155,10 +156,10 @@ class Branch(Summarised):
         *_, found = continuation(problem, u, ContinuationOptions(bounds=bounds, locate=False),
                                  tangent=sign * tangent)
         if abs(found.parameter - value) > _MET * max(abs(value), abs(value - start.parameter)):
-            raise AnalysisError(f"The solution at {self.name} = {value:.6g} was not found from "
-                                f"that at {start.parameter:.6g}; follow the branch in shorter "
-                                f"steps there.")
-        return on_branch(found, BranchHeader(self.name, self.attributes))
+            raise AnalysisError(f"The solution at {self.parameter_name} = {value:.6g} was not "
+                                f"found from that at {start.parameter:.6g}; follow the branch in "
+                                f"shorter steps there.")
+        return on_branch(found, BranchHeader(self.parameter_name, self.attributes))
 
     def _passed(self, value: float) -> list[tuple[int, float]]:
         """Points from which a value of the parameter is near, and whether it lies before (-1) or

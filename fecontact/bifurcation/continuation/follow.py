@@ -5,7 +5,7 @@ from typing import Any
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions, BranchStatus
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import End, continuation, start_of
 from fecontact.core.errors import require_finite
 from fecontact.core.types import Array
@@ -52,7 +52,8 @@ def continue_branch(
 
 
 def _collected(
-    problem: Problem, u: Array, options: ContinuationOptions, tangent: Array | None, direction: float
+    problem: Problem, u: Array, options: ContinuationOptions, tangent: Array | None,
+    direction: float
 ) -> tuple[list[BranchPoint], End]:
     points: list[BranchPoint] = []
     steps = continuation(problem, u, options, tangent=tangent, direction=direction)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.special_points import locate_between
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
@@ -74,7 +74,7 @@ def follow_hairpin(
         turn = float(weights * at.tangent @ there.tangent)
         turned = float(weights * here.tangent @ there.tangent) < np.cos(options.largest_turn)
         if (turned and turn > np.cos(options.largest_turn)
-                and norm(problem, there.u - at.u) >= step):
+            and norm(problem, there.u - at.u) >= step):
             return found
         at, slope = there, float(along @ there.tangent / (row @ there.tangent))
         length *= min(2.0, 0.7 * _CHANGE / max(change, 1e-3))

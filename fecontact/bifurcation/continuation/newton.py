@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from fecontact.bifurcation.continuation.problem import Linearisation, Problem, ContinuationOptions
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Linearisation, Problem
 from fecontact.core.compiled import borrowed, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
@@ -159,7 +159,7 @@ def finished(
     tangent = tangent / size
     values = problem.point(u, linearisation, tangent)
     return Solution(u, linearisation, tangent, iterations, values,
-                     _tests(problem, u, linearisation, tangent, values, options))
+                    _tests(problem, u, linearisation, tangent, values, options))
 
 
 def _tests(

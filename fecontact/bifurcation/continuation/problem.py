@@ -191,19 +191,22 @@ class ContinuationOptions:
                          points=self.points, iterations=self.iterations,
                          largest_turn=self.largest_turn)
         if not self.smallest_step <= self.step <= self.largest_step:
-            raise InputError(f"ContinuationOptions: step = {self.step:g} must lie between smallest_step = "
-                             f"{self.smallest_step:g} and largest_step = {self.largest_step:g}.")
+            raise InputError(f"ContinuationOptions: step = {self.step:g} must lie between "
+                             f"smallest_step = {self.smallest_step:g} and "
+                             f"largest_step = {self.largest_step:g}.")
         try:
             low, high = self.bounds
             fine = float(low) < float(high)
         except (TypeError, ValueError):
             fine = False
         if not fine:
-            raise InputError(f"ContinuationOptions: bounds = {self.bounds!r} must be two values of the "
-                             f"parameter, the smaller one first.")
+            raise InputError(f"ContinuationOptions: bounds = {self.bounds!r} must be two values of "
+                             f"the parameter, the smaller one first.")
 
 
-def options_of(options: ContinuationOptions | None, bounds: tuple[float, float] | None) -> ContinuationOptions:
+def options_of(
+    options: ContinuationOptions | None, bounds: tuple[float, float] | None
+) -> ContinuationOptions:
     """The options, with other bounds if these are given."""
     require_kind("A branch", (ContinuationOptions, type(None)), options=options)
     chosen = options or ContinuationOptions()

@@ -14,7 +14,12 @@ from fecontact.bifurcation.continuation.crossings import UNRESOLVED
 from fecontact.bifurcation.continuation.hairpin import follow_hairpin
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Linearisation, Problem, ContinuationOptions, BranchStatus
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    Linearisation,
+    Problem,
+)
 from fecontact.bifurcation.continuation.special_points import hermite, locate_between
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array
@@ -35,7 +40,7 @@ _AGAIN = 1e-5
 # Solutions whose distance is this many times what Newton's method leaves are the same.
 _ALIKE = 10.0
 
-__all__ = ["End", "Linearisation", "Problem", "ContinuationOptions", "continuation", "start_of"]
+__all__ = ["ContinuationOptions", "End", "Linearisation", "Problem", "continuation", "start_of"]
 
 
 @dataclass(frozen=True)
@@ -155,7 +160,8 @@ def _leaves(start: Solution, options: ContinuationOptions) -> bool:
 
 
 def start_of(
-    problem: Problem, u: Array, options: ContinuationOptions, tangent: Array | None, direction: float
+    problem: Problem, u: Array, options: ContinuationOptions, tangent: Array | None,
+    direction: float
 ) -> Solution:
     """The solution near u, with its tangent."""
     row = np.zeros(len(u))
@@ -164,7 +170,7 @@ def start_of(
     else:
         row = problem.weights() * tangent / norm(problem, tangent)
     found = corrected(problem, np.array(u, dtype=float), row, options.tolerance,
-                       3 * options.iterations)
+                      3 * options.iterations)
     if found is None:
         raise InputError(f"There is no solution near the start at the parameter {u[-1]:.6g}; give "
                          f"a start that is closer to one.")
@@ -195,7 +201,8 @@ def _room(here: Solution, options: ContinuationOptions) -> float:
     return (bound - float(here.u[-1])) / slope if slope != 0.0 else np.inf
 
 
-def _believable(problem: Problem, here: Solution, there: Solution, options: ContinuationOptions) -> bool:
+def _believable(problem: Problem, here: Solution, there: Solution,
+                options: ContinuationOptions) -> bool:
     """Whether a step does not turn too much."""
     row = problem.weights() * here.tangent
     chord = there.u - here.u

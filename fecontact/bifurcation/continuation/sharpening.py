@@ -121,7 +121,7 @@ def _searched(place: Place, start: Array, length: float, kind: str) -> BranchPoi
     problem, u, tangent = place
     row, weights = problem.weights() * tangent, problem.weights()
     options = ContinuationOptions(step=length, largest_step=length, points=_POINTS,
-                        smallest_step=min(1e-7, length))
+                                  smallest_step=min(1e-7, length))
     points = []
     try:
         for point in continuation(problem, start, options, tangent=tangent):

@@ -8,7 +8,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.crossings import UNRESOLVED, counted, with_count
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 

@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint, CrossingPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of, width_of
+from fecontact.bifurcation.continuation.problem import (
+    ContinuationOptions,
+    options_of,
+    sizes_of,
+    width_of,
+)
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
     default_scales,
@@ -111,7 +116,7 @@ def equilibrium_branch(
         return _crossing(problem, crossed, tangent, chosen, parameter, both is not False,
                          attributes)
     return continue_branch(problem, u, chosen, name=parameter, tangent=tangent, direction=direction,
-                  both=bool(both), attributes=attributes)
+                           both=bool(both), attributes=attributes)
 
 
 def _crossing(
@@ -129,7 +134,7 @@ def _crossing(
         if not options.bounds[0] <= first[-1] <= options.bounds[1]:
             continue
         branch = continue_branch(problem, first, options, name=parameter, tangent=side * tangent,
-                        attributes=attributes)
+                                 attributes=attributes)
         ends.append(branch)
         if side < 0.0:
             points = [replace(each, tangent=-each.tangent) for each in branch.points[::-1]]
@@ -152,7 +157,7 @@ def _start(field: VectorField, start: Equilibrium | ArrayLike | None) -> Equilib
 def _problem(
     field: VectorField, begin: Equilibrium, index: int, options: ContinuationOptions | None,
     bounds: tuple[float, float] | None, scales: ArrayLike | None, width: float | None,
-) -> tuple[EquilibriumProblem, Settings]:
+) -> tuple[EquilibriumProblem, ContinuationOptions]:
     chosen = options_of(options, bounds)
     for bound in map(float, chosen.bounds):
         # A parameter may be what drives the system, as an amplitude that begins at zero.

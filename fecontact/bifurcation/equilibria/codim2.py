@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, BranchStatus
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.equilibria.codim2_problems import (
     FoldCurve,
     HopfCurve,
@@ -31,8 +31,8 @@ _GROWTH = 1e4
 
 def fold_curve(
     field: VectorField, parameters: tuple[str, str], point: BranchPoint | Equilibrium, *,
-    bounds: Mapping[str, tuple[float, float]] | None = None, options: ContinuationOptions | None = None,
-    scales: ArrayLike | None = None, both: bool = True,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    options: ContinuationOptions | None = None, scales: ArrayLike | None = None, both: bool = True,
 ) -> Branch:
     """Curve of folds of equilibria in two parameters.
 
@@ -73,8 +73,8 @@ def fold_curve(
 
 def hopf_curve(
     field: VectorField, parameters: tuple[str, str], point: BranchPoint | Equilibrium, *,
-    bounds: Mapping[str, tuple[float, float]] | None = None, options: ContinuationOptions | None = None,
-    scales: ArrayLike | None = None, both: bool = True,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    options: ContinuationOptions | None = None, scales: ArrayLike | None = None, both: bool = True,
 ) -> Branch:
     """Curve of Hopf points in two parameters, such as the border of flutter or stick-slip.
 
@@ -135,8 +135,8 @@ def _beginning(
 
 def _followed(
     problem: PlaneCurve, u: Array, parameters: tuple[str, str],
-    bounds: Mapping[str, tuple[float, float]] | None, options: ContinuationOptions | None, both: bool,
-    ends: tuple[str, ...],
+    bounds: Mapping[str, tuple[float, float]] | None, options: ContinuationOptions | None,
+    both: bool, ends: tuple[str, ...],
 ) -> Branch:
     chosen = options or ContinuationOptions()
     first = parameters[0]

@@ -16,7 +16,7 @@ from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period
 
-_DIRECTIONS = ("x", "y", "rotation")
+_COMPONENTS = ("x", "y", "phi")
 # Step of differences in a parameter, relative to its value.
 _STEP = 2e-4
 # Part of the base value below which the step does not get any smaller.
@@ -105,22 +105,22 @@ class ContactField(VectorField):
     def _base_period(self) -> float | None:
         return common_period(self.system())
 
-    def displacement_row(self, point: str | int, direction: str = "x") -> Array:
+    def displacement_row(self, point: str | int, component: str = "x") -> Array:
         """Row (d,) that gives the displacement of a point [m] from a state.
 
-        ``point`` is 'B', 'C', a named point or the number of a contact node, ``direction`` 'x',
-        'y' or 'rotation' (then in rad).
+        ``point`` is 'B', 'C', a named point or the number of a contact node, ``component`` 'x',
+        'y' or 'phi' (then in rad).
 
         Raises
         ------
         InputError
-            For a point or a direction that does not exist.
+            For a point or a component that does not exist.
         """
-        if direction not in _DIRECTIONS:
-            raise InputError(f"direction = {direction!r} must be one of {choices(_DIRECTIONS)}.")
+        if component not in _COMPONENTS:
+            raise InputError(f"component = {component!r} must be one of {choices(_COMPONENTS)}.")
         basis = self._family.base.basis
         row = np.zeros(self.dimension)
-        row[: basis.modes] = basis.T[basis.point_index(point), _DIRECTIONS.index(direction)]
+        row[: basis.modes] = basis.T[basis.point_index(point), _COMPONENTS.index(component)]
         return row
 
 

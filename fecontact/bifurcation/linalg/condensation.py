@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.bifurcation.linalg.lu import factorise, eliminate_lanes
+from fecontact.bifurcation.linalg.lu import eliminate_lanes, factorise
 from fecontact.core.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.simd import WIDTH, gather, read, spread, write
 from fecontact.core.types import Array, Integers
@@ -32,7 +32,7 @@ _groups = types.Array(f8, 4, "C")
 
 
 class CondensedFactors(NamedTuple):
-    """CondensedFactors of a collocation system of N intervals, m points each, d states, e common unknowns.
+    """Factors of a collocation system of N intervals, m points each, d states, e common unknowns.
 
     inner (G, m d, (m + 1) d + e, 8), columns: inner nodes, left end, right end, common unknowns;
     chain (G - 1, 2 d, 3 d + e, 8) within segments, columns: x_j, the segment's first, x_(j+1),

@@ -11,8 +11,8 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
 from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
     ContinuationOptions,
-    Status,
     options_of,
     sizes_of,
     width_of,
@@ -120,7 +120,7 @@ def orbit_branch(
         - a 'branch point' of orbits: those that cross there,
         - another point of a branch of orbits, also of one read from a file: goes on from there,
         - a motion that has settled over one period at least, such as
-          :func:`fecontact.periodic_motion` finds; its end counts.
+          :func:`fecontact.bifurcation.periodic_motion` finds; its end counts.
     parameter : str, optional
         The one that is varied; by default that of the point, or the only one of the field.
     method : Collocation or Shooting, optional
@@ -247,8 +247,8 @@ def _first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch
 
 
 def _from_hopf(
-    field: VectorField, point: HopfPoint, method: Collocation | Shooting, options: ContinuationOptions,
-    scales: ArrayLike | None, width: float | None,
+    field: VectorField, point: HopfPoint, method: Collocation | Shooting,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None,
 ) -> Branch:
     if isinstance(method, Shooting):
         return _first_that_goes(
@@ -340,7 +340,7 @@ def _goes_on(
 
 def _followed(
     start: tuple[CollocationProblem, Array, Array | None], options: ContinuationOptions,
-    limits: Array | None, **options: Any,
+    limits: Array | None, **how: Any,
 ) -> Branch:
     """The branch of orbits by collocation, its special points on meshes of their own."""
     problem, u, tangent = start
@@ -355,17 +355,18 @@ def _followed(
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     ended = replace(options, stop_at=[*stops, HALVING])
     # What is special is located once more below, on a mesh of its own.
-    branch = continue_branch(replace(problem, limits=limits, precision=ROUGHLY), u, ended, name=name,
-                    tangent=tangent, attributes=attributes, **options)
+    branch = continue_branch(replace(problem, limits=limits, precision=ROUGHLY), u, ended,
+                             name=name,
+                             tangent=tangent, attributes=attributes, **how)
     if branch.points[-1].kind == HALVING and HALVING not in stops:
-        branch = replace(branch, status=Status.CLOSED)
+        branch = replace(branch, status=BranchStatus.CLOSED)
     points = list(branch.points)
     try:
         for index, point in enumerate(branch.points):
             if point.kind in SHARPENED:
                 points[index] = _sharpened(field, branch, index)
     except KeyboardInterrupt:
-        branch = replace(branch, status=Status.INTERRUPTED)
+        branch = replace(branch, status=BranchStatus.INTERRUPTED)
     return replace(branch, points=tuple(points))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, ContinuationOptions, options_of
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem, options_of
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
@@ -177,7 +177,7 @@ def orbit_curve(
         The system, with both parameters.
     point : BranchPoint
         A special point of the kind 'fold', 'period doubling' or 'Neimark-Sacker' on a branch from
-        :func:`fecontact.orbit_branch` by collocation.
+        :func:`fecontact.bifurcation.orbit_branch` by collocation.
     second : str
         The second parameter.
     options, bounds : optional
@@ -227,7 +227,7 @@ def orbit_curve(
         tangent = CurveLinearised(curve, start).solve(_unit(len(start), -2), unit)
     tangent = np.copysign(1.0, direction) * tangent
     return continue_branch(curve, start, options_of(options, bounds), name=first, tangent=tangent,
-                  both=both, attributes=attributes)
+                           both=both, attributes=attributes)
 
 
 def _unit(size: int, place: int) -> Array:

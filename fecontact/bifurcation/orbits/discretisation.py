@@ -227,7 +227,7 @@ class CollocationLinearisation:
             P[:, :, place] = (up - down) / (2.0 * h * T)
 
     @cached_property
-    def factors(self) -> condensation.Factors:
+    def factors(self) -> condensation.CondensedFactors:
         """The condensed equations."""
         problem = self.problem
         f, J, P = self.derivatives

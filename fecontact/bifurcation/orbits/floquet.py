@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.linalg.condensation import Factors
+from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.core.compiled import i8, kernel, vector
@@ -116,7 +116,7 @@ class Floquet:
         return {"kind": "Neimark-Sacker", "angle": float(np.angle(critical))}
 
 
-def floquet_of(factors: Factors, autonomous: bool) -> Floquet:
+def floquet_of(factors: CondensedFactors, autonomous: bool) -> Floquet:
     """Floquet multipliers from the condensed equations of a periodic orbit.
 
     They are the eigenvalues of the product of the transitions over the intervals, found without

@@ -42,7 +42,7 @@ def periodic_motion(
     -------
     PeriodicMotion
         One period of the motion, or two and more where nothing excites it; a start for
-        :func:`fecontact.orbit_branch`.
+        :func:`fecontact.bifurcation.orbit_branch`.
 
     Raises
     ------

@@ -66,7 +66,7 @@ def observe(
     Stored are the numbers 'observed_minimum', 'observed_maximum' and 'observed_amplitude', half of
     what lies between the two [m], of an equilibrium or over one period; for orbits of excited
     systems also 'observed_section' (n,), its values at the starts of the n periods of the
-    excitation, as :func:`fecontact.poincare_scan` keeps them.
+    excitation, as :func:`fecontact.bifurcation.poincare_scan` keeps them.
 
     Parameters
     ----------

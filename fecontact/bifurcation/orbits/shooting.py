@@ -251,7 +251,7 @@ def shooting_from(
     mesh = np.linspace(0.0, 1.0, segments + 1)
     starts = interpolate(problem.mesh, problem.nodes(u), mesh[:-1])
     result = ShootingProblem(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
-                      problem.scales, problem.periods, rtol, derivative_rtol)
+                             problem.scales, problem.periods, rtol, derivative_rtol)
     return result, np.concatenate([starts.reshape(-1), u[problem.size :]])
 
 
@@ -367,7 +367,7 @@ class ShootingLinearisation:
         return np.append(gaps, problem.phase_row @ (starts[0] - problem.reference))
 
     @cached_property
-    def factors(self) -> condensation.Factors:
+    def factors(self) -> condensation.CondensedFactors:
         """The chained equations."""
         problem = self.problem
         K, d = len(problem.mesh) - 1, problem.field.dimension

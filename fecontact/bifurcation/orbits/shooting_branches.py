@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, BranchStatus
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.mesh import interpolate
@@ -48,7 +48,8 @@ def _name(problem: ShootingProblem) -> str:
 
 
 def born(
-    start: Start, segments: int, rtol: float, derivative_rtol: float | None, options: ContinuationOptions
+    start: Start, segments: int, rtol: float, derivative_rtol: float | None,
+    options: ContinuationOptions
 ) -> Branch:
     """The branch from a start at a Hopf point; for orbits that come to stick on steep friction."""
     found, u, leaving = start
@@ -56,8 +57,8 @@ def born(
     shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
     tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
     return continue_branch(problem, first, options, name=_name(problem),
-                  tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
-                  attributes=_attributes(problem))
+                           tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
+                           attributes=_attributes(problem))
 
 
 def from_motion(
@@ -77,16 +78,17 @@ def from_motion(
     """
     times, states = motion.times, motion.states
     if (motion.period is not None and isinstance(field, ContactField)
-            and states.shape == (times.size, field.dimension)
-            and field.forcing_period(values) is None):
+        and states.shape == (times.size, field.dimension)
+        and field.forcing_period(values) is None):
         times, states = _to_fastest(times, states, widths[:-1], motion.period,
                                     field.system().basis.modes)
     found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
                          motion.periods, widths)
     problem, u = shooting_from(*found, segments, rtol, derivative_rtol)
     try:
-        return continue_branch(problem, u, options, name=_name(problem), direction=direction, both=both,
-                      attributes=_attributes(problem))
+        return continue_branch(problem, u, options, name=_name(problem), direction=direction,
+                               both=both,
+                               attributes=_attributes(problem))
     except (AnalysisError, InputError) as error:
         raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {values[free]:.6g} "
                             f"near the motion: Newton's method does not converge; run it longer "
@@ -119,12 +121,13 @@ def goes_on(
     problem = rescaled(problem, scales, width)
     if rtol is not None:
         problem = replace(problem, rtol=rtol)
-    return continue_branch(problem, u, options, name=_name(problem), tangent=sign * tangent, both=both,
-                  attributes=_attributes(problem))
+    return continue_branch(problem, u, options, name=_name(problem), tangent=sign * tangent,
+                           both=both,
+                           attributes=_attributes(problem))
 
 
 def doubled(
-    field: VectorField, point: BranchPoint, options: tuple[int, float, float | None] | None,
+    field: VectorField, point: BranchPoint, how: tuple[int, float, float | None] | None,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
 ) -> Branch:
     """The branch of orbits of twice the period that begins at a period doubling.
@@ -132,7 +135,7 @@ def doubled(
     They leave along the eigenvector of the multiplier -1, carried along the orbit; the second
     round takes it with the other sign. Where the two rounds become the same again, at another
     doubling of the single orbit, the branch ends with a point 'period halving': beyond it are the
-    same orbits with their halves exchanged. ``options`` are segments, rtol and derivative_rtol, by
+    same orbits with their halves exchanged. ``how`` is segments, rtol and derivative_rtol, by
     default those of the branch with twice the segments.
 
     Raises
@@ -145,19 +148,20 @@ def doubled(
                          f"period doublings alone.")
     problem, u, _ = restored_shooting(field, point)
     problem = rescaled(problem, scales, width)
-    if options is not None:
+    if how is not None:
         segments = 2 * (len(problem.mesh) - 1)
-        if options[0] != segments:
-            raise InputError(f"segments = {options[0]} must be {segments}, twice those of the "
+        if how[0] != segments:
+            raise InputError(f"segments = {how[0]} must be {segments}, twice those of the "
                              f"branch, for the orbits of twice the period; or leave the method "
                              f"out.")
-        problem = replace(problem, rtol=options[1], derivative_rtol=options[2])
+        problem = replace(problem, rtol=how[1], derivative_rtol=how[2])
     twice, start, tangent = _doubled(problem, u)
     tangent = np.copysign(1.0, direction) * tangent
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     twice, start, tangent = twice.adapted(start + options.step * tangent, tangent)
-    found = continue_branch(twice, start, replace(options, stop_at=[*stops, HALVING]), name=_name(twice),
-                   tangent=tangent, attributes=_attributes(twice))
+    found = continue_branch(twice, start, replace(options, stop_at=[*stops, HALVING]),
+                            name=_name(twice),
+                            tangent=tangent, attributes=_attributes(twice))
     return _ended(found, problem, options)
 
 
@@ -222,7 +226,7 @@ def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions
     tail[:-1] /= 2.0
     tail[-1] = there
     near = _doublings_near(single, np.concatenate([(first + second) / 2.0, tail]), options,
-                           abs(there - last.parameter), branch.name)
+                           abs(there - last.parameter), branch.parameter_name)
     if not near:
         return replace(branch, points=points[:-1])
     closest = min(near, key=lambda point: abs(point.parameter - there))

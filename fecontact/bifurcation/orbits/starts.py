@@ -60,7 +60,7 @@ def from_hopf(
     shape = np.array((np.exp(phase)[:, None] * np.asarray(vector)).real, order="C")
     period = 2.0 * np.pi / angular_frequency
     problem = CollocationProblem(field, values.copy(), free, mesh, degree, shape,
-                          _with_period(scales, period))
+                                 _with_period(scales, period))
     leaving = np.concatenate([shape.reshape(-1), [0.0, 0.0]])
     leaving /= np.sqrt(problem.weights() @ leaving**2)
     u = np.concatenate([np.tile(np.asarray(state, dtype=float), len(shape)),
@@ -131,7 +131,7 @@ def from_samples(
                            intervals)
     nodes = sampled(node_times(mesh, degree))
     problem = CollocationProblem(field, values.copy(), free, mesh, degree, nodes,
-                          _with_period(scales, T), periods)
+                                 _with_period(scales, T), periods)
     return problem, np.concatenate([nodes.reshape(-1), [T] if forcing is None else [],
                                     [values[free]]])
 

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import fail, echo, echo_written, show
+from fecontact.cli.console import echo, echo_written, fail, show
 from fecontact.cli.options import Changes, Folder, StudyFile
-from fecontact.core.errors import InputError
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.diagram_options import BranchSettings
@@ -20,10 +19,10 @@ def branch(
         help="Dotted name of a number, `ground.speed`, in place of that of `[branch]`.")] = None,
     /,
     *,
+    bounds: Annotated[tuple[float, float] | None, Parameter(
+        help="Least and largest value of the parameter, in place of those of `[branch]`.")] = None,
     start: Annotated[float | None, Parameter(
-        name="--from", help="Value at which it begins, in place of `[branch]`.")] = None,
-    end: Annotated[float | None, Parameter(
-        name="--to", help="Value at which it ends, in place of `[branch]`.")] = None,
+        help="Value at which it begins; the least by default.")] = None,
     set_: Changes = None,
     output: Folder = None,
 ) -> int:
@@ -38,8 +37,8 @@ def branch(
     from fecontact.core.atomic_write import output_folder
 
     described = read_study(study, set_)
-    wanted = _wanted(described.branch, parameter, start, end)
-    _ = wanted.name, wanted.bounds
+    wanted = _wanted(described.branch, parameter, bounds, start)
+    _ = wanted.checked_parameter, wanted.checked_bounds
     from fecontact.bifurcation.diagram import follow_branches
     from fecontact.cli.branch_results import runs_beneath, special_table, write_branch_results
 
@@ -66,20 +65,16 @@ def branch(
     stalled = [name for name, found in result.found.items() if found.status.name == "STALLED"]
     if stalled:
         return fail(f"{', '.join(stalled)}: the steps became too small to go on; what was "
-                        f"computed is written.", 1)
+                    f"computed is written.", 1)
     return 1 if result.notes else 0
 
 
 def _wanted(
-    given: "BranchSettings", parameter: str | None, start: float | None, end: float | None
+    given: "BranchSettings", parameter: str | None, bounds: tuple[float, float] | None,
+    start: float | None,
 ) -> "BranchSettings":
     """The section with what the command line says in its place."""
     changed = given if parameter is None else replace(given, parameter=parameter)
-    if (start is None) != (end is None):
-        raise InputError("--from and --to belong together; give both ends of the range, or none "
-                         "of them.")
-    if start is None or end is None:
-        return changed
-    if start == end:
-        raise InputError(f"--from and --to are both {start:g}; give the two ends of a range.")
-    return replace(changed, range=(min(start, end), max(start, end)), start=start)
+    if bounds is not None:
+        changed = replace(changed, bounds=bounds, start=None)
+    return changed if start is None else replace(changed, start=start)

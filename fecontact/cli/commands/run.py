@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import warn_if_stale, echo_written
+from fecontact.cli.console import echo_written, warn_if_stale
 from fecontact.cli.options import RunFile, Trust
 
 
@@ -79,7 +79,8 @@ def plot(
     stored = stored_run(file, trust)
     from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw
 
-    choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component, highest)
+    choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
+                         highest)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"):
         redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)

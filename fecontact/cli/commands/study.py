@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import INTERRUPTED, fail, echo, echo_written, show
+from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, show
 from fecontact.cli.options import Changes, Folder, StudyFile
 from fecontact.core.errors import InputError
 

@@ -155,10 +155,11 @@ def _problem(
     cluster, rows = _clusters(arrays.Tx)
     ground = system.ground
     wave = ground.shortest_wavelength if ground.wavy else None
-    problem = kinds.NonsmoothProblem(arrays, _static(static_coefficient, n), cluster, rows,
-                            1e-4 * longest, -1.0 if restitution is None else float(restitution),
-                            np.array([*ground.height_range, np.inf if wave is None else wave]),
-                            int(ground.motion is None), compiled_derivative.address)
+    problem = kinds.NonsmoothProblem(
+        arrays, _static(static_coefficient, n), cluster, rows, 1e-4 * longest,
+        -1.0 if restitution is None else float(restitution),
+        np.array([*ground.height_range, np.inf if wave is None else wave]),
+        int(ground.motion is None), compiled_derivative.address)
     if restitution is not None:
         _require_free_stops(system, groups, problem)
     return problem

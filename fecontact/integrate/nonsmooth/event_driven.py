@@ -38,7 +38,11 @@ from fecontact.integrate.nonsmooth.problem import (
     STUCK,
     WORKSPACE,
 )
-from fecontact.integrate.nonsmooth.transitions import decide_clusters, resolve_impacts, hold_velocity
+from fecontact.integrate.nonsmooth.transitions import (
+    decide_clusters,
+    hold_velocity,
+    resolve_impacts,
+)
 from fecontact.system.kernels import drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
@@ -89,7 +93,7 @@ def run_events(
                 height = max(height, abs(w.nodes[j, PENETRATION]))
                 largest[1] = max(largest[1], abs(w.nodes[j, RATE]))
             resolve_impacts(t, Y, p, touched, parting, 1e-9 * largest[1], height,
-                         1e-9 * longest, status, closed, fresh[clusters:], w, rate)
+                            1e-9 * longest, status, closed, fresh[clusters:], w, rate)
         else:
             for c in range(clusters):
                 largest[0] = max(largest[0], abs(w.slip[c]))
@@ -230,7 +234,7 @@ def run_events(
                 if touched[j]:
                     counts[IMPACTS] += 1
             flight = resolve_impacts(t, Y, p, touched, parting, 0.01 * rtol * largest[1], height,
-                                  1e-9 * longest, status, closed, fresh[clusters:], w, slopes[0])
+                                     1e-9 * longest, status, closed, fresh[clusters:], w, slopes[0])
             h = min(h, max(0.5 * flight, tiny))
         else:
             for c in range(clusters):

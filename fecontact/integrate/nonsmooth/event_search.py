@@ -335,7 +335,7 @@ def first_changes(
             for i in range(len(b)):
                 b[i] = -b[i] - s.gap[j]
             if (pressed(smallest(b) + p.relief[0], j, s) == 0.0
-                    and pressed(largest(b) + p.relief[1], j, s) == 0.0):
+                and pressed(largest(b) + p.relief[1], j, s) == 0.0):
                 continue
             part = _add_ground(j, t, h, Y, parts, p, c, b, x, values)
             before = pressed(b[0], j, s)

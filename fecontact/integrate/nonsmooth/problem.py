@@ -52,7 +52,8 @@ class NonsmoothProblem(NamedTuple):
     derivative: int
 
 
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, vector, i8, i8], NonsmoothProblem)
+PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, vector, i8, i8],
+                           NonsmoothProblem)
 
 
 class Workspace(NamedTuple):

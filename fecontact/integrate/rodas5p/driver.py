@@ -226,7 +226,7 @@ def integrate(
 
 
 ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,
-         step_loop.NOT_FINITE: Status.NOT_FINITE, step_loop.STOPPED: Status.EVENT}
+        step_loop.NOT_FINITE: Status.NOT_FINITE, step_loop.STOPPED: Status.EVENT}
 
 
 def _place(run: Run, ended: Status) -> str:

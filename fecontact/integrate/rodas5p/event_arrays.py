@@ -8,9 +8,9 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.integrate.events import (
     CONTACT_EVENTS,
+    AnyEvent,
     ContactEvents,
     Crossing,
-    AnyEvent,
     direction_sign,
 )
 from fecontact.integrate.rodas5p.event_kernels import (

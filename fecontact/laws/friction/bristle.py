@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
-from fecontact.laws.base import NotNegative, OneOrAbove, PerNode, Positive, Bound
+from fecontact.laws.base import Bound, NotNegative, OneOrAbove, PerNode, Positive
 from fecontact.laws.friction.base import MemoryFriction, require_at_least
 from fecontact.laws.signatures import memory_friction_law
 

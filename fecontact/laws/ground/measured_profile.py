@@ -71,16 +71,18 @@ class MeasuredProfile(Profile):
         require_positive("MeasuredProfile", abscissa_scale=self.abscissa_scale)
         for name in ("periodic", "remove_mean"):
             if not isinstance(getattr(self, name), bool):
-                raise InputError(f"MeasuredProfile: {name} = {getattr(self, name)!r} must be true or false.")
-        x, y = read_or_given("MeasuredProfile", self.file, abscissa=self.abscissa, heights=self.heights,
-                             least=3)
+                raise InputError(f"MeasuredProfile: {name} = {getattr(self, name)!r} must be true "
+                                 f"or false.")
+        x, y = read_or_given("MeasuredProfile", self.file, abscissa=self.abscissa,
+                             heights=self.heights, least=3)
         if self.periodic:
             y = require_closed("MeasuredProfile", "heights", y)
         for name, value in (("abscissa", x), ("heights", y), ("file", None)):
             object.__setattr__(self, name, value)
         places, heights = self._points
-        require_resolved("MeasuredProfile", f"abscissa times abscissa_scale = {self.abscissa_scale:g}",
-                         places, f"heights times scale = {self.scale:g}", heights)
+        require_resolved("MeasuredProfile",
+                         f"abscissa times abscissa_scale = {self.abscissa_scale:g}", places,
+                         f"heights times scale = {self.scale:g}", heights)
 
     @property
     def _points(self) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
-from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive, Bound
+from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive
 from fecontact.laws.signatures import normal_law
 
 _TAU = 2.0 * math.pi

@@ -88,7 +88,8 @@ def read_branches(path: str | Path) -> dict[str, Branch]:
 
 def _store(group: Any, branch: Branch) -> None:
     """Write a branch into an empty HDF5 group."""
-    group.attrs.update(parameter=branch.name, status=branch.status.name, message=branch.message)
+    group.attrs.update(parameter=branch.parameter_name, status=branch.status.name,
+                       message=branch.message)
     group.create_dataset("kind", data=[point.kind or "" for point in branch.points])
     for name in ("u", "tangent"):
         _write(group, name, [getattr(point, name) for point in branch.points])
@@ -118,7 +119,7 @@ def _stored(group: Any, path: str | Path) -> Branch:
         attributes = {name: _value(item)
                       for name, item in _members(group, "attributes").items()}
         return Branch(text(group, "parameter"), points, BranchStatus[text(group, "status")],
-                   text(group, "message"), attributes)
+                      text(group, "message"), attributes)
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:

@@ -104,7 +104,7 @@ def write_case(
             file.create_group("study").attrs["toml"] = _changed(
                 study, lambda table: movable(table, folder, root))
         _write_trajectory(file.create_group("trajectory"), trajectory)
-        if len(indices) and trajectory.system.basis.field is not None:
+        if len(indices) and trajectory.system.basis.mode_shapes is not None:
             write_vtkhdf(file, trajectory, indices)
     return Path(path)
 

@@ -100,7 +100,7 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
         dim = variable.dims[1]
         for place, label in enumerate(names[dim]):
             owner = label if dim == "point" else f"node {label}"
-            for axis, unit in enumerate(units):
+            for component, unit in enumerate(units):
                 ending = f" {_AXES[component]}" if "component" in variable.dims else ""
                 values = variable.values[:, place]
                 found[f"{owner} {title}{ending} [{unit}]"] = (
@@ -111,7 +111,8 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
 def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
     """A run as an :class:`xarray.Dataset`, with coordinates and an attribute ``units`` each.
 
-    Dimensions are time, point, component, node and mode: ``ds.displacement.sel(point="B", component="x")``.
+    Dimensions are time, point, component, node and mode: ``ds.displacement.sel(point="B",
+    component="x")``.
 
     Raises
     ------

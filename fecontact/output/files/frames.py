@@ -10,7 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.reduction.modal_basis import Field
+from fecontact.reduction.modal_basis import ModeShapes
 
 
 def frame_indices(
@@ -52,23 +52,23 @@ def frame_indices(
     return chosen[np.unique(nearest)]
 
 
-def require_field(trajectory: Trajectory) -> Field:
+def require_field(trajectory: Trajectory) -> ModeShapes:
     """The modes over the body; InputError if the modal basis holds none."""
     require_kind("A picture", Trajectory, trajectory=trajectory)
-    field = trajectory.system.basis.field
+    field = trajectory.system.basis.mode_shapes
     if field is None:
         raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "
                          "body; make the basis with modal_basis(body, ...).")
     return field
 
 
-def displacement(field: Field, q: Array) -> Array:
+def displacement(field: ModeShapes, q: Array) -> Array:
     """Displacements (F, N, 2) of the nodes [m] at modal coordinates q (F, m)."""
     nodes, _, modes = field.shapes.shape
     return np.asarray(q @ field.shapes.reshape(2 * nodes, modes).T).reshape(len(q), nodes, 2)
 
 
-def von_mises(field: Field, q: Array) -> Array:
+def von_mises(field: ModeShapes, q: Array) -> Array:
     """Von Mises stress (F, N) at the nodes [Pa] at modal coordinates q (F, m)."""
     nodes, _, modes = field.stress.shape
     components = field.stress.transpose(1, 0, 2).reshape(4 * nodes, modes)

@@ -22,10 +22,10 @@ from fecontact.core.stored import (
     sound_sparse,
     values,
 )
-from fecontact.reduction.modal_basis import Field, ModalBasis, Quality
+from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
-_FIELD = ("nodes", "cells", "outline", "shapes", "stress")
+_MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
 
 
 class _Sink(io.FileIO):
@@ -144,15 +144,15 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
         quality = group.create_group("quality")
         for name, value in vars(basis.quality).items():
             quality.create_dataset(name, data=value)
-    if basis.field is None:
+    if basis.mode_shapes is None:
         return
-    field = group.create_group("field")
-    for name in _FIELD:
-        field.create_dataset(name, data=getattr(basis.field, name))
-    restriction = basis.field.restriction.tocsr()
+    shapes = group.create_group("mode_shapes")
+    for name in _MODE_SHAPES:
+        shapes.create_dataset(name, data=getattr(basis.mode_shapes, name))
+    restriction = basis.mode_shapes.restriction.tocsr()
     for name in ("data", "indices", "indptr"):
-        field.create_dataset(f"restriction/{name}", data=getattr(restriction, name))
-    field["restriction"].attrs["shape"] = restriction.shape
+        shapes.create_dataset(f"restriction/{name}", data=getattr(restriction, name))
+    shapes["restriction"].attrs["shape"] = restriction.shape
 
 
 def stored_basis(group: Any) -> ModalBasis:
@@ -172,12 +172,13 @@ def stored_basis(group: Any) -> ModalBasis:
     return ModalBasis(
         w, array(group, "damping", (m, m)), T, array(group, "positions", (len(T), 2)),
         array(group, "tributary", (None,)), extra=extra,
-        field=_read_field(member(group, "field"), m, len(T)) if "field" in group else None,
+        mode_shapes=(_read_mode_shapes(member(group, "mode_shapes"), m, len(T))
+                     if "mode_shapes" in group else None),
         quality=_read_quality(member(group, "quality"), m, len(T)) if "quality" in group else None,
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)))
 
 
-def _read_field(group: Any, modes: int, points: int) -> Field:
+def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
     import scipy.sparse as sp
 
     nodes = array(group, "nodes", (None, 2))
@@ -193,16 +194,16 @@ def _read_field(group: Any, modes: int, points: int) -> Field:
     columns = array(stored, "indices", (None,), "i")
     restriction = sp.csr_array((array(stored, "data", (len(columns),)), columns, rows),
                                shape=shape)
-    return Field(nodes, cells, indices(group, "outline", (None, 2), N),
+    return ModeShapes(nodes, cells, indices(group, "outline", (None, 2), N),
                  array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
                  sound_sparse(restriction))
 
 
-def _read_quality(group: Any, modes: int, points: int) -> Quality:
+def _read_quality(group: Any, modes: int, points: int) -> ReductionQuality:
     mass, count, orthogonality = (
         values(member(group, name)).item() for name in ("mass", "vibration_modes",
                                                         "orthogonality"))
-    return Quality(
+    return ReductionQuality(
         mass=float(mass), vibration_modes=int(count), orthogonality=float(orthogonality),
         residuals=array(group, "residuals", (modes,)),
         participation=array(group, "participation", (2, modes)),

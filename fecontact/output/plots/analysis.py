@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.histories import Point, history, point_name
 from fecontact.analysis.periodicity import strobed_states
+from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.core.checks import require_kind
@@ -176,12 +176,12 @@ def plot_poincare(
     Raises
     ------
     InputError
-        For a point or an component that does not exist, a system without a period, another suffix, or
-        a file that cannot be written.
+        For a point or a component that does not exist, a system without a period, another suffix,
+        or a file that cannot be written.
     """
     require_kind("plot_poincare", Trajectory, trajectory=trajectory)
     if component not in _AXES:
-        raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
+        raise InputError(f"component = {component!r} is not known; choose from {choices(_AXES)}.")
     row = _AXES.index(component)
     found = strobed_states(trajectory, period=period, phase=phase,
                            t_start=float(trajectory.time[0]))

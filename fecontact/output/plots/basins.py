@@ -27,7 +27,7 @@ def plot_basins(
     Parameters
     ----------
     found : Basins
-        Of :func:`fecontact.basins`; the first axis goes along x.
+        Of :func:`fecontact.bifurcation.basins`; the first axis goes along x.
     x_label, y_label : str, optional
         Labels of the axes, with units.
     rows : (2, size) array, optional

@@ -109,8 +109,8 @@ def plot_branches(
             for index, point in enumerate(branch.points):
                 if point.kind is not None:
                     known.setdefault(point.kind, []).append((places[index], heights[index]))
-        axis.set_xlabel(x_label or _label(x, branches[0].name))
-        axis.set_ylabel(y_label or _label(y, branches[0].name))
+        axis.set_xlabel(x_label or _label(x, branches[0].parameter_name))
+        axis.set_ylabel(y_label or _label(y, branches[0].parameter_name))
         axis.margins(x=0.02, y=0.06)
         axis.autoscale_view()
         axis.ticklabel_format(axis="y", scilimits=(-3, 5))

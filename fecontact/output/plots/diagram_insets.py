@@ -74,7 +74,7 @@ def phase_inset(
     modes = field.system().basis.modes
     rate = np.concatenate([np.zeros(modes), row[:modes], np.zeros(len(row) - 2 * modes)])
     return Inset(point.parameter, height, states @ row, states @ rate,
-                 title or f"{branch.name} = {point.parameter:.4g}",
+                 title or f"{branch.parameter_name} = {point.parameter:.4g}",
                  bool(point.values["stable"]))
 
 

@@ -9,7 +9,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.output.plots.figure import new_figure
 from fecontact.reduction.convergence import ModeConvergence
-from fecontact.reduction.modal_basis import Field, ModalBasis
+from fecontact.reduction.modal_basis import ModalBasis, ModeShapes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,12 +43,12 @@ def plot_modes(
         written.
     """
     require_kind("plot_modes", ModalBasis, basis=basis)
-    if basis.field is None:
+    if basis.mode_shapes is None:
         raise InputError("These modes cannot be drawn: the modal basis holds no shapes over the "
                          "body; make it with ElasticBody.modal_basis.")
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise InputError(f"count = {count!r} must be a whole number of at least one mode.")
-    field, shown = basis.field, min(count, basis.modes)
+    field, shown = basis.mode_shapes, min(count, basis.modes)
     size = np.ptp(field.nodes, axis=0)
     reach = _VISIBLE * float(np.linalg.norm(size))
     aspect = (size[0] + 2.0 * reach) / (size[1] + 2.0 * reach)
@@ -107,7 +107,7 @@ def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None)
     return figure
 
 
-def _draw_mode(axis: "Axes", field: Field, mode: int, reach: float) -> Any:
+def _draw_mode(axis: "Axes", field: ModeShapes, mode: int, reach: float) -> Any:
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
 

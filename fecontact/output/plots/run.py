@@ -117,12 +117,12 @@ def plot_phase(
     Raises
     ------
     InputError
-        For a point or an component that does not exist, another suffix, or a file that cannot be
+        For a point or a component that does not exist, another suffix, or a file that cannot be
         written.
     """
     require_kind("plot_phase", Trajectory, trajectory=trajectory)
     if component not in _AXES:
-        raise InputError(f"axis = {axis!r} is not known; choose from {choices(_AXES)}.")
+        raise InputError(f"component = {component!r} is not known; choose from {choices(_AXES)}.")
     row = _AXES.index(component)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
@@ -329,7 +329,7 @@ def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:
 
 
 def _place_edges(trajectory: Trajectory) -> tuple[Array, NDArray[np.intp], str]:
-    """Borders (k + 1,) of the rows of the map, their nodes (k,), and the label of their component.
+    """Borders (k + 1,) of the rows of the map, their nodes (k,), and the label of their axis.
 
     The node of a row without contact face is -1.
     """

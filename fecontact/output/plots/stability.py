@@ -65,7 +65,7 @@ def plot_eigenvalues(
                            textcoords="offset points", fontsize=9.0)
         upper.set_ylabel("frequency [Hz]")
         lower.set_ylabel("growth rate [1/s]")
-        lower.set_xlabel(x_label or parameter_label(branch.name))
+        lower.set_xlabel(x_label or parameter_label(branch.parameter_name))
         if values.min() < values.max():
             lower.set_xlim(values.min(), values.max())
         figure.align_ylabels([upper, lower])

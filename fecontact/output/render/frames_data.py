@@ -20,7 +20,7 @@ from fecontact.output.files.frames import (
     von_mises,
 )
 from fecontact.output.plots.style import state_names
-from fecontact.reduction.modal_basis import Field
+from fecontact.reduction.modal_basis import ModeShapes
 
 Colour = Literal["displacement", "von_mises"]
 
@@ -64,7 +64,7 @@ class Motion:
             require_scale("The deformation", self.given_scale)
 
     @cached_property
-    def field(self) -> Field:
+    def mode_shapes(self) -> ModeShapes:
         """Modes over the body."""
         return require_field(self.trajectory)
 
@@ -98,7 +98,7 @@ class Motion:
         """Factor of all displacements, a round number of at least one unless it was given."""
         if self.given_scale is not None:
             return float(self.given_scale)
-        extent = float(np.linalg.norm(np.ptp(self.field.nodes, axis=0)))
+        extent = float(np.linalg.norm(np.ptp(self.mode_shapes.nodes, axis=0)))
         gap = self._gap
         low, high = self.trajectory.system.ground.height_range
         size = max(self._largest["shape"], 0.5 * (high - low), gap)
@@ -112,8 +112,8 @@ class Motion:
     @cached_property
     def box(self) -> tuple[float, float, float, float]:
         """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
-        low = np.minimum(self.field.nodes.min(axis=0), self._extremes[0])
-        high = np.maximum(self.field.nodes.max(axis=0), self._extremes[1])
+        low = np.minimum(self.mode_shapes.nodes.min(axis=0), self._extremes[0])
+        high = np.maximum(self.mode_shapes.nodes.max(axis=0), self._extremes[1])
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     @cached_property
@@ -126,10 +126,10 @@ class Motion:
     def body(self, frame: int) -> tuple[Array, Array]:
         """Drawn places (N, 2) of the nodes [m] and their colours (N,) in SI units."""
         q = self._q(frame)
-        motion = displacement(self.field, q)[0]
+        motion = displacement(self.mode_shapes, q)[0]
         colours = np.linalg.norm(motion, axis=1) if self.colour == "displacement" else \
-            von_mises(self.field, q)[0]
-        return self.field.nodes + self._scaled(motion[None], q)[0], colours
+            von_mises(self.mode_shapes, q)[0]
+        return self.mode_shapes.nodes + self._scaled(motion[None], q)[0], colours
 
     def contact_places(self, frame: int) -> Array:
         """Drawn places (n, 2) of the contact nodes [m]."""
@@ -181,9 +181,9 @@ class Motion:
     @cached_property
     def _extremes(self) -> tuple[Array, Array]:
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
-        for which in blocks(self.indices, len(self.field.nodes)):
+        for which in blocks(self.indices, len(self.mode_shapes.nodes)):
             q = self.trajectory.modal_coordinates[which]
-            places = self.field.nodes + self._scaled(displacement(self.field, q), q)
+            places = self.mode_shapes.nodes + self._scaled(displacement(self.mode_shapes, q), q)
             low = np.minimum(low, places.min(axis=(0, 1)))
             high = np.maximum(high, places.max(axis=(0, 1)))
         return low, high
@@ -192,15 +192,15 @@ class Motion:
     def _largest(self) -> dict[str, float]:
         largest = dict.fromkeys((*COLOURS, "shape"), 0.0)
         wavy = self.trajectory.system.ground.wavy
-        for which in blocks(self.indices, len(self.field.nodes)):
+        for which in blocks(self.indices, len(self.mode_shapes.nodes)):
             q = self.trajectory.modal_coordinates[which]
-            motion = displacement(self.field, q)
+            motion = displacement(self.mode_shapes, q)
             size = np.linalg.norm(motion, axis=2).max()
             largest["displacement"] = max(largest["displacement"], float(size))
             motion[..., 0] -= wavy * self._drift(q)[:, None]
             size = np.linalg.norm(motion, axis=2).max()
             largest["shape"] = max(largest["shape"], float(size))
             if self.colour == "von_mises":
-                stress = float(von_mises(self.field, q).max())
+                stress = float(von_mises(self.mode_shapes, q).max())
                 largest["von_mises"] = max(largest["von_mises"], stress)
         return largest

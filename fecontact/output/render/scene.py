@@ -121,7 +121,7 @@ class Scene:
         mesh.GetPoints().Modified()
 
     def _add_body(self, line: float) -> None:
-        motion, field = self._motion, self._motion.field
+        motion, field = self._motion, self._motion.mode_shapes
         largest = motion.largest_colour or 1.0
         self._body = self._add(
             "body", field.nodes, faces=field.cells, scalars="colour",

@@ -1,0 +1,21 @@
+from .histories import history
+from .impacts import Impacts, find_impacts, find_rests
+from .periodicity import Periodicity, count_periods, periodicity, strobed_states
+from .receptance import Receptance, receptance
+from .spectra import amplitude_spectrum, power_spectral_density, spectrogram
+
+__all__ = [
+    "Impacts",
+    "Periodicity",
+    "Receptance",
+    "amplitude_spectrum",
+    "count_periods",
+    "find_impacts",
+    "find_rests",
+    "history",
+    "periodicity",
+    "power_spectral_density",
+    "receptance",
+    "spectrogram",
+    "strobed_states",
+]

@@ -1,0 +1,22 @@
+from .ensemble import Ensemble, strobe
+from .events import ContactEvents, Crossing, Events
+from .sensitivity import Sensitivity
+from .smoothing_cost import SmoothingCost, smoothing_cost
+from .solvers import CVODE, Rodas5P, Scipy, SetValued
+from .trajectory import Energies
+
+__all__ = [
+    "CVODE",
+    "ContactEvents",
+    "Crossing",
+    "Energies",
+    "Ensemble",
+    "Events",
+    "Rodas5P",
+    "Scipy",
+    "Sensitivity",
+    "SetValued",
+    "SmoothingCost",
+    "smoothing_cost",
+    "strobe",
+]

@@ -1,0 +1,26 @@
+from .output.files.branches import read_branch, read_branches, write_branch, write_branches
+from .output.files.dataset import to_xarray
+from .output.files.export import export_csv, export_mat, export_netcdf
+from .output.files.hdf5 import read_basis, write_basis
+from .output.files.pvd import export_pvd
+from .reduction.matrix_files import AssembledMatrix, read_matrix
+from .reduction.matrix_files.uff import read_uff
+from .sweeps.table import read_table
+
+__all__ = [
+    "AssembledMatrix",
+    "export_csv",
+    "export_mat",
+    "export_netcdf",
+    "export_pvd",
+    "read_basis",
+    "read_branch",
+    "read_branches",
+    "read_matrix",
+    "read_table",
+    "read_uff",
+    "to_xarray",
+    "write_basis",
+    "write_branch",
+    "write_branches",
+]

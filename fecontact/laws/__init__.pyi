@@ -1,0 +1,78 @@
+from .base import Bound, FrictionLaw, NormalLaw, NotNegative, PerNode, Positive
+from .check import check_law
+from .friction.bristle import BoucWenFriction, DahlFriction, LuGreFriction
+from .friction.maxwell_slip import IwanFriction, JenkinsFriction
+from .friction.stribeck import (
+    ConstantFriction,
+    CubicFriction,
+    ExponentialFriction,
+    GalvanettoFriction,
+    GaussianFriction,
+    HyperbolicFriction,
+    ProductFriction,
+)
+from .ground.fourier_series import FourierSeries
+from .ground.measured_profile import MeasuredProfile
+from .ground.motion import HarmonicSpeed, SpeedRamp
+from .ground.profile import Flat, Sine
+from .ground.random_roughness import RandomRoughness
+from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
+from .normal.measured_surface import MeasuredSurface
+from .normal.power import PowerContact, PowerLawContact, RestitutionContact
+from .normal.rough_surface import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
+from .normal.statistical import ExponentialContact, GreenwoodWilliamson
+from .signals.harmonic import Constant, Harmonic, Harmonics, SweptSine
+from .signals.transient import Pulse, Step, Tabulated
+from .signatures import friction_law, memory_friction_law, normal_law
+
+__all__ = [
+    "BoucWenFriction",
+    "Bound",
+    "Constant",
+    "ConstantFriction",
+    "CosineSurface",
+    "CubicFriction",
+    "DahlFriction",
+    "ExponentialContact",
+    "ExponentialFriction",
+    "Flat",
+    "FourierSeries",
+    "FrictionLaw",
+    "GalvanettoFriction",
+    "GaussianFriction",
+    "GaussianSurface",
+    "GreenwoodWilliamson",
+    "Harmonic",
+    "HarmonicSpeed",
+    "Harmonics",
+    "HyperbolicFriction",
+    "IwanFriction",
+    "JenkinsFriction",
+    "LinearContact",
+    "LuGreFriction",
+    "MeasuredProfile",
+    "MeasuredSurface",
+    "NormalLaw",
+    "NotNegative",
+    "ParabolicSurface",
+    "PerNode",
+    "Positive",
+    "PowerContact",
+    "PowerLawContact",
+    "PrescribedForce",
+    "ProductFriction",
+    "Pulse",
+    "RandomRoughness",
+    "RestitutionContact",
+    "RoughSurface",
+    "Sine",
+    "SpeedRamp",
+    "Step",
+    "SweptSine",
+    "Tabulated",
+    "TwoSidedStop",
+    "check_law",
+    "friction_law",
+    "memory_friction_law",
+    "normal_law",
+]
