@@ -20,11 +20,11 @@ demo: $(READY) $(SYSTEM) ## two studies from geometry to movie, into demo-output
 test-fast: $(READY) $(SYSTEM) ## run the tests that take seconds
 	@$(BIN)/python -m pytest -q -n auto -m 'not slow and not long'
 
-test: $(READY) $(SYSTEM) ## run the tests
+test: $(READY) $(SYSTEM) ## run all tests but the slow ones
 	@$(BIN)/python -m pytest -q -n auto
 
-test-slow: $(READY) $(SYSTEM) ## run the tests that take minutes
-	@$(BIN)/python -m pytest -q -m slow
+test-slow: $(READY) $(SYSTEM) ## run the documents, and what is killed on purpose
+	@$(BIN)/python -m pytest -q -n auto -m slow
 
 check: $(READY) ## ruff and mypy
 	@$(BIN)/ruff check .

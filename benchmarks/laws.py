@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from fecontact import ContactSystem, ModalBasis
-from fecontact.laws import ConstantFriction, FrictionLaw, LinearContact, NormalLaw
+from fecontact.laws import ConstantFriction, FrictionLaw, LinearContact, NormalLaw, law_names
 from fecontact.laws.base import NodeLaw
-from fecontact.laws.registry import law_class, law_names
+from fecontact.laws.registry import law_class
 from fecontact.system.kernels import right_hand_side
 
 NODES, MODES = 400, 40

@@ -22,7 +22,7 @@ from fecontact import (
 )
 from fecontact.io import export_pvd
 from fecontact.laws import ExponentialFriction, RoughSurface
-from fecontact.output.render.offscreen import can_render
+from fecontact.plot import rendering_problem
 
 FRAMES = 200
 
@@ -76,7 +76,7 @@ def main(quick: bool = False) -> None:
               f"{plain.stat().st_size / 1e6:8.0f} MB")
         seconds = best_of(1, lambda: export_pvd(trajectory, Path(folder, "pvd"), frames=frames))
         print(f"{'PVD and VTU':32}{seconds:8.2f} s")
-        if (reason := can_render()) is not None:
+        if (reason := rendering_problem()) is not None:
             print(reason)
             return
         for size in ((320, 180),) if quick else ((960, 540), (1280, 720)):

@@ -31,7 +31,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     periodic_motion,
 )
-from fecontact.integrate.initial_state import initial_state
+from fecontact.integrate import initial_state
 from fecontact.laws import Constant, ExponentialFriction, RoughSurface
 
 SPEED = "ground.speed"

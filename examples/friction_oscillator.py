@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.analysis import amplitude_spectrum, periodicity
-from fecontact.analysis.spectra import Peak
+from fecontact.analysis import Peak, amplitude_spectrum, periodicity
 from fecontact.laws import (
     ExponentialFriction,
     FourierSeries,
@@ -179,8 +178,7 @@ def soft_block(nodes: int = 16, youngs_modulus: float = 5e6) -> fc.ContactSystem
 
 def figure(runs: dict[str, fc.Trajectory], path: Path | None = None) -> Any:
     """Phase planes of B and of the contact, one row a run, as in Fig. 4.3-2."""
-    from fecontact.output.plots.figure import new_figure
-    from fecontact.output.plots.style import COLOURS
+    from fecontact.plot import COLOURS, new_figure
 
     with new_figure(8.0, 2.6 * len(runs), path) as drawn:
         axes = drawn.subplots(len(runs), 2, sharex=True, sharey="col", squeeze=False)

@@ -15,8 +15,7 @@ from scipy.linalg import eigh
 
 from fecontact import ModalBasis, basis_from_matrices, basis_from_modes
 from fecontact.io import AssembledMatrix, read_matrix, read_uff
-from fecontact.reduction import rows_from_dofs
-from fecontact.reduction.from_modes import normalisation
+from fecontact.reduction import normalisation, rows_from_dofs
 
 DATA = Path(__file__).resolve().parents[1] / "tests" / "data"
 MODES = 8

@@ -15,8 +15,7 @@ from impact_oscillator import FREQUENCIES, mesh_system, settled, two_mode_system
 
 from fecontact import ContactSystem, Trajectory
 from fecontact.analysis.periodicity import drive_period
-from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS
+from fecontact.plot import COLOURS, new_figure
 
 SHOWN_PERIODS = {64.32: 4, 30.84: 4, 37.41: 4, 23.63: 25, 9.845: 2}
 SECTION_POINTS = 3000

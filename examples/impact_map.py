@@ -20,10 +20,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from fecontact import ContactSystem
 from fecontact.analysis import count_periods
-from fecontact.cli.console import progress_bar
 from fecontact.integrate import strobe
-from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS
+from fecontact.plot import COLOURS, new_figure
 
 EXPECTED = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
 SWEPT = np.linspace(5.0, 80.0, 600)  # rad/s
@@ -59,9 +57,8 @@ def bifurcation(system: ContactSystem, frequencies: np.ndarray, *, transient: in
     """Follow the motion upwards and downwards, each from the end of the one before."""
     driven = [system.with_(**{"drive.angular_frequency": float(w)}) for w in frequencies]
     # Two chains, one on each of two cores.
-    with progress_bar("bifurcation diagram", 2 * len(driven)) as progress:
-        found = strobe(driven + driven[::-1], transient_periods=transient, keep=keep,
-                       initial=start(system, 1e-4), chain=len(driven), progress=progress)
+    found = strobe(driven + driven[::-1], transient_periods=transient, keep=keep,
+                   initial=start(system, 1e-4), chain=len(driven), progress=True)
     if not found.finished.all():
         raise RuntimeError(f"{np.count_nonzero(~found.finished)} runs did not reach their end.")
     points = contact_states(system, found.states)
@@ -81,9 +78,8 @@ def regime_map(bendings_hz: np.ndarray, dampings: np.ndarray, ratio: float = 0.6
                        transient=100, periods=10)
         scale = np.ptp(contact_states(systems[0], base.states), axis=0)
         rests = frequency == 9.845
-        with progress_bar(f"map at {frequency:g} rad/s", len(systems)) as progress:
-            found = strobe(systems, transient_periods=transient // 4 if rests else transient,
-                           keep=keep, initial=start(systems[0], 1e-4), progress=progress)
+        found = strobe(systems, transient_periods=transient // 4 if rests else transient,
+                       keep=keep, initial=start(systems[0], 1e-4), progress=True)
         points = contact_states(systems[0], found.states)
         counts = [count_periods(x, scale, largest=1 if rests else LARGEST,
                                 tolerance=COARSE if rests else FINE) for x in points]

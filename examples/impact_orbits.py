@@ -90,7 +90,7 @@ def runs(quick: bool = False) -> PoincareScan:
     if quick:
         values = np.arange(44.0, 52.0, 2.0)
     return poincare_scan(oscillator(), FREQUENCY, values, transient_periods=100, keep=24,
-                            initial=np.zeros(4))
+                         initial=np.zeros(4))
 
 
 def orbits(
@@ -113,8 +113,8 @@ def doubled(branch: Branch, doubling: BranchPoint, points: int) -> Branch | None
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4):
         try:
             return orbit_branch(field_at(doubling.parameter), doubling, bounds=(25.0, 80.0),
-                                   options=ContinuationOptions(step=step, largest_step=0.02,
-                                                               points=points))
+                                options=ContinuationOptions(step=step, largest_step=0.02,
+                                                            points=points))
         except FecontactError as error:
             why = error
     print(f"No doubled orbits from {doubling.parameter:.4f} rad/s: {why}")
@@ -245,22 +245,22 @@ def draw(
                    key=periods)
     insets = []
     for count, w in chosen:
-        there = [(point, branch) for branch in shown if periods(branch) == count
+        there = [point for branch in shown if periods(branch) == count
                  for point in branch.points if point.kind is None]
         if not there:
             continue
-        point, branch = min(there, key=lambda pair: abs(pair[0].parameter - w))
+        point = min(there, key=lambda one: abs(one.parameter - w))
         kind = "" if point.values["stable"] else ", unstable"
-        insets.append(phase_inset(field_at(w), branch, point, float(section(point)[0]),
-                                     ("B", "y"), f"{point.parameter:.2f} rad/s{kind}"))
+        insets.append(phase_inset(field_at(w), point, ("B", "y"),
+                                  f"{point.parameter:.2f} rad/s{kind}"))
     part = (low <= found.values) & (found.values <= high)
     plot_branches(shown, "observed_section",
-                     x_label="angular frequency of the drive [rad/s]",
-                     y_label="displacement once per period [m]",
-                     names=[f"period {periods(branch)}" for branch in shown],
-                     beneath=replace(found, values=found.values[part], up=found.up[part],
-                                     down=found.down[part]),
-                     observe=("B", "y"), insets=insets, path=path)
+                  x_label="angular frequency of the drive [rad/s]",
+                  y_label="displacement once per period [m]",
+                  names=[f"period {periods(branch)}" for branch in shown],
+                  beneath=replace(found, values=found.values[part], up=found.up[part],
+                                  down=found.down[part]),
+                  observe=("B", "y"), insets=insets, path=path)
 
 
 def main(folder: Path = Path("impact-orbits"), quick: bool = False) -> None:

@@ -26,8 +26,7 @@ from fecontact import (
     sensitivity,
     simulate,
 )
-from fecontact.analysis import Impacts, Periodicity, find_impacts, find_rests, periodicity
-from fecontact.analysis.impacts import Rest
+from fecontact.analysis import Impacts, Periodicity, Rest, find_impacts, find_rests, periodicity
 from fecontact.analysis.periodicity import drive_period
 from fecontact.bifurcation import lyapunov_exponents
 from fecontact.laws import ConstantFriction, RoughSurface

@@ -17,10 +17,10 @@ import numpy as np
 import fecontact as fc
 from fecontact.bifurcation import (
     Branch,
+    codim2_curve,
     contact_field,
     equilibrium_branch,
     find_equilibrium,
-    hopf_curve,
     stability_map,
 )
 from fecontact.laws import ConstantFriction, RoughSurface
@@ -47,7 +47,7 @@ def main(folder: Path = Path(), quick: bool = False) -> tuple[Branch, Branch]:
     field = contact_field(system(), [FRICTION, "load.normal"])
     branch = equilibrium_branch(field, parameter=FRICTION, bounds=(0.0, 0.6))
     plot_eigenvalues(branch, x_label="friction coefficient", range_hz=(300.0, 1200.0),
-                        path=folder / "squeal_modes.png")
+                     path=folder / "squeal_modes.png")
     hopf = branch.of_kind("Hopf")[0]
     print(f"flutter from a friction coefficient of {hopf.parameter:.4f} on, "
           f"at {hopf.frequency_hz:.1f} Hz, {hopf.criticality}")
@@ -57,14 +57,14 @@ def main(folder: Path = Path(), quick: bool = False) -> tuple[Branch, Branch]:
           f"damping ratio {modes.damping_ratios[worst]:.4f}")
 
     box = {FRICTION: (0.0, 0.6), "load.normal": (2.0, 30.0)}
-    border = hopf_curve(field, (FRICTION, "load.normal"), hopf, bounds=box)
+    border = codim2_curve(field, hopf, "load.normal", bounds=box)
     loads, frictions = border.column("load.normal"), border.column(FRICTION)
     print(f"border: {len(border)} points, friction coefficient from {frictions.min():.3f} to "
           f"{frictions.max():.3f}, load from {loads.min():.1f} to {loads.max():.1f} N")
     found = stability_map(field, {FRICTION: np.linspace(0.0, 0.6, columns),
-                                     "load.normal": np.linspace(2.0, 30.0, rows)})
+                                  "load.normal": np.linspace(2.0, 30.0, rows)})
     plot_stability_map(found, borders=[border], x_label="friction coefficient",
-                          y_label="load [N]", path=folder / "squeal_map.png")
+                       y_label="load [N]", path=folder / "squeal_map.png")
     return branch, border
 
 

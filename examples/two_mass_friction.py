@@ -36,9 +36,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.integrate import Crossing
 from fecontact.laws import PrescribedForce, ProductFriction
-from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS
-from fecontact.plot import plot_basins, plot_branches
+from fecontact.plot import COLOURS, new_figure, plot_basins, plot_branches
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,19 +8,26 @@ from .output.plots.analysis import (
 from .output.plots.basins import plot_basins
 from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.diagram_insets import Inset, phase_inset
-from .output.plots.modes import plot_modes
+from .output.plots.figure import new_figure
+from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
+from .output.plots.style import COLOURS, STATE_COLOURS
 from .output.render.movie import picture
+from .output.render.offscreen import rendering_problem
 from .sweeps.plots import plot_sobol, plot_strobed, plot_sweep
 
 __all__ = [
+    "COLOURS",
+    "STATE_COLOURS",
     "Inset",
+    "new_figure",
     "phase_inset",
     "picture",
     "plot_basins",
     "plot_branches",
     "plot_contact_map",
+    "plot_convergence",
     "plot_eigenvalues",
     "plot_energies",
     "plot_friction_work",
@@ -35,4 +42,5 @@ __all__ = [
     "plot_stability_map",
     "plot_strobed",
     "plot_sweep",
+    "rendering_problem",
 ]

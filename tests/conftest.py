@@ -8,9 +8,16 @@ import pytest
 # Small matrices: threads of the linear algebra would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# Files whose tests start processes, draw movies, run documents or follow motions for long.
+# Files that run all pages, examples and benchmarks, minutes each.
+SLOW = {"test_documentation", "test_examples", "test_benchmarks"}
+
+# Files whose tests start processes, draw movies, compile or follow motions for long.
 LONG = {
-    "test_documentation", "test_examples", "test_benchmarks", "test_bad_arguments",
+    "test_bad_arguments", "test_damaged_caches", "test_memory_laws", "test_laws_by_name",
+    "test_plots", "test_sweep_statistics", "test_assembled",
+    "test_sharp_turns", "test_closed_and_flat_branches", "test_shooting", "test_orbit_curves",
+    "test_changes_of_stability", "test_curves", "test_elimination", "test_diagrams",
+    "test_bernstein",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
     "test_set_valued_beam", "test_friction_oscillator",
     "test_sweep", "test_sweep_command", "test_sweep_killed", "test_sweep_strobed",
@@ -25,7 +32,10 @@ LONG = {
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Mark what ``make test-fast`` leaves out."""
+    """Mark what ``make test-fast`` leaves out, and what only ``make test-slow`` runs."""
     for item in items:
-        if Path(item.path).stem in LONG:
+        name = Path(item.path).stem
+        if name in LONG:
             item.add_marker(pytest.mark.long)
+        if name in SLOW:
+            item.add_marker(pytest.mark.slow)

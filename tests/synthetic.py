@@ -5,7 +5,7 @@ import scipy.sparse as sp
 
 from fecontact import ContactSystem, Ground, ModalBasis, Trajectory
 from fecontact.laws import ExponentialFriction, RoughSurface
-from fecontact.reduction.modal_basis import ModeShapes
+from fecontact.reduction import ModeShapes
 
 YOUNGS_MODULUS = 2.1e11
 

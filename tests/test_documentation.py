@@ -13,7 +13,7 @@ from fecontact import Study
 from fecontact.cli import execute
 from fecontact.cli.app import COMMANDS, app
 from fecontact.laws import check_law
-from fecontact.output.render.offscreen import can_render
+from fecontact.plot import rendering_problem
 from fecontact.reduction import BasisReport
 from fecontact.study import Span
 
@@ -111,6 +111,9 @@ def check_bifurcation(names, printed, folder):
         [float(x) for x in told.groups()], abs=5e-7)
     assert first[-1] == "subcritical"
     assert names["flow"].of_kind("Hopf")[0].parameter == pytest.approx(470.0 / 19.0, rel=1e-10)
+    # The border ends on bounds of both parameters, one to each side.
+    assert names["forces"].max() == pytest.approx(30.0, rel=1e-12)
+    assert names["speeds"].min() == pytest.approx(0.5, rel=1e-12)
     end = names["short"].points[-1]
     assert end.kind == "first mode displaced by 1"
     assert end.values["state"][0] == pytest.approx(1.0, rel=1e-10)
@@ -183,7 +186,7 @@ def test_code_of_the_page_runs(page, tmp_path, monkeypatch, capsys):
         BETWEEN.get((page, number), lambda names: None)(names)
         for old, new in shorter.items():
             code = code.replace(old, new)
-        if can_render() is not None:
+        if rendering_problem() is not None:
             code = re.sub(r"^render\(.*\)$", "", code, flags=re.MULTILINE)
         exec(compile(code, page, "exec"), names)
     CHECKS[page](names, capsys.readouterr().out, tmp_path)

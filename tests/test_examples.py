@@ -6,7 +6,7 @@ from scripts_for_tests import ROOT, check_numbers, run_script
 
 from fecontact import read_case
 from fecontact.cli import execute
-from fecontact.output.render.offscreen import can_render
+from fecontact.plot import rendering_problem
 
 # Spring of the drive and elastic mode with the contact held: w^2 of the one motion that is left.
 _w = 2.0 * np.pi * 30.0
@@ -61,7 +61,7 @@ def test_every_example_is_here():
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_example(name, tmp_path, monkeypatch, capsys):
-    if name == "sliding_beam" and (reason := can_render()) is not None:
+    if name == "sliding_beam" and (reason := rendering_problem()) is not None:
         pytest.skip(reason)
     if name == "sweep_on_dask":
         pytest.importorskip("distributed")

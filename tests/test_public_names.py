@@ -1,8 +1,11 @@
 """The public names: all there, documented, and quick to import."""
 
 import importlib
+import inspect
+import pydoc
 import subprocess
 import sys
+import textwrap
 
 import pytest
 
@@ -13,13 +16,13 @@ NAMESPACES = ("laws", "reduction", "integrate", "analysis", "bifurcation", "stud
 PUBLIC = [("fecontact", name) for name in fecontact.__all__ if name not in NAMESPACES] + [
     (f"fecontact.{space}", name) for space in NAMESPACES
     for name in importlib.import_module(f"fecontact.{space}").__all__]
-ANNOTATIONS = {"PerNode", "Positive", "NotNegative"}
+WITHOUT_DOCSTRING = {"PerNode", "Positive", "NotNegative", "COLOURS", "STATE_COLOURS"}
 
 
 @pytest.mark.parametrize(("space", "name"), PUBLIC)
 def test_every_public_name_exists_and_is_documented(space, name):
     thing = getattr(importlib.import_module(space), name)
-    if name in ANNOTATIONS:
+    if name in WITHOUT_DOCSTRING:
         return
     assert thing.__doc__
     assert not thing.__doc__.startswith(f"{name}(")  # a docstring of its own, not dataclass's
@@ -30,8 +33,43 @@ def test_every_name_has_one_place():
     assert len(set(names)) == len(names)
     assert len(fecontact.__all__) < 60
     assert set(NAMESPACES) <= set(fecontact.__all__)
-    assert fecontact.laws.LuGreFriction is getattr(importlib.import_module("fecontact.laws"),
-                                                   "LuGreFriction")
+    assert fecontact.laws.LuGreFriction.__module__ == "fecontact.laws.friction.bristle"
+
+
+def public_things():
+    """Public functions and classes by name, those of public modules too."""
+    found = {}
+    for name in fecontact.__all__:
+        thing = getattr(fecontact, name)
+        if inspect.ismodule(thing):
+            found |= {f"{name}.{inner}": getattr(thing, inner)
+                      for inner in getattr(thing, "__all__", ())}
+        else:
+            found[name] = thing
+    return found
+
+
+def test_help_of_a_public_function_fits_a_screen():
+    """No signature above 12 lines of 80 characters; with it and its docstring below 75 lines."""
+    functions = {name: thing for name, thing in public_things().items()
+                 if inspect.isroutine(thing)}
+    assert len(functions) > 80
+    for name, function in functions.items():
+        shown = pydoc.plain(pydoc.render_doc(function)).splitlines()
+        signature = textwrap.wrap(str(inspect.signature(function)), 80)
+        assert len(signature) <= 12, name
+        assert len(shown) + len(signature) <= 75, name
+
+
+@pytest.mark.parametrize("alias", ["ArrayLike", "Array", "PerNode"])
+def test_signatures_show_types_of_arrays_by_name(alias):
+    shown = [str(inspect.signature(thing)) for thing in public_things().values()
+             if inspect.isroutine(thing) or (inspect.isclass(thing)
+             and not issubclass(thing, Exception))]
+    assert any(alias in text for text in shown)
+    for text in shown:
+        assert "_SupportsArray" not in text
+        assert "<lambda>" not in text
 
 
 def test_import_loads_nothing_heavy():

@@ -7,8 +7,7 @@ import pytest
 from synthetic import basis, run
 
 import fecontact as fc
-from fecontact.bifurcation import Branch, BranchPoint
-from fecontact.bifurcation.equilibria.stability_map import StabilityMap
+from fecontact.bifurcation import Branch, BranchPoint, StabilityMap
 from fecontact.core.units import html_table, listed, span
 from fecontact.integrate import Ensemble
 from fecontact.laws import LinearContact

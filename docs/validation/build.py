@@ -14,7 +14,7 @@ import impact_section
 import normal_contact
 import two_mass_section
 
-from fecontact.core.atomic_write import write_text
+from fecontact.core.files.atomic_write import write_text
 
 DOCS = Path(__file__).resolve().parents[1]
 HEAD = """# Validation

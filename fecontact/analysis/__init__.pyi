@@ -1,13 +1,15 @@
 from .histories import history
-from .impacts import Impacts, find_impacts, find_rests
+from .impacts import Impacts, Rest, find_impacts, find_rests
 from .periodicity import Periodicity, count_periods, periodicity, strobed_states
 from .receptance import Receptance, receptance
-from .spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from .spectra import Peak, amplitude_spectrum, power_spectral_density, spectrogram
 
 __all__ = [
     "Impacts",
+    "Peak",
     "Periodicity",
     "Receptance",
+    "Rest",
     "amplitude_spectrum",
     "count_periods",
     "find_impacts",

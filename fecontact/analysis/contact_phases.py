@@ -1,4 +1,4 @@
-"""Penetration of contact nodes between the output times of a run, and when they touch."""
+"""Contact phases of nodes: penetration between output times, touch-down and lift-off."""
 
 from dataclasses import dataclass
 from functools import cached_property

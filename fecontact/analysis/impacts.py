@@ -1,4 +1,4 @@
-"""Impacts: contact phases of a run, with velocities, restitution, forces; and coming to rest."""
+"""Impacts: contact phases with velocities, restitution and forces; rests at the end of chatter."""
 
 import math
 from dataclasses import dataclass, fields

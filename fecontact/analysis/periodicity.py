@@ -1,14 +1,13 @@
-"""Periodic or not: states once per drive period, and the number of periods of a motion."""
+"""Periodicity: states once per drive period, and the number of periods after which they repeat."""
 
 from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
 

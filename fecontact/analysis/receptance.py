@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem

@@ -1,9 +1,8 @@
-"""A run with the motion between its outputs, so that pictures of it are curves and show all peaks.
+"""Runs refined between their outputs until they are dense enough to plot, peaks included.
 
-The outputs of a run are chosen for what is done with them, not for drawing: an impact may begin
-and end between two, and seven a period make a circle a heptagon. The state at an output is all
-that the motion after it depends on. Where outputs are too far apart it is computed again from
-there, with more of them, and again where these are too far apart for a short impact.
+Outputs may miss an impact between two of them, and draw a circle of seven points as a heptagon. The
+state at an output determines the motion after it: where outputs are too far apart, the run is
+computed again from there with more of them, until the curves are resolved.
 """
 
 import math

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 _EVEN = 1e-6  # part of the spacing by which times may be off
 

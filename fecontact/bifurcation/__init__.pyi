@@ -1,26 +1,28 @@
 from .attractors.basins import Attractor, Axis, Basins, basins
 from .attractors.lyapunov import LyapunovExponents, lyapunov_exponents
 from .attractors.poincare_scan import PoincareScan, poincare_scan
+from .codim2 import codim2_curve
 from .continuation.branch import Branch
 from .continuation.points import (
     BranchPoint,
     CrossingPoint,
+    DoubleHopfPoint,
     FoldPoint,
     HopfPoint,
     NeimarkSackerPoint,
     PeriodDoublingPoint,
     UnresolvedPoint,
+    ZeroHopfPoint,
 )
 from .continuation.problem import BranchStatus, ContinuationOptions
+from .diagram_options import BranchSettings
 from .equilibria.branches import equilibrium_branch
-from .equilibria.codim2 import fold_curve, hopf_curve
 from .equilibria.equilibrium import Equilibrium, find_equilibrium
-from .equilibria.stability_map import stability_map
+from .equilibria.stability_map import StabilityMap, stability_map
 from .fields.contact_field import ContactField, contact_field
 from .fields.function_field import vector_field
 from .fields.vector_field import VectorField
 from .orbits.branches import Collocation, Shooting, orbit_branch
-from .orbits.codim2 import orbit_curve
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range
@@ -31,11 +33,13 @@ __all__ = [
     "Basins",
     "Branch",
     "BranchPoint",
+    "BranchSettings",
     "BranchStatus",
     "Collocation",
     "ContactField",
     "ContinuationOptions",
     "CrossingPoint",
+    "DoubleHopfPoint",
     "Equilibrium",
     "FoldPoint",
     "HopfPoint",
@@ -45,19 +49,19 @@ __all__ = [
     "PeriodicMotion",
     "PoincareScan",
     "Shooting",
+    "StabilityMap",
     "UnresolvedPoint",
     "VectorField",
+    "ZeroHopfPoint",
     "amplitude",
     "basins",
+    "codim2_curve",
     "contact_field",
     "equilibrium_branch",
     "find_equilibrium",
-    "fold_curve",
-    "hopf_curve",
     "lyapunov_exponents",
     "observe",
     "orbit_branch",
-    "orbit_curve",
     "periodic_motion",
     "poincare_scan",
     "quantity_range",

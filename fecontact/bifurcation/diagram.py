@@ -1,4 +1,4 @@
-"""All branches that the section ``[branch]`` of a study asks for."""
+"""Bifurcation diagrams of a study: the branches of its section ``[branch]``."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 
 _EQUILIBRIA = "steady sliding"
-# Longest step along equilibria, in parts of the diagram.
-_FINE = 0.02
-# Amplitudes of the first orbit that count as one in the length of a step.
-_SIZE = 10.0
-# Points of a branch that are held against the limits of the model.
-_LOOKS = 12
+# Longest step along equilibria, in widths of the diagram.
+_LONGEST_STEP = 0.02
+# Scale of the states, in amplitudes of the first orbit.
+_SCALE = 10.0
+# Number of points of a branch at which the limits of the model are checked.
+_CHECKED_POINTS = 12
 
 
 @dataclass
@@ -62,7 +62,7 @@ def follow_branches(
     system: "ContactSystem", wanted: "BranchSettings", initial: Any = "rest",
     progress: Callable[[str, float], None] | None = None,
 ) -> Branches:
-    """Follow steady sliding or an orbit over a parameter, and what begins at special points.
+    """Follow steady sliding or an orbit over a parameter, and the branches from special points.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def follow_branches(
     basis, shown = system.basis, wanted.point
     if shown is None:
         shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
-    # Found out after a long computation, a wrong name would be found out too late.
+    # Check the names before the long computation.
     basis.point_index(shown)
     result = Branches(contact_field(system, {wanted.checked_parameter: wanted.first}),
                       (shown, wanted.component))
@@ -113,9 +113,9 @@ def follow_branches(
 
 
 def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
-    """Where a branch first leaves what the model holds for, at some of its points."""
+    """Where a branch first exceeds the limits of the model, checked at some of its points."""
     values = np.array(branch.attributes["parameter_values"], dtype=float)
-    for place in np.unique(np.linspace(0, len(branch) - 1, _LOOKS).astype(int)):
+    for place in np.unique(np.linspace(0, len(branch) - 1, _CHECKED_POINTS).astype(int)):
         point = branch.points[place]
         values[field.index(branch.parameter_name)] = point.parameter
         if "period" in point.values:
@@ -131,7 +131,7 @@ def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
 
 
 class _Task(NamedTuple):
-    """A branch that is to be followed."""
+    """A branch to follow."""
 
     title: str
     generation: int
@@ -159,9 +159,9 @@ def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) ->
 
 
 def _fine(options: ContinuationOptions) -> ContinuationOptions:
-    """Shorter steps: equilibria cost little, and curves are drawn through them."""
-    return replace(options, step=min(options.step, _FINE),
-                   largest_step=min(options.largest_step, _FINE))
+    """Options with shorter steps for equilibria, which are cheap and drawn as curves."""
+    return replace(options, step=min(options.step, _LONGEST_STEP),
+                   largest_step=min(options.largest_step, _LONGEST_STEP))
 
 
 def _tasks_beyond(
@@ -187,13 +187,13 @@ def _orbits(
                              longest_period=wanted.longest_period)
     return orbit_branch(
         field, motion, wanted.checked_parameter, method=_method(wanted), options=options,
-        # So that a step is one of the parameter rather than of the orbit, which may grow.
-        scales=_SIZE * motion.amplitudes,
+        # Large scales make a step one of the parameter rather than of the orbit, which may grow.
+        scales=_SCALE * motion.amplitudes,
         direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high)
 
 
 def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
-    """How orbits are found."""
+    """Collocation or shooting."""
     from fecontact.bifurcation.orbits.branches import Collocation, Shooting
 
     if wanted.method == "shooting":

@@ -1,14 +1,15 @@
 """The section ``[branch]`` of a study file."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from fecontact.core.errors import InputError, choices, require_finite, require_positive
+from fecontact.core.units import Unit
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
-# Pieces of an orbit and runs beneath a diagram; more is a slip of the pen.
+# Limits of the mesh intervals or segments and of the runs beneath a diagram, against typing errors.
 _MOST_PIECES, _MOST_RUNS = 10_000, 100_000
 _SWITCHES = ("Hopf", "period doubling", "branch point")
 
@@ -79,8 +80,8 @@ class BranchSettings:
     method: Literal["collocation", "shooting"] = "collocation"
     intervals: int = 50
     segments: int = 4
-    transient: float | None = None
-    longest_period: float | None = None
+    transient: Annotated[float | None, Unit("s")] = None
+    longest_period: Annotated[float | None, Unit("s")] = None
     point: str | int | None = None
     component: Literal["x", "y"] = "x"
     show: Literal["maximum", "minimum", "amplitude", "section"] = "maximum"

@@ -1,15 +1,15 @@
-"""What the command ``branch`` writes and prints: tables and pictures of branches."""
+"""Results of the command ``branch``: files, tables and plots."""
 
 import csv
 import io
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.cli.console import progress_bar
-from fecontact.core.atomic_write import write_text
+from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint, UnresolvedPoint
+from fecontact.core.files.atomic_write import write_text
 from fecontact.output.files.branches import write_branches
 
 if TYPE_CHECKING:
@@ -61,9 +61,7 @@ def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any
     from fecontact.bifurcation.attractors.poincare_scan import poincare_scan
 
     values = np.linspace(*wanted.checked_bounds, wanted.poincare_scan)
-    with progress_bar("Running at each value", 2.0 * len(values)) as show:
-        return poincare_scan(system, wanted.checked_parameter, values, initial=initial,
-                             progress=show)
+    return poincare_scan(system, wanted.checked_parameter, values, initial=initial, progress=True)
 
 
 def branches_csv(branches: Mapping[str, Branch]) -> str:
@@ -80,9 +78,8 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
                 "" if period is None else repr(1.0 / period),
                 *(repr(float(values[f"observed_{what}"]))
                   for what in ("minimum", "maximum", "amplitude")),
-                point.details.get("criticality", ""),
-                repr(float(error)) if (error := point.details.get("parameter_error")) is not None
-                else ""])
+                point.criticality or "",
+                "" if math.isnan(point.parameter_error) else repr(point.parameter_error)])
     return text.getvalue()
 
 
@@ -102,8 +99,9 @@ def special_table(branch: Branch) -> Any:
 
 def _period(point: BranchPoint) -> float | None:
     """Period of an orbit, or of what is born at a Hopf point [s]."""
-    found = point.values.get("period", point.details.get("period"))
-    return None if found is None else float(found)
+    if isinstance(point, HopfPoint):
+        return point.period
+    return float(point.values["period"]) if point.is_orbit else None
 
 
 def _remark(point: BranchPoint) -> str:
@@ -112,25 +110,24 @@ def _remark(point: BranchPoint) -> str:
     unstable = int(point.values["unstable"])
     if not unstable:
         return "stable"
-    if "period" in point.values:
+    if point.is_orbit:
         return f"{unstable} unstable multiplier{'s' if unstable > 1 else ''}"
     return f"unstable in {unstable} direction{'s' if unstable > 1 else ''}"
 
 
 def _what_changes(point: BranchPoint) -> str:
     """What begins at a special point, or by how many the unstable directions change."""
-    details = point.details
-    if "instead_of" in details:
-        return f"{details['instead_of']} on this mesh, not on finer ones: take more intervals"
-    if "unstable_before" in details:
-        return f"{details['unstable_before']} to {details['unstable_after']} unstable directions"
-    criticality = str(details.get("criticality", ""))
-    return _BORN.get(criticality, "") if point.kind == "Hopf" else criticality
+    if isinstance(point, UnresolvedPoint):
+        if point.instead_of is not None:
+            return f"{point.instead_of} on this mesh, not on finer ones: take more intervals"
+        return f"{point.unstable_before} to {point.unstable_after} unstable directions"
+    criticality = point.criticality or ""
+    return _BORN.get(criticality, "") if isinstance(point, HopfPoint) else criticality
 
 
 def _how_sure(point: BranchPoint) -> str:
     """By how much the parameter may be off, where that is more than the table shows."""
-    error = float(point.details.get("parameter_error", 0.0))
+    error = point.parameter_error  # NaN compares as smaller
     return f"known to {error:.1g} only" if error > 5e-7 * abs(point.parameter) else ""
 
 

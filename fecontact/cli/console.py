@@ -1,69 +1,21 @@
-"""What commands show while they work, on stderr, and how signals end them."""
+"""Console output of commands, and the signals that end them."""
 
 import os
 import re
 import signal
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from fecontact.core.progress import PATIENCE
+
 INTERRUPTED = 130  # exit code after Ctrl-C
 _ENDING = ("SIGTERM", "SIGHUP")
 _ended_by: list[int] = []  # the first of these signals that came
-PATIENCE = 2.0  # nothing is shown of work that takes less [s]
-
-
-@contextmanager
-def progress_bar(
-    what: str, total: float, start: float = 0.0
-) -> Iterator[Callable[[float], None]]:
-    """A function that is told how far the work is, from ``start`` to ``total``.
-
-    It draws a bar on a terminal, from two seconds on.
-    """
-    with titled_bar() as show:
-        yield lambda done: show(what, (done - start) / (total - start))
-
-
-@contextmanager
-def titled_bar() -> Iterator[Callable[[str, float], None]]:
-    """A function that is told what is being done, and which part of it is done, 0 to 1.
-
-    It draws a bar on a terminal, from two seconds on.
-    """
-    if not sys.stderr.isatty():
-        yield lambda what, part: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    bar = Progress(TextColumn("{task.description}"), BarColumn(),
-                   TextColumn("{task.percentage:.0f} %"), TimeRemainingColumn(),
-                   console=Console(stderr=True), transient=True)
-    task = bar.add_task("", total=1.0)
-    begin = latest = time.perf_counter()
-    shown = ""
-
-    def show(what: str, part: float) -> None:
-        nonlocal latest, shown
-        now = time.perf_counter()
-        if now - begin > PATIENCE and now - latest > 0.1:
-            latest = now
-            if what != shown:
-                shown = what
-                bar.reset(task, description=what, total=1.0)
-            bar.start()
-            bar.update(task, completed=part)
-
-    try:
-        yield show
-    finally:
-        bar.stop()
 
 
 @contextmanager

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fecontact.cli.console import loading, progress_bar
+from fecontact.cli.console import loading
 from fecontact.cli.templates import TEMPLATES, template
-from fecontact.core.atomic_write import output_folder, write_text
 from fecontact.core.errors import MissingLibraryError
+from fecontact.core.files.atomic_write import output_folder, write_text
 
 SHOWN = ("beam", "pendulum")
 
@@ -75,9 +75,8 @@ def _show_study(name: str, text: str, folder: Path, log: Log) -> None:
         system = study.system()
     what = (f"running {study.t_end:g} s with {count(system.basis.modes, 'mode')} and "
             f"{count(system.basis.contact_nodes, 'contact node')}")
-    with log.step(name, what), \
-            progress_bar(f"Running {name}", study.t_end, study.simulation.t_start) as progress:
-        trajectory = study.run(progress)
+    with log.step(name, what):
+        trajectory = study.run(progress=True)
     with log.step(name, "writing"):
         log.files.append(write_case(folder / f"{name}.vtkhdf", trajectory,
                                     frames=study.output.frames, study=study.to_toml()))

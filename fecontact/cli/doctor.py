@@ -1,4 +1,4 @@
-"""What this computer has of what fecontact needs, and how to get the rest.
+"""Check of the installation: Python packages, system libraries, rendering; remedies.
 
 Libraries that may be missing or broken are tried in processes of their own: where graphics
 libraries are missing, VTK ends its process instead of raising.
@@ -29,8 +29,8 @@ subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-version"], check=True, captur
 _COMPILED = "import fecontact.system.contact_system"
 _RENDERING = """
 import sys
-from fecontact.output.render.offscreen import can_render
-reason = can_render()
+from fecontact.output.render.offscreen import rendering_problem
+reason = rendering_problem()
 sys.exit(reason)
 """
 

@@ -1,4 +1,4 @@
-"""From a command line to an exit code: errors are one sentence, without a traceback."""
+"""Entry point: runs a command line; errors become one sentence and an exit code."""
 
 import sys
 import warnings

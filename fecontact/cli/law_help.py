@@ -1,11 +1,12 @@
-"""What laws there are, for the terminal."""
+"""List of laws and their parameters for the terminal."""
 
 import inspect
 import json
 from dataclasses import MISSING, fields
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 from fecontact.cli.tables import table
+from fecontact.core.docstrings import summary
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import check_law
@@ -17,7 +18,7 @@ def laws_table() -> Any:
     from rich.markup import escape
 
     return table("kind", "law", "", left=3, rows=[
-        (_title(kind), name, escape(_summary(cls)))
+        (_title(kind), name, escape(summary(cls).rstrip(".")))
         for kind, names in law_names().items() for name, cls in names.items()])
 
 
@@ -59,29 +60,28 @@ def _own(name: str) -> str:
 
 def _example(kind: type, name: str, cls: type) -> str:
     lines = [f"    [{_SECTIONS[kind.__name__]}]", f'    law = "{name}"']
+    hints = get_type_hints(cls)
     for entry in fields(cls):
         default = entry.default_factory() if callable(entry.default_factory) else entry.default
         if default is MISSING:
             lines.append(f"    {entry.name} =")
         elif default is None or default == ():
-            lines.append(f"    # {entry.name} = {_hint(str(entry.type))}")
+            lines.append(f"    # {entry.name} = {_hint(hints[entry.name])}")
         else:
             shown = list(default) if isinstance(default, tuple) else default
             lines.append(f"    {entry.name} = {json.dumps(shown)}")
     return "\n".join(lines)
 
 
-def _hint(annotation: str) -> str:
+def _hint(kind: Any) -> str:
     """What the value of an optional key looks like."""
-    return "[...]" if "tuple" in annotation else '"..."' if "str" in annotation else "..."
+    kind = getattr(kind, "__value__", kind)
+    options = {get_origin(option) or option for option in (kind, *get_args(kind))}
+    return "[...]" if tuple in options else '"..."' if str in options else "..."
 
 
 def _title(kind: type) -> str:
     return _TITLES.get(kind.__name__, _SECTIONS[kind.__name__])
-
-
-def _summary(cls: type) -> str:
-    return (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " ").rstrip(".")
 
 
 _SECTIONS = {"NormalLaw": "normal", "FrictionLaw": "friction", "Profile": "ground.profile",

@@ -1,12 +1,12 @@
-"""From studies to files: what ``run``, ``render`` and the demonstration share."""
+"""Reading studies and runs, writing results: shared by several commands."""
 
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fecontact.cli.console import loading, progress_bar
+from fecontact.cli.console import loading
 from fecontact.core.errors import FecontactError, InputError
 
 if TYPE_CHECKING:
@@ -143,18 +143,14 @@ def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") ->
     """Draw a run with a progress bar; the file or folder."""
     from fecontact.output.render.movie import render
 
-    with progress_bar("Drawing", settings.frames) as progress:
-        return render(trajectory, target, frames=settings.frames, fps=settings.fps,
-                      size=settings.size, colour=settings.colour, scale=settings.scale,
-                      title=settings.title, t_start=settings.t_start, t_end=settings.t_end,
-                      progress=lambda done, total: progress(done * settings.frames / total))
+    return render(trajectory, target, frames=settings.frames, fps=settings.fps,
+                  size=settings.size, colour=settings.colour, scale=settings.scale,
+                  title=settings.title, t_start=settings.t_start, t_end=settings.t_end,
+                  progress=True)
 
 
-def convergence_of(study: "Study", progress: Callable[[float], None]) -> "ModeConvergence":
-    """Frequencies and contact compliance of a study as its mesh is refined and modes are added.
-
-    ``progress`` is told the part that is done.
-    """
+def convergence_of(study: "Study") -> "ModeConvergence":
+    """Frequencies and contact compliance of a study as its mesh is refined and modes are added."""
     from fecontact.reduction.convergence import mode_convergence
 
     settings = replace(study.basis, select=None)
@@ -162,4 +158,4 @@ def convergence_of(study: "Study", progress: Callable[[float], None]) -> "ModeCo
     return mode_convergence(
         body, lambda part, count: replace(settings, modes=count).modal_basis(part), settings.modes,
         levels=4 if body.mass.shape[0] < 4000 else 3,
-        progress=lambda done, steps: progress(done / steps))
+        progress=True)

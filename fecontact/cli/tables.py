@@ -1,4 +1,4 @@
-"""What commands print of a mesh and of a run."""
+"""Tables that commands print about meshes and runs."""
 
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,14 +1,14 @@
 """Checks of arguments that several functions of the interface share."""
 
 import os
-from collections.abc import Mapping, Sequence
-from numbers import Real
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.errors import InputError, require_positive, shown
 from fecontact.core.types import Array, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
@@ -34,8 +34,8 @@ def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> No
             raise InputError(f"{owner}: {name} must be {wanted}, not {type(value).__name__}.")
 
 
-_NAMES: dict[type, str] = {Mapping: "a mapping of names", Sequence: "a sequence", str: "a text",
-                           int: "a whole number"}
+_NAMES: dict[Any, str] = {Mapping: "a mapping of names", Sequence: "a sequence", str: "a text",
+                          int: "a whole number", Callable: "a function", bool: "true or false"}
 
 
 def as_path(path: Any, what: str) -> Path:
@@ -52,13 +52,51 @@ def as_path(path: Any, what: str) -> Path:
     return found
 
 
+def as_count(value: Any, what: str, least: int = 1) -> int:
+    """A whole number of at least some value; InputError if it is not. ``what`` is its name."""
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+        raise InputError(f"{what} = {shown(value)} must be a whole number, {least} or above.")
+    return int(value)
+
+
 def as_floats(values: Any, what: str) -> Array:
-    """An array of numbers; InputError if it is none. ``what`` is its name, for the message."""
+    """An array of numbers; ``what`` is its name, for messages.
+
+    Raises
+    ------
+    InputError
+        For complex numbers, truth values, texts, None and lists of unequal lengths.
+    """
     try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} must be numbers, not {type(values).__name__} of another "
-                         f"kind.") from None
+        given = np.asarray(values)
+        if isinstance(values, list | tuple) and any(isinstance(item, bool) for item in values):
+            given = np.empty(0, bool)  # beside numbers, NumPy takes truth values for 0 and 1
+        if given.dtype.kind in "iuf":
+            return np.asarray(given, dtype=float)
+        if given.dtype.kind == "O" and all(isinstance(item, Real) and not isinstance(item, bool)
+                                           for item in given.flat):
+            return np.asarray(given, dtype=float)  # fractions, whole numbers beyond 64 bits
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InputError(f"{what} must be real numbers, not {shown(values)}; give a number, or lists "
+                     f"of numbers of equal length.")
+
+
+def is_numeric(values: Any) -> bool:
+    """Whether :func:`as_floats` takes it."""
+    try:
+        as_floats(values, "")
+    except InputError:
+        return False
+    return True
+
+
+def as_pair(values: Any, what: str) -> tuple[float, float]:
+    """Two finite numbers, the coordinates of a place; InputError if they are not."""
+    place = as_floats(values, what)
+    if place.shape != (2,) or not np.isfinite(place).all():
+        raise InputError(f"{what} = {shown(values)} must be a pair of coordinates x, y [m].")
+    return float(place[0]), float(place[1])
 
 
 def as_integers(values: Any, what: str) -> Integers:

@@ -1,21 +1,23 @@
-"""Compiling: kernels and laws go through numba here, and only here.
+"""Compilation of kernels and laws by numba, and the code that is kept on disk.
 
 Laws reach a kernel as addresses of compiled functions. A kernel is then compiled once for all
-laws, now and in later processes, a call from a kernel costs a few nanoseconds, and no time is
-spent in converting function objects when the kernel is called from Python.
+laws, for this process and later ones, a call from a kernel costs a few nanoseconds, and calling
+the kernel from Python spends no time on converting function objects.
 """
 
 import dis
 import hashlib
 import inspect
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
+from numbers import Number
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
+import numpy as np
 from numba import njit, types
 from numba.core import cgutils, sigutils
 from numba.core.caching import IndexDataCacheFile
@@ -36,35 +38,89 @@ integers = types.Array(i8, 1, "C")
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
 
 
-_PACKAGE = Path(__file__).parents[1]
-_IMPORT = re.compile(r"^\s*(?:from|import)\s+(fecontact[\w.]*)"
-                     r"(?:\s+import\s+(\([^)]*\)|[^\n]*))?", re.MULTILINE)
+def source_digest(function: Any) -> str:
+    """A mark of all code and constants that a function is compiled from.
 
-
-@cache
-def _imported(path: Path) -> frozenset[Path]:
-    """Files of the package that a file imports."""
-    found = set()
-    for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
-        place = _PACKAGE.joinpath(*module.split(".")[1:])
-        for part in (place, *(place / name for name in re.findall(r"\w+", names))):
-            found |= {file for file in (part.with_suffix(".py"), part / "__init__.py")
-                      if file.is_file()}
-    return frozenset(found)
-
-
-@cache
-def _source_stamp(path: Path) -> str:
-    """A mark that changes with any source of the package that a file's kernels may call."""
-    reached, ahead = set(), {path}
+    It covers the functions that it calls, in whatever file they are, and the values of the
+    globals that they name; comments, docstrings and times of files do not count. Numba by itself
+    looks only at the file of the function.
+    """
+    marks: set[str] = set()
+    seen: set[int] = set()
+    ahead = [function]
     while ahead:
-        reached |= ahead
-        ahead = set().union(*(_imported(file) for file in ahead)) - reached
-    stamp = hashlib.sha256()
-    for file in sorted(reached):
-        info = file.stat()
-        stamp.update(f"{file.name}:{info.st_size}:{info.st_mtime_ns};".encode())
-    return stamp.hexdigest()
+        item = ahead.pop()
+        if id(item) not in seen:
+            seen.add(id(item))
+            mark, called = _own_digest(item)
+            marks.add(mark)
+            ahead += called
+    return hashlib.sha256(" ".join(sorted(marks)).encode()).hexdigest()
+
+
+@cache
+def _own_digest(item: Any) -> tuple[str, tuple[Any, ...]]:
+    """A mark of one function, compiled or plain, and the functions that it refers to."""
+    called: list[Any] = []
+    intrinsic_code = getattr(item, "_defn", None)
+    function = intrinsic_code or getattr(item, "py_func", item)
+    parts = [function.__module__, function.__qualname__,
+             _written(getattr(item, "targetoptions", {}), called),
+             _written(function.__defaults__, called)]
+    names: set[str] = set()
+    for code in _codes(function.__code__):
+        names.update(code.co_names)
+        # Names of variables and line numbers have no effect.
+        parts.append(code.co_code.hex())
+        parts += [_written(value, called) for value in code.co_consts
+                  if not inspect.iscode(value) and value != function.__doc__]
+        parts.append(" ".join(code.co_names))
+    known = {name: function.__globals__[name] for name in names if name in function.__globals__}
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # a cell that is not filled yet
+            known[name] = cell.cell_contents
+    for name, value in sorted(known.items()):
+        parts.append(f"{name} = {_written(value, called)}")
+        if inspect.ismodule(value) and not _is_library(value.__name__):
+            parts += [f"{name}.{inner} = {_written(vars(value)[inner], called)}"
+                      for inner in sorted(names & vars(value).keys())]
+    if intrinsic_code is not None:
+        # Overloads and data models beside an intrinsic are at work without being named.
+        parts.append(hashlib.sha256(Path(inspect.getfile(function)).read_bytes()).hexdigest())
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest(), tuple(called)
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """A code object and those of the functions within."""
+    yield code
+    for value in code.co_consts:
+        if inspect.iscode(value):
+            yield from _codes(value)
+
+
+def _written(value: Any, called: list[Any]) -> str:
+    """A value as a text that is the same in every process; functions go to ``called``."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape}{hashlib.sha256(value.tobytes()).hexdigest()}"
+    if isinstance(value, Mapping):
+        return str(sorted(f"{key}: {_written(item, called)}" for key, item in value.items()))
+    if isinstance(value, tuple | list):
+        return str([_written(item, called) for item in value])
+    if isinstance(value, set | frozenset):
+        return str(sorted(_written(item, called) for item in value))
+    if isinstance(value, types.Type | Number | str | bytes | None):
+        return f"{type(value).__name__} {value!s}"
+    function = getattr(value, "_defn", None) or getattr(value, "py_func", value)
+    name = f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', '')}"
+    if inspect.isfunction(function) and not _is_library(name):
+        called.append(value)
+    return f"{type(value).__name__} {name}"
+
+
+def _is_library(name: str) -> bool:
+    """Whether a module is one whose code changes with its version alone, which numba sees."""
+    return name.partition(".")[0] in ("builtins", "cmath", "llvmlite", "math", "numba", "numpy",
+                                      "operator")
 
 
 class _StoredCode(IndexDataCacheFile):
@@ -105,22 +161,20 @@ def _remove(path: str) -> None:
         Path(path).unlink()
 
 
-def _stamp(compiled: Any, function: Callable[..., Any], module: str = "") -> None:
+def _stamp(compiled: Any, function: Any, module: str = "") -> None:
     """Key stored code by the sources it is made from, and by the module name it refers to."""
     stored: Any = getattr(compiled, "_cache", None)
     if isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
-        stored._cache_file = _StoredCode(
-            stored.cache_path, stored._impl.filename_base,
-            (stored._impl.locator.get_source_stamp(),
-             _source_stamp(Path(inspect.getfile(function))), module))
+        stored._cache_file = _StoredCode(stored.cache_path, stored._impl.filename_base,
+                                         (source_digest(function), module))
 
 
 def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function for one signature and keep the result on disk.
 
     Floating-point sums may be reordered (so that they vectorise), but NaN and infinity keep
-    their meaning. The stored code is renewed when the file of the function changes, or any that it
-    imports from the package: numba by itself looks only at the first.
+    their meaning. The stored code is renewed when the function changes, or anything that it is
+    compiled from, see :func:`source_digest`.
     """
 
     def compile_(function: Callable[..., Any]) -> Any:
@@ -129,7 +183,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
             "fastmath": _FASTMATH, **options,
         }
         dispatcher = njit(**settings)(function)
-        _stamp(dispatcher, function)
+        _stamp(dispatcher, dispatcher)
         dispatcher.compile(signature)
         dispatcher.disable_compile()
         return dispatcher

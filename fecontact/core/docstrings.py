@@ -1,21 +1,69 @@
-"""What the docstring of a class says of its parameters."""
+"""Parameters of classes in their docstrings: reading them, and inheriting them."""
 
 import inspect
-import re
+from functools import cache
+from typing import Any
+
+from docstring_parser import Docstring, DocstringStyle, compose, parse
+from docstring_parser.common import DocstringParam
 
 
 def documented(cls: type) -> list[tuple[tuple[str, ...], str]]:
-    """Parameters of a class and what its docstring says of them, those together that stand so.
+    """Parameters of a class and their descriptions; names that share a description are together.
 
-    Where it says nothing of a parameter but its values, these.
+    A parameter without a description has its type in place of one.
     """
-    text = inspect.getdoc(cls) or ""
-    found = re.search(r"^Parameters\n-+\n(.*?)(?:\n\n\w[\w ]*\n-+\n|\Z)", text, re.S | re.M)
-    entries: list[tuple[tuple[str, ...], str, list[str]]] = []
-    for line in (found.group(1) if found else "").splitlines():
-        if line and not line.startswith(" "):
-            names, _, values = line.partition(" : ")
-            entries.append((tuple(name.strip() for name in names.split(",")), values, []))
-        elif line.strip():
-            entries[-1][2].append(line.strip())
-    return [(names, " ".join(lines) or values) for names, values, lines in entries]
+    return [(_names(entry), " ".join((entry.description or entry.type_name or "").split()))
+            for entry in _parsed(inspect.getdoc(cls) or "").params]
+
+
+def summary(thing: Any) -> str:
+    """The first paragraph of a docstring, as one line."""
+    doc = _parsed(inspect.getdoc(thing) or "")
+    text = doc.short_description or ""
+    if not doc.blank_after_short_description:
+        text += "\n" + (doc.long_description or "").split("\n\n")[0]
+    return " ".join(text.split())
+
+
+def inherit_documentation(cls: type) -> None:
+    """Add to the docstring of a dataclass what it leaves to those of its bases.
+
+    These are the fields that it does not describe itself, in the order of the fields, and the
+    errors that are raised. A base may describe fields that only its subclasses have. A class
+    without a docstring stays without.
+    """
+    text = cls.__dict__.get("__doc__")
+    if not text:
+        return
+    bases = [_parsed(inspect.cleandoc(base.__dict__.get("__doc__") or ""))
+             for base in cls.__mro__[1:-1]]
+    own = _parsed(inspect.cleandoc(text))
+    names = [*getattr(cls, "__dataclass_fields__", ()), *inspect.get_annotations(cls),
+             *(name for entry in own.params for name in _names(entry))]
+    entries: dict[str, DocstringParam] = {}
+    for doc in (*reversed(bases), own):
+        for entry in doc.params:
+            entries |= dict.fromkeys(_names(entry), entry)
+    parameters = list({id(entries[name]): entries[name] for name in names
+                       if name in entries}.values())
+    raises = next((doc.raises for doc in (own, *bases) if doc.raises), [])
+    others = [item for item in own.meta if item not in own.params and item not in own.raises]
+    complete = Docstring(style=own.style)
+    complete.short_description = own.short_description
+    complete.blank_after_short_description = own.blank_after_short_description
+    complete.long_description = own.long_description
+    complete.meta = [*parameters, *raises, *others]
+    cls.__doc__ = compose(complete).replace("\n\n\n", "\n\n")
+
+
+@cache
+def _parsed(text: str) -> Docstring:
+    found = parse(text, DocstringStyle.NUMPYDOC)
+    for entry in found.params:
+        entry.default = None  # taken from the words "by default", which stay in the description
+    return found
+
+
+def _names(entry: DocstringParam) -> tuple[str, ...]:
+    return tuple(name.strip() for name in entry.arg_name.split(","))

@@ -1,4 +1,4 @@
-"""The package's exception family.
+"""Exceptions of the package, and the checks of numbers that raise them.
 
 Every message is one sentence that names the thing that is wrong, its value, what is allowed and
 what to do about it.
@@ -52,10 +52,10 @@ def require_positive(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a number from 1e-60 to 1e60."""
     for name, value in values.items():
         if not (_is_number(value) and 0.0 < value < float("inf")):
-            raise InputError(f"{owner}: {name} = {_shown(value)} must be a finite number above "
+            raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number above "
                              f"zero.")
         if not _LEAST <= value <= _MOST:
-            raise InputError(f"{owner}: {name} = {_shown(value)} must be a number from {_LEAST:g} "
+            raise InputError(f"{owner}: {name} = {shown(value)} must be a number from {_LEAST:g} "
                              f"to {_MOST:g}.")
 
 
@@ -63,7 +63,7 @@ def require_not_negative(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a finite number of at least zero."""
     for name, value in values.items():
         if not (_is_number(value) and 0.0 <= value < float("inf")):
-            raise InputError(f"{owner}: {name} = {_shown(value)} must be a finite number, zero or "
+            raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number, zero or "
                              f"above.")
 
 
@@ -71,16 +71,16 @@ def require_finite(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a finite number."""
     for name, value in values.items():
         if not _is_number(value):
-            raise InputError(f"{owner}: {name} = {_shown(value)} must be a number.")
+            raise InputError(f"{owner}: {name} = {shown(value)} must be a number.")
         if not abs(value) < float("inf"):
-            raise InputError(f"{owner}: {name} = {_shown(value)} must be finite.")
+            raise InputError(f"{owner}: {name} = {shown(value)} must be finite.")
 
 
 def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
     """A value in one line, cut to a length that fits into a sentence."""
     try:
         text = " ".join(repr(value).split())

@@ -1,4 +1,4 @@
-"""Ctrl-C around libraries that cannot stand it."""
+"""Deferral of Ctrl-C during calls of libraries that must not be interrupted."""
 
 import signal
 import threading

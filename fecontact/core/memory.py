@@ -1,4 +1,4 @@
-"""What fits into memory: asked before large arrays are made, not found out by running out of it."""
+"""Estimates of memory, checked before large arrays are allocated."""
 
 import os
 import sys

@@ -295,7 +295,10 @@ def _shared_keys(hint: Any, table: Mapping[str, Any]) -> int:
 
 
 def _options(hint: Any) -> Sequence[Any]:
-    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+    hint = getattr(hint, "__value__", hint)  # of an alias
+    if get_origin(hint) not in (Union, types.UnionType):
+        return (hint,)
+    return [option for part in get_args(hint) for option in _options(part)]
 
 
 def _words(hint: Any, plural: bool) -> list[str]:

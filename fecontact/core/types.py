@@ -1,8 +1,13 @@
-"""Types of arrays, for annotations."""
+"""Types of arrays, for annotations; signatures show them by these names."""
 
 import numpy as np
+from numpy import typing as npt
 from numpy.typing import NDArray
+from typing_extensions import TypeAliasType
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-ComplexArray = NDArray[np.complex128]
+Array = TypeAliasType("Array", NDArray[np.float64])
+Integers = TypeAliasType("Integers", NDArray[np.int64])
+ComplexArray = TypeAliasType("ComplexArray", NDArray[np.complex128])
+
+# What NumPy makes an array of.
+ArrayLike = TypeAliasType("ArrayLike", npt.ArrayLike)

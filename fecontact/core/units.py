@@ -1,7 +1,8 @@
-"""What people are shown: numbers in units that suit their size, and objects in short."""
+"""Units of parameters, numbers in units that suit their size, and objects in short."""
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from html import escape
 from itertools import chain, repeat
 
@@ -20,6 +21,16 @@ _UNITS = {
 }
 
 _LONGEST = 360  # characters of an object in a line
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Unit of a number, as part of its annotation: ``Annotated[float, Unit("m/s")]``."""
+
+    symbol: str
+
+    def __repr__(self) -> str:
+        return self.symbol
 
 
 def suitable_unit(size: float, unit: str) -> tuple[float, str]:

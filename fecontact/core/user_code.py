@@ -1,40 +1,87 @@
-"""Functions of the user's own, from their files."""
+"""Python files of the user: laws, and functions of runs."""
 
 import importlib.util
+import re
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from fecontact.core.errors import InputError, nearest
 
 
-def user_function(file: Path, name: str) -> Callable[[Any], float]:
-    """A function of a Python file, as it is now.
+def user_module(file: str | Path, where: str = "") -> ModuleType:
+    """The module in a Python file, as the file is at this time.
+
+    It is loaded once for each time that the file was written, and found by pickling under
+    :func:`module_name`.
+
+    Parameters
+    ----------
+    file : path
+        The file.
+    where : str
+        What names the file, before the messages: ``study.toml: [friction]: ``.
 
     Raises
     ------
     InputError
-        If the file cannot be loaded, or has no such function.
+        If there is no such file, or it cannot be loaded.
     """
+    path = Path(file).resolve()
     try:
-        written = file.stat().st_mtime_ns
+        written = path.stat().st_mtime_ns
+    except FileNotFoundError:
+        raise InputError(f"{where}there is no file {file}.") from None
     except OSError as error:
-        raise InputError(f"{file} cannot be loaded "
+        raise InputError(f"{where}{file} cannot be loaded "
                          f"({(error.strerror or str(error)).lower()}).") from None
-    return _function(file, name, written)
-
-
-@cache
-def _function(file: Path, name: str, written: int) -> Callable[[Any], float]:
-    """The function as it was written then: processes may outlive a change of the file."""
     try:
-        spec = importlib.util.spec_from_file_location(f"fecontact_summary_{file.stem}", file)
-        module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
-        spec.loader.exec_module(module)  # type: ignore[union-attr]
+        return _module(path, written)
+    except InputError:
+        raise
     except Exception as error:
-        raise InputError(f"{file} cannot be loaded ({type(error).__name__}: {error}).") from None
+        raise InputError(f"{where}{file} cannot be loaded "
+                         f"({type(error).__name__}: {error}).") from None
+
+
+def user_function(file: Path, name: str) -> Callable[[Any], float]:
+    """A function of a Python file.
+
+    Raises
+    ------
+    InputError
+        As :func:`user_module`, or if the file has no such function.
+    """
+    module = user_module(file)
     function = getattr(module, name, None)
     if not callable(function):
         raise InputError(f"{file} has no function '{name}'{nearest(name, vars(module))}.")
     return function
+
+
+def module_name(file: str | Path) -> str:
+    """The name under which the module of a file is kept."""
+    return f"fecontact_user_{re.sub(r'[^0-9a-zA-Z]', '_', str(Path(file).resolve()))}"
+
+
+@cache
+def _module(path: Path, written: int) -> ModuleType:
+    """The module as it was written then: processes may outlive a change of the file."""
+    name = module_name(path)
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError("a Python file ends with .py")
+    module = importlib.util.module_from_spec(spec)
+    before = sys.modules.get(name)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        if before is not None:
+            sys.modules[name] = before
+        raise
+    return module

@@ -44,6 +44,9 @@ def contact_groups(
     import scipy.sparse as sp
 
     require_kind("modal_basis", (str, Sequence), contact=boundaries)
+    if not isinstance(boundaries, str):
+        for item in boundaries:
+            require_kind("modal_basis: contact", str, name=item)
     names = (boundaries,) if isinstance(boundaries, str) else tuple(boundaries)
     each: tuple[Any, ...] = (tuple(counts) if isinstance(counts, list | tuple)
                              else (counts,) * len(names))

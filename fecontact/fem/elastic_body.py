@@ -60,6 +60,7 @@ class Material:
     @classmethod
     def named(cls, name: str) -> "Material":
         """'steel' or 'aluminium' with handbook values; InputError lists the names there are."""
+        require_kind("Material.named", str, name=name)
         if name not in _MATERIALS:
             raise InputError(f"There is no material '{name}'"
                              f"{nearest(str(name), _MATERIALS)}; named materials are "
@@ -116,7 +117,7 @@ class ElasticBody(Summarised):
         require_positive("ElasticBody", thickness=self.thickness)
         if self.plane not in ("stress", "strain"):
             raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")
-        if self.degree not in (1, 2):
+        if self.degree not in (1, 2) or type(self.degree) is not int:
             raise InputError(f"ElasticBody: degree = {self.degree!r} must be 1 or 2.")
         corners, degree = self.mesh.cells.shape[1], int(self.degree)
         require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
@@ -135,11 +136,11 @@ class ElasticBody(Summarised):
         material = self.material
         return [
             ("mesh", f"{len(self.mesh.cells)} {kind}, {len(self.mesh.nodes)} nodes, degree "
-                     f"{self.degree}"),
+             f"{self.degree}"),
             ("x", span(x, "m")), ("y", span(y, "m")),
             ("thickness", f"{self.thickness:.4g} m, plane {self.plane}"),
             ("material", f"{quantity(material.youngs_modulus, 'Pa')}, Poisson ratio "
-                         f"{material.poisson_ratio:.4g}, {material.density:.4g} kg/m³"),
+             f"{material.poisson_ratio:.4g}, {material.density:.4g} kg/m³"),
             ("fixed", listed([f"{name} in {way}" for name, way in self.fixed.items()])),
         ]
 

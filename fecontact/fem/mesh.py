@@ -1,15 +1,14 @@
-"""The plane mesh that every other room works with."""
+"""Plane meshes of triangles or quadrilaterals with named boundaries and points."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from fecontact.core.checks import as_floats, as_integers
+from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import MeshError, choices, nearest
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
 
 _FLAT = 1e-12  # area of a degenerate cell, as part of its squared sides
@@ -71,6 +70,9 @@ class Mesh(Summarised):
                 f"{np.count_nonzero(bad)} mesh cells have no area or are folded, the first is cell "
                 f"{np.flatnonzero(bad)[0]}."
             )
+        require_kind("Mesh", Mapping, boundaries=self.boundaries, points=self.points)
+        for name in (*self.boundaries, *self.points):
+            require_kind("Mesh: boundaries and points", str, name=name)
         boundaries = {name: _edges(name, edges) for name, edges in self.boundaries.items()}
         points = {name: np.unique(as_integers(which, f"The nodes of mesh point '{name}'"))
                   for name, which in self.points.items()}
@@ -185,7 +187,7 @@ class Mesh(Summarised):
 
 
 def _edges(name: str, edges: ArrayLike) -> Integers:
-    array = np.array(edges, np.int64)
+    array = np.array(as_integers(edges, f"The edges of mesh boundary '{name}'"))
     if array.size and (array.ndim != 2 or array.shape[1] != 2):
         raise MeshError(f"Boundary '{name}' must have shape (k, 2), pairs of nodes, not "
                         f"{array.shape}.")

@@ -1,4 +1,4 @@
-"""Points of interest: rows that give a point's displacement and rotation from the nodes'.
+"""Points of interest: rows that map nodal displacements to a point's displacement and rotation.
 
 Every function returns rows (3, 2 N), sparse: displacement x, y and rotation phi of the point
 from the displacements of the body's nodes. Transposed, they spread a force at the point over
@@ -6,12 +6,14 @@ the nodes, so that both do the same virtual work.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from fecontact.core.checks import as_pair
 from fecontact.core.errors import InputError, MeshError, choices, nearest, require_positive
 from fecontact.core.types import Array, Integers
+from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -27,13 +29,20 @@ class Patch:
         Name of a point of the mesh, or a place [m].
     radius : float
         Distance, positive [m].
+
+    Raises
+    ------
+    InputError
+        For another radius, or a place that is no pair of finite numbers.
     """
 
-    at: str | tuple[float, float]
-    radius: float
+    at: Annotated[str | tuple[float, float], Unit("m")]
+    radius: Annotated[float, Unit("m")]
 
     def __post_init__(self) -> None:
         require_positive("Patch", radius=self.radius)
+        if not isinstance(self.at, str):
+            object.__setattr__(self, "at", as_pair(self.at, "Patch: at"))
 
 
 Place = str | tuple[float, float] | Patch
@@ -185,10 +194,7 @@ def _centre(body: ElasticBody, at: str | tuple[float, float], name: str) -> Arra
                             f"{nearest(at, body.mesh.points)}; its points are: "
                             f"{choices(body.mesh.points)}.")
         return np.asarray(body.mesh.nodes[body.mesh.points[at]].mean(axis=0))
-    centre = np.asarray(at, dtype=float)
-    if centre.shape != (2,) or not np.isfinite(centre).all():
-        raise InputError(f"Point {name}: {at!r} must be a pair of coordinates x, y [m].")
-    return centre
+    return np.array(as_pair(at, f"Point {name}"))
 
 
 def _node_set_rows(body: ElasticBody, nodes: Integers) -> Rows:

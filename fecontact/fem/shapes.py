@@ -6,12 +6,13 @@ The contact face is the bottom of the body, at y = 0; the ground lies below it.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from fecontact.core.errors import InputError, choices, require_not_negative, require_positive
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 
 Element = Literal["quadrilateral", "triangle"]
 
@@ -39,9 +40,9 @@ class Beam:
         For a value that is not a finite number above zero, or another element.
     """
 
-    length: float = 0.2
-    height: float = 0.02
-    element_size: float = 0.005
+    length: Annotated[float, Unit("m")] = 0.2
+    height: Annotated[float, Unit("m")] = 0.02
+    element_size: Annotated[float, Unit("m")] = 0.005
     element: Element = "quadrilateral"
 
     def __post_init__(self) -> None:
@@ -79,11 +80,11 @@ class Block:
         block, a drive above its top, or another element.
     """
 
-    width: float = 0.12
-    height: float = 0.06
-    contact_length: float | None = None
-    drive_height: float | None = None
-    element_size: float = 0.005
+    width: Annotated[float, Unit("m")] = 0.12
+    height: Annotated[float, Unit("m")] = 0.06
+    contact_length: Annotated[float | None, Unit("m")] = None
+    drive_height: Annotated[float | None, Unit("m")] = None
+    element_size: Annotated[float, Unit("m")] = 0.005
     element: Element = "quadrilateral"
 
     def __post_init__(self) -> None:
@@ -143,14 +144,14 @@ class Pendulum:
         element.
     """
 
-    arm_length: float = 0.3
-    arm_height: float = 0.0077
-    bob_width: float = 0.033
-    bob_height: float = 0.033
-    drive_distance: float | None = None
-    hinge_radius: float = 0.0
-    contact_length: float | None = None
-    element_size: float = 0.004
+    arm_length: Annotated[float, Unit("m")] = 0.3
+    arm_height: Annotated[float, Unit("m")] = 0.0077
+    bob_width: Annotated[float, Unit("m")] = 0.033
+    bob_height: Annotated[float, Unit("m")] = 0.033
+    drive_distance: Annotated[float | None, Unit("m")] = None
+    hinge_radius: Annotated[float, Unit("m")] = 0.0
+    contact_length: Annotated[float | None, Unit("m")] = None
+    element_size: Annotated[float, Unit("m")] = 0.004
     element: Element = "quadrilateral"
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Supports: which motions of the nodes are held, and the others in terms of free ones."""
+"""Supports: constraints of nodal displacements, and their elimination."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,5 +1,6 @@
 from .ensemble import Ensemble, strobe
 from .events import ContactEvents, Crossing, Events
+from .initial_state import initial_state
 from .sensitivity import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
 from .solvers import CVODE, Rodas5P, Scipy, SetValued
@@ -17,6 +18,7 @@ __all__ = [
     "Sensitivity",
     "SetValued",
     "SmoothingCost",
+    "initial_state",
     "smoothing_cost",
     "strobe",
 ]

@@ -12,11 +12,12 @@ from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array, Integers
+from fecontact.core.progress import progress_bar, shown
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.events import AnyEvent, Events, as_events
 from fecontact.integrate.initial_state import Initial, initial_state
@@ -79,7 +80,7 @@ def ensemble(
     chain: int = 1,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     workers: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: bool | Callable[[int], None] | None = None,
 ) -> Ensemble:
     """Run many systems, or one from many initial states, and keep their states at few times.
 
@@ -108,8 +109,9 @@ def ensemble(
         has no states after it.
     workers : int, optional
         Threads; default one a core.
-    progress : callable, optional
-        Called with the number of runs that have ended, now and then.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is called with the
+        number of runs that have ended, now and then.
 
     Raises
     ------
@@ -153,15 +155,16 @@ def ensemble(
             last = run.progress.state if result == step_loop.FINISHED else None
             done[0] += 1
 
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+    with (shown(progress, lambda: progress_bar("Running", count)) as tell,
+          ThreadPoolExecutor(workers or os.cpu_count()) as pool):
         pending = {pool.submit(run_chain, first) for first in range(0, count, chain)}
         try:
             while pending:
                 ended, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
                 for future in ended:
                     future.result()
-                if progress is not None:
-                    progress(done[0])
+                if tell is not None:
+                    tell(done[0])
         except BaseException:
             leave[0] = True
             raise

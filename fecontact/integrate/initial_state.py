@@ -5,7 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.checks import as_floats, is_numeric
+from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import ModalBasis
@@ -24,10 +25,24 @@ class RigidStart:
         Of the origin of coordinates [m, m, rad]; phi counter-clockwise.
     velocity : (x, y, phi)
         Of the origin of coordinates [m/s, m/s, rad/s].
+
+    Raises
+    ------
+    InputError
+        If either is not three finite numbers.
     """
 
     displacement: tuple[float, float, float] = (0.0, 0.0, 0.0)
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("displacement", "velocity"):
+            given = getattr(self, name)
+            values = as_floats(given, name) if is_numeric(given) else np.zeros(0)
+            if values.shape != (3,) or not np.isfinite(values).all():
+                raise InputError(f"RigidStart: {name} = {shown(given)} must be three finite "
+                                 f"numbers: x [m], y [m] and phi [rad], or their rates.")
+            object.__setattr__(self, name, tuple(values.tolist()))
 
 
 Initial = Literal["rest", "sliding"] | RigidStart | Trajectory | Array
@@ -69,11 +84,10 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
                                _rigid(system.basis, initial.velocity, "velocity"),
                                np.zeros(system.size - 2 * m)])
     given = initial.states[-1] if isinstance(initial, Trajectory) else initial
-    try:
-        state = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"initial = {initial!r} must be 'rest', 'sliding', a RigidStart, a "
-                         f"Trajectory or an array of numbers.") from None
+    if not is_numeric(given):
+        raise InputError(f"initial = {shown(given)} must be 'rest', 'sliding', a RigidStart, a "
+                         f"Trajectory or an array of real numbers.")
+    state = np.array(as_floats(given, "initial"))
     if state.shape != (system.size,):
         raise InputError(f"The initial state must have {system.size} values [q, q', z], not shape "
                          f"{state.shape}.")
@@ -84,12 +98,7 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
 
 def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> Array:
     q = np.zeros(basis.modes)
-    try:
-        wanted = np.asarray(motion, dtype=float)
-    except (TypeError, ValueError):
-        wanted = np.zeros(0)
-    if wanted.shape != (3,) or not np.isfinite(wanted).all():
-        raise InputError(f"initial: {what} = {motion!r} must be three finite numbers x, y, phi.")
+    wanted = np.array(motion)
     if not wanted.any():
         return q
     x, y = basis.positions.T

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish, start

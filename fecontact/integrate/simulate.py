@@ -7,11 +7,11 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.errors import InputError
 from fecontact.core.memory import require_memory
-from fecontact.core.types import Array
+from fecontact.core.progress import progress_bar, shown
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.events import AnyEvent, as_events
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.solvers import RODAS5P, Solver, Task, require_solver
@@ -40,7 +40,7 @@ def simulate(
     rtol: float = 1e-6,
     max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: bool | Callable[[float], None] | None = None,
 ) -> Trajectory:
     r"""Integrate a contact system in time.
 
@@ -69,8 +69,9 @@ def simulate(
     events : ContactEvents, Crossing, Event or sequence of them, optional
         For Rodas5P: what to watch for, located within the steps and kept in
         :attr:`Trajectory.events`; the run ends at those that say so.
-    progress : callable, optional
-        Called with the time reached [s] now and then.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is called with the time
+        reached [s] now and then.
 
     Returns
     -------
@@ -104,14 +105,13 @@ def simulate(
     if events is not None and not solver.locates_events:
         raise InputError(f"Events are located by Rodas5P() alone, not by {solver!r}; leave them "
                          f"out, or find what happened between the outputs afterwards.")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress = {progress!r} must be a function of the time reached.")
     watched = as_events(events)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory):
         _warn_of_depth(system, state, t_start)
     m = system.basis.modes
-    found = solver.run(Task(system, state, times, float(rtol), max_step, watched, progress))
+    with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:
+        found = solver.run(Task(system, state, times, float(rtol), max_step, watched, tell))
     states = found.states
     trajectory = Trajectory(
         system, found.time, states[:, :m], states[:, m : 2 * m], found.work, found.status,
@@ -176,7 +176,7 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
     InputError
         If they are not ascending from ``t_start`` to ``t_end``.
     """
-    if not (isinstance(t_start, Real) and isinstance(t_end, Real)
+    if not (all(isinstance(time, Real) and not isinstance(time, bool) for time in (t_start, t_end))
             and -np.inf < t_start < t_end < np.inf):
         raise InputError(f"t_end = {t_end!r} must be a finite time after t_start = {t_start!r}.")
     latest = max(abs(t_start), abs(t_end))

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.core.checks import as_path
+from fecontact.core.checks import as_floats, as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.integrate.events import AnyEvent
@@ -103,6 +103,7 @@ class Rodas5P(Solver):
     def __post_init__(self) -> None:
         if self.checkpoint is not None:
             as_path(self.checkpoint, "a checkpoint")
+        require_kind("Rodas5P", bool, keep_checkpoint=self.keep_checkpoint)
 
     @property
     def name(self) -> str:
@@ -171,10 +172,7 @@ class SetValued(Solver):
             raise InputError("SetValued: scheme = 'stepping' has no rigid stops; use 'events', or "
                              "leave restitution out.")
         if self.static_coefficient is not None:
-            try:
-                values = np.asarray(self.static_coefficient, dtype=float)
-            except (TypeError, ValueError):
-                values = np.array([np.nan])
+            values = as_floats(self.static_coefficient, "SetValued: static_coefficient")
             if values.ndim > 1 or not (np.isfinite(values).all() and (values >= 0.0).all()):
                 raise InputError(f"SetValued: static_coefficient = {self.static_coefficient!r} "
                                  f"must be a number, zero or above, or one for each contact node.")

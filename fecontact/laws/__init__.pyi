@@ -14,16 +14,18 @@ from .friction.stribeck import (
 from .ground.fourier_series import FourierSeries
 from .ground.measured_profile import MeasuredProfile
 from .ground.motion import HarmonicSpeed, SpeedRamp
-from .ground.profile import Flat, Sine
+from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .normal.measured_surface import MeasuredSurface
 from .normal.power import PowerContact, PowerLawContact, RestitutionContact
 from .normal.rough_surface import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .normal.statistical import ExponentialContact, GreenwoodWilliamson
+from .registry import law_names
+from .signals.base import Signal
 from .signals.harmonic import Constant, Harmonic, Harmonics, SweptSine
 from .signals.transient import Pulse, Step, Tabulated
-from .signatures import friction_law, memory_friction_law, normal_law
+from .signatures import friction_law, ground_profile, memory_friction_law, normal_law, signal
 
 __all__ = [
     "BoucWenFriction",
@@ -61,10 +63,12 @@ __all__ = [
     "PowerLawContact",
     "PrescribedForce",
     "ProductFriction",
+    "Profile",
     "Pulse",
     "RandomRoughness",
     "RestitutionContact",
     "RoughSurface",
+    "Signal",
     "Sine",
     "SpeedRamp",
     "Step",
@@ -73,6 +77,9 @@ __all__ = [
     "TwoSidedStop",
     "check_law",
     "friction_law",
+    "ground_profile",
+    "law_names",
     "memory_friction_law",
     "normal_law",
+    "signal",
 ]

@@ -6,18 +6,20 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_type_hints
+from typing import Annotated, Any, ClassVar, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import TypeAliasType
 
 from fecontact.core.compiled import CompiledLaw
+from fecontact.core.docstrings import inherit_documentation
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.laws.friction_curve import stick_velocity
 from fecontact.laws.sampling import stored_energy
 
-PerNode = float | tuple[float, ...]
+PerNode = TypeAliasType("PerNode", float | tuple[float, ...])
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,9 @@ class Bound:
     allowed: str
     holds: Callable[[Array], Any]
 
+    def __repr__(self) -> str:
+        return self.allowed
+
 
 Positive = Annotated[PerNode, Bound("above zero", lambda x: x > 0.0)]
 NotNegative = Annotated[PerNode, Bound("zero or above", lambda x: x >= 0.0)]
@@ -43,27 +48,41 @@ UpToOne = Annotated[PerNode, Bound("above zero and at most 1", lambda x: (x > 0.
 
 
 @cache
-def _ranges(law: Any) -> Mapping[str, tuple[Bound, ...]]:
-    """Ranges that the annotations of a law's parameters name."""
+def _annotations(law: Any) -> Mapping[str, tuple[Any, tuple[Bound, ...]]]:
+    """Types of a law's parameters, and the ranges that their annotations name."""
     try:
         hints = get_type_hints(law, include_extras=True)
     except NameError as error:
         raise InputError(f"{law.__name__}: an annotation cannot be understood ({error}); use names "
                          f"that the module of the law knows.") from None
-    return {name: tuple(item for item in getattr(hint, "__metadata__", ())
-                        if isinstance(item, Bound))
+    return {name: (getattr(hint, "__origin__", hint) if get_origin(hint) is Annotated else hint,
+                   tuple(item for item in getattr(hint, "__metadata__", ())
+                         if isinstance(item, Bound)))
             for name, hint in hints.items()}
 
 
 @dataclass(frozen=True)
 class NodeLaw:
-    """A law whose parameters may differ from contact node to contact node."""
+    """A law whose parameters may differ from contact node to contact node.
+
+    A subclass describes its own fields; those described by its bases, and the errors below, are
+    added to its docstring.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
+    """
 
     kernel: ClassVar[CompiledLaw]
     extensive: ClassVar[frozenset[str]] = frozenset()
     # Parameters whose lists are not one value per node.
     shared_fields: ClassVar[frozenset[str]] = frozenset()
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        inherit_documentation(cls)
 
     def __post_init__(self) -> None:
         law: Any = type(self)
@@ -82,14 +101,15 @@ class NodeLaw:
             if array.dtype.kind not in "iuf" or array.ndim > 1 or not array.size:
                 raise InputError(f"{self._title(entry.name)} = {given!r} must be a number or a "
                                  f"list of numbers, one per contact node.")
-            if array.ndim and entry.type in (float, "float"):
+            kind, ranges = _annotations(law)[entry.name]
+            if array.ndim and kind is float:
                 raise InputError(f"{self._title(entry.name)} = {given!r} must be a number; only "
                                  f"parameters annotated as PerNode take one per contact node.")
             value = tuple(float(item) for item in array) if array.ndim else float(array)
             if not np.isfinite(value).all():
                 raise InputError(f"{self._title(entry.name)} = {value!r} must be finite.")
             object.__setattr__(self, entry.name, value)
-            for one in _ranges(law)[entry.name]:
+            for one in ranges:
                 self.require(one.allowed, one.holds, entry.name)
 
     def node_count(self) -> int | None:
@@ -156,9 +176,7 @@ class NormalLaw(NodeLaw):
         """
         return np.zeros((1, nodes))
 
-    def stored_energy(
-        self, penetration: Array, share: Array
-    ) -> Array:
+    def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         return stored_energy(self.kernel.address, penetration, self.table(share),
                              self.penetration_scale)

@@ -1,4 +1,4 @@
-"""Whether a law keeps the contract of laws, tried over the range in which it changes."""
+"""Checks of a law: derivatives, signs and energy over the range in which it changes."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -229,7 +229,7 @@ def _check_derivatives(
         far = {k: outputs(points + k * shift) for k in (-2, -1, 1, 2)}
         central = (8.0 * (far[1] - far[-1]) - (far[2] - far[-2])) / (12.0 * step[:, None])
         near = {k: (outputs(points + k * _SIDE / _STEP * shift) - here) / (k * _SIDE / _STEP
-                                                                          * step[:, None])
+                                                                           * step[:, None])
                 for k in (-1, 1)}
         size = np.max([np.abs(value) for value in far.values()], axis=0)
         rounding = 50.0 * np.finfo(float).eps * size

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from numbers import Integral
-from typing import Literal
+from typing import Annotated, Literal
 
 from fecontact.core.errors import (
     InputError,
@@ -12,6 +12,7 @@ from fecontact.core.errors import (
     require_finite,
     require_not_negative,
 )
+from fecontact.core.units import Unit
 from fecontact.laws.signals.harmonic import Harmonic, Signal
 
 _COMPONENTS = ("x", "y", "phi")
@@ -45,15 +46,15 @@ class Drive:
         For values outside these ranges, or an amplitude and a motion in the same direction.
     """
 
-    stiffness_x: float = 0.0
-    stiffness_y: float = 0.0
-    damping_x: float = 0.0
-    damping_y: float = 0.0
-    amplitude_x: float = 0.0
-    amplitude_y: float = 0.0
-    angular_frequency: float = 0.0
-    motion_x: Signal | None = None
-    motion_y: Signal | None = None
+    stiffness_x: Annotated[float, Unit("N/m")] = 0.0
+    stiffness_y: Annotated[float, Unit("N/m")] = 0.0
+    damping_x: Annotated[float, Unit("N s/m")] = 0.0
+    damping_y: Annotated[float, Unit("N s/m")] = 0.0
+    amplitude_x: Annotated[float, Unit("m")] = 0.0
+    amplitude_y: Annotated[float, Unit("m")] = 0.0
+    angular_frequency: Annotated[float, Unit("rad/s")] = 0.0
+    motion_x: Annotated[Signal | None, Unit("m")] = None
+    motion_y: Annotated[Signal | None, Unit("m")] = None
 
     def __post_init__(self) -> None:
         require_not_negative(
@@ -149,7 +150,7 @@ class Load:
         For values that are not finite, or forces of another kind.
     """
 
-    normal: float = 0.0
+    normal: Annotated[float, Unit("N")] = 0.0
     forces: tuple[PointLoad, ...] = ()
 
     def __post_init__(self) -> None:

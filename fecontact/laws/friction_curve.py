@@ -1,4 +1,4 @@
-"""Questions to a friction law without memory: the curve R/F over slip velocity and its extremes.
+"""The friction curve R/F over slip velocity of laws without memory, and its extremes.
 
 They are answered by sampling the compiled law, so they hold for every law, also for users' own.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from numba import types
 from scipy.optimize import brentq
 
+from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw, f8, i8, kernel, matrix, vector
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
@@ -152,7 +153,7 @@ def _turning_points(
 
 def _curve(law: Curve, velocity: Array | float, F: float, column: int) -> Array:
     nodes = _nodes(law)
-    v = np.asarray(velocity, dtype=float)
+    v = as_floats(velocity, f"{type(law).__name__}: velocity")
     if nodes == 1:
         return _sampled(law, v.reshape(-1), F, _table(law, 1)[0])[:, column].reshape(v.shape)
     v = np.broadcast_to(v, np.broadcast_shapes(v.shape, (nodes,)))

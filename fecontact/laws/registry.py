@@ -1,19 +1,17 @@
 """Names of the laws in study files: ``law = "lugre"``, or a law of the user's own file."""
 
-import importlib.util
 import os
-import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import Kinds, register_kinds
+from fecontact.core.user_code import user_module
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
@@ -25,70 +23,66 @@ from fecontact.laws.signals.base import Signal
 @cache
 def law_names() -> Mapping[type, Mapping[str, type]]:
     """Classes by name, for each kind of law (the base class)."""
-    from fecontact.laws.friction import bristle as memory
-    from fecontact.laws.friction import maxwell_slip
-    from fecontact.laws.friction import stribeck as friction
-    from fecontact.laws.friction import stribeck as friction_minimum
-    from fecontact.laws.ground import fourier_series, profile, random_roughness
-    from fecontact.laws.ground import measured_profile as trace
-    from fecontact.laws.ground import motion as ground_motion
-    from fecontact.laws.normal import linear as normal_stop
-    from fecontact.laws.normal import measured_surface as normal_measured
-    from fecontact.laws.normal import power as normal_power
-    from fecontact.laws.normal import rough_surface as normal
-    from fecontact.laws.normal import statistical as normal_statistical
-    from fecontact.laws.signals import harmonic as signals
-    from fecontact.laws.signals import transient as transients
+    from fecontact.laws.friction import bristle, maxwell_slip, stribeck
+    from fecontact.laws.ground import (
+        fourier_series,
+        measured_profile,
+        motion,
+        profile,
+        random_roughness,
+    )
+    from fecontact.laws.normal import linear, measured_surface, power, rough_surface, statistical
+    from fecontact.laws.signals import harmonic, transient
 
     return {
         NormalLaw: {
-            "rough-surface": normal.RoughSurface,
-            "parabolic-surface": normal.ParabolicSurface,
-            "cosine-surface": normal.CosineSurface,
-            "gaussian-surface": normal.GaussianSurface,
-            "measured-surface": normal_measured.MeasuredSurface,
-            "linear": normal_stop.LinearContact,
-            "power": normal_power.PowerContact,
-            "restitution": normal_power.RestitutionContact,
-            "exponential": normal_statistical.ExponentialContact,
-            "back-burdekin": normal_power.PowerLawContact,
-            "greenwood-williamson": normal_statistical.GreenwoodWilliamson,
-            "two-sided-stop": normal_stop.TwoSidedStop,
-            "prescribed": normal_stop.PrescribedForce,
+            "rough-surface": rough_surface.RoughSurface,
+            "parabolic-surface": rough_surface.ParabolicSurface,
+            "cosine-surface": rough_surface.CosineSurface,
+            "gaussian-surface": rough_surface.GaussianSurface,
+            "measured-surface": measured_surface.MeasuredSurface,
+            "linear": linear.LinearContact,
+            "power": power.PowerContact,
+            "restitution": power.RestitutionContact,
+            "exponential": statistical.ExponentialContact,
+            "back-burdekin": power.PowerLawContact,
+            "greenwood-williamson": statistical.GreenwoodWilliamson,
+            "two-sided-stop": linear.TwoSidedStop,
+            "prescribed": linear.PrescribedForce,
         },
         FrictionLaw: {
-            "exponential": friction.ExponentialFriction,
-            "gaussian": friction.GaussianFriction,
-            "hyperbolic": friction.HyperbolicFriction,
-            "constant": friction.ConstantFriction,
-            "galvanetto": friction_minimum.GalvanettoFriction,
-            "cubic": friction_minimum.CubicFriction,
-            "product": friction.ProductFriction,
+            "exponential": stribeck.ExponentialFriction,
+            "gaussian": stribeck.GaussianFriction,
+            "hyperbolic": stribeck.HyperbolicFriction,
+            "constant": stribeck.ConstantFriction,
+            "galvanetto": stribeck.GalvanettoFriction,
+            "cubic": stribeck.CubicFriction,
+            "product": stribeck.ProductFriction,
             "jenkins": maxwell_slip.JenkinsFriction,
             "iwan": maxwell_slip.IwanFriction,
-            "dahl": memory.DahlFriction,
-            "lugre": memory.LuGreFriction,
-            "bouc-wen": memory.BoucWenFriction,
+            "dahl": bristle.DahlFriction,
+            "lugre": bristle.LuGreFriction,
+            "bouc-wen": bristle.BoucWenFriction,
         },
         Profile: {
             "flat": profile.Flat,
             "sine": profile.Sine,
             "fourier-series": fourier_series.FourierSeries,
-            "trace": trace.MeasuredProfile,
+            "trace": measured_profile.MeasuredProfile,
             "random-roughness": random_roughness.RandomRoughness,
         },
         GroundMotion: {
-            "harmonic-speed": ground_motion.HarmonicSpeed,
-            "speed-ramp": ground_motion.SpeedRamp,
+            "harmonic-speed": motion.HarmonicSpeed,
+            "speed-ramp": motion.SpeedRamp,
         },
         Signal: {
-            "constant": signals.Constant,
-            "harmonic": signals.Harmonic,
-            "harmonics": signals.Harmonics,
-            "sweep": signals.SweptSine,
-            "step": transients.Step,
-            "pulse": transients.Pulse,
-            "tabulated": transients.Tabulated,
+            "constant": harmonic.Constant,
+            "harmonic": harmonic.Harmonic,
+            "harmonics": harmonic.Harmonics,
+            "sweep": harmonic.SweptSine,
+            "step": transient.Step,
+            "pulse": transient.Pulse,
+            "tabulated": transient.Tabulated,
         },
     }
 
@@ -139,28 +133,21 @@ def own_law(kind: Any, name: str, where: str) -> type:
     path, _, title = name.rpartition(":")
     file = str(Path(path).resolve())
     trusted = _trusted.get()
-    try:
-        if trusted is None or file in trusted:
-            found = getattr(_module(file), title, None)
-        elif (found := _loaded(file, title)) is None:
-            raise UntrustedError(
-                f"{where} is code in a file, which is not run unadvised; if you trust {path}, say "
-                f"--trust (trust=True).")
-    except FileNotFoundError:
-        raise InputError(f"{where}: there is no file {path}.") from None
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f"{where}: {path} cannot be loaded "
-                         f"({type(error).__name__}: {error}).") from None
-    if not (isinstance(found, type) and issubclass(found, kind)):
-        kinds = kind if isinstance(kind, tuple) else (kind,)
-        laws = {one.__name__ for one in chain(*map(_subclasses, kinds))
-                if one.__module__ == _module_name(str(Path(path).resolve()))}
-        what = "law" if len(kinds) > 1 else kind.__name__
+    if trusted is not None and file not in trusted:
+        if (loaded := _loaded(file, title)) is not None and issubclass(loaded, kind):
+            return loaded
+        raise UntrustedError(
+            f"{where} is code in a file, which is not run unadvised; if you trust {path}, say "
+            f"--trust (trust=True).")
+    module = user_module(path, f"{where}: ")
+    laws = {cls.__name__: cls for cls in vars(module).values()
+            if isinstance(cls, type) and issubclass(cls, kind)
+            and cls.__module__ == module.__name__}
+    if title not in laws:
+        what = "law" if isinstance(kind, tuple) else kind.__name__
         raise InputError(f"{where}: {path} has no {what} of that name"
                          f"{nearest(title, laws)}; it has {choices(laws)}.")
-    return found
+    return laws[title]
 
 
 class UntrustedError(InputError):
@@ -259,32 +246,6 @@ def _relative(key: str, value: Any, folder: Path, root: Path) -> Any:
 def _located(key: str, value: Any, folder: Path) -> Any:
     named = isinstance(value, str) and (key == "file" or (key == "law" and ".py:" in value))
     return str(folder.resolve() / value) if named else value
-
-
-def _subclasses(kind: type[Any]) -> Iterator[type]:
-    for cls in kind.__subclasses__():
-        yield cls
-        yield from _subclasses(cls)
-
-
-def _module_name(path: str) -> str:
-    return f"fecontact_user_{re.sub(r'[^0-9a-zA-Z]', '_', path)}"
-
-
-@cache
-def _module(path: str) -> Any:
-    name = _module_name(path)
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise FileNotFoundError(path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
 
 
 register_kinds(Kinds(is_kind, law_class, name_of))

@@ -34,12 +34,14 @@ rates must be continuous where R depends on them; at F = 0, where it does not, t
 zero.
 """
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 
 from numba import types
 
 from fecontact.core.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
+from fecontact.core.errors import InputError
 
 NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
 FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)
@@ -58,22 +60,33 @@ FRICTION_FORM = "f(v, F, p) -> R, dR/dv, dR/dF"
 MEMORY_FORM = "f(v, F, z, p, force, rates)"
 
 
+def _compiled(signature: Any, form: str, function: Any, arguments: int) -> CompiledLaw:
+    """A law of a function, the arguments of which are counted before it is compiled."""
+    if not inspect.isfunction(function):
+        raise InputError(f"A law must be a Python function {form}, not "
+                         f"{type(function).__name__}.")
+    if len(names := inspect.signature(function).parameters) != arguments:
+        raise InputError(f"The law {function.__name__}({', '.join(names)}) is not one of the form "
+                         f"{form}.")
+    return compile_law(signature, form, function)
+
+
 def normal_law(function: Callable[..., Any]) -> CompiledLaw:
     """Decorator of a function ``f(u, v, p) -> F, dF/du, dF/dv``, compiled at its first use.
 
-    Arguments, results, units and signs stand at the top of the module. InputError at that use for
-    another form, or a statement that cannot be compiled.
+    Arguments, results, units and signs stand at the top of the module. InputError for another
+    number of arguments; at the first use for other results, or what cannot be compiled.
     """
-    return compile_law(NORMAL, NORMAL_FORM, function)
+    return _compiled(NORMAL, NORMAL_FORM, function, 3)
 
 
 def friction_law(function: Callable[..., Any]) -> CompiledLaw:
     """Decorator of a function ``f(v, F, p) -> R, dR/dv, dR/dF``, compiled at its first use.
 
-    Arguments, results, units and signs stand at the top of the module. InputError at that use for
-    another form, or a statement that cannot be compiled.
+    Arguments, results, units and signs stand at the top of the module. InputError for another
+    number of arguments; at the first use for other results, or what cannot be compiled.
     """
-    return compile_law(FRICTION, FRICTION_FORM, function)
+    return _compiled(FRICTION, FRICTION_FORM, function, 3)
 
 
 def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
@@ -86,7 +99,7 @@ def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
 
     As :func:`friction_law`.
     """
-    return compile_law(MEMORY, MEMORY_FORM, function)
+    return _compiled(MEMORY, MEMORY_FORM, function, 6)
 
 
 def signal(function: Callable[..., Any]) -> CompiledLaw:

@@ -1,5 +1,6 @@
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
+from .from_modes import normalisation
 from .modal_basis import ModeShapes, ReductionQuality
 from .report import BasisReport
 from .restriction import rows_from_dofs
@@ -10,5 +11,6 @@ __all__ = [
     "ReductionQuality",
     "eigenfrequencies_hz",
     "mode_convergence",
+    "normalisation",
     "rows_from_dofs",
 ]

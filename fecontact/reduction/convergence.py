@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import as_count, require_kind
+from fecontact.core.progress import counting_bar, shown
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.modal_basis import ModalBasis
@@ -62,7 +63,7 @@ def mode_convergence(
     modes: int,
     *,
     levels: int = 3,
-    progress: Callable[[int, int], None] | None = None,
+    progress: bool | Callable[[int, int], None] | None = None,
 ) -> ModeConvergence:
     """Refine the mesh of a body, and add modes on its own mesh.
 
@@ -76,33 +77,38 @@ def mode_convergence(
         Number of modes; half, this, twice and four times as many are tried.
     levels : int
         Number of meshes, at least two.
-    progress : callable, optional
-        Called with the number of bases done, and of all.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is called with the
+        number of bases done, and of all.
     """
     require_kind("mode_convergence", ElasticBody, body=body)
+    require_kind("mode_convergence", Callable, build=build)  # type: ignore[arg-type]
+    modes = as_count(modes, "mode_convergence: modes")
+    levels = as_count(levels, "mode_convergence: levels", 2)
     unknowns = len(body.expansion.indptr) - 1
     counts = [max(1, modes // 2), modes, 2 * modes, 4 * modes]
     counts = sorted({count for count in counts if count <= unknowns // 2} | {modes})
     steps = len(counts) + levels - 1
     bases = []
-    for done, count in enumerate(counts):
-        bases.append(build(body, count))
-        if progress is not None:
-            progress(done + 1, steps)
-    own = bases[counts.index(modes)]
-    meshes, refined = [own], body
-    sizes = [unknowns]
-    for level in range(1, levels):
-        refined = replace(refined, mesh=refined.mesh.refined())
-        meshes.append(build(refined, modes))
-        sizes.append(len(refined.expansion.indptr) - 1)
-        if progress is not None:
-            progress(len(counts) + level, steps)
-    shown = min(6, own.modes - own.rigid_modes)
+    with shown(progress, lambda: counting_bar("Refining")) as tell:
+        for done, count in enumerate(counts, 1):
+            bases.append(build(body, count))
+            if tell is not None:
+                tell(done, steps)
+        own = bases[counts.index(modes)]
+        meshes, refined = [own], body
+        sizes = [unknowns]
+        for level in range(1, levels):
+            refined = replace(refined, mesh=refined.mesh.refined())
+            meshes.append(build(refined, modes))
+            sizes.append(len(refined.expansion.indptr) - 1)
+            if tell is not None:
+                tell(len(counts) + level, steps)
+    some = min(6, own.modes - own.rigid_modes)
     first = own.rigid_modes
     return ModeConvergence(
         unknowns=np.array(sizes),
-        frequencies_hz=np.array([basis.frequencies_hz[first : first + shown] for basis in meshes]),
+        frequencies_hz=np.array([basis.frequencies_hz[first : first + some] for basis in meshes]),
         compliance=np.array([_compliance(basis).mean(axis=0) for basis in meshes]),
         modes=np.array(counts),
         missing=np.array([BasisReport(basis).contact_error.max(axis=0) for basis in bases]),

@@ -1,12 +1,15 @@
-"""Damping of the modes: what a user gives, as the modal damping matrix of the equations."""
+"""Modal damping matrices from damping ratios, Rayleigh factors or a loss factor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_not_negative
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 
 
 @dataclass(frozen=True)
@@ -24,8 +27,8 @@ class Rayleigh:
         Factor of the stiffness [s], zero or above.
     """
 
-    mass_factor: float = 0.0
-    stiffness_factor: float = 0.0
+    mass_factor: Annotated[float, Unit("1/s")] = 0.0
+    stiffness_factor: Annotated[float, Unit("s")] = 0.0
 
     def __post_init__(self) -> None:
         require_not_negative("Rayleigh damping", mass_factor=self.mass_factor,
@@ -78,10 +81,7 @@ def modal_damping(
                        + damping.stiffness_factor * angular_frequencies**2)
     if isinstance(damping, LossFactor):
         damping = 0.5 * damping.value
-    try:
-        values = np.asarray(damping, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"Damping {damping!r} is not a number or an array of numbers.") from None
+    values = as_floats(damping, "The damping of a modal basis")
     if not np.isfinite(values).all():
         raise InputError(f"Damping {damping!r} is not finite.")
     if values.shape == (count, count) and values.ndim == 2:

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs, free_modes
 from fecontact.reduction.matrix_files import AssembledMatrix

@@ -1,14 +1,13 @@
-"""Modes computed or measured elsewhere: what they are scaled by, and the basis they give."""
+"""Modal bases from modes computed or measured elsewhere, and the scaling of these."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.eigenmodes import fixed_signs
 from fecontact.reduction.from_matrices import assembled_basis, given_matrix

@@ -209,6 +209,8 @@ class ModalBasis(Summarised):
         InputError if there is none, with those that there are.
         """
         require_kind("A point", (str, int), point=point)
+        if isinstance(point, bool):
+            raise InputError(f"A point: {point!r} must be a name, or the number of a contact node.")
         if isinstance(point, int):
             if not 0 <= point < self.contact_nodes:
                 raise InputError(f"Contact node {point} does not exist; there are "
@@ -262,6 +264,7 @@ class ModalBasis(Summarised):
         A block's tilting, say, is left out by leaving out its rigid rotation. Raises InputError
         for a mode that does not exist.
         """
+        require_kind("select", (Sequence, np.ndarray), modes=modes)
         chosen = np.unique(as_integers(modes, "The modes to select"))
         if not chosen.size or len(chosen) != len(modes) or chosen[0] < 0 or (
                 chosen[-1] >= self.modes):

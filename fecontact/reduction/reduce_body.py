@@ -1,4 +1,4 @@
-"""From the finite-element body to its modal basis."""
+"""Modal reduction of a finite-element body."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal, get_args

@@ -1,4 +1,4 @@
-"""How good a modal basis is: frequencies, effective masses, compliance at the contact."""
+"""Quality of a modal basis: frequencies, effective masses, compliance at the contact."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -122,8 +122,8 @@ class BasisReport:
         error = self.contact_error
         if np.isfinite(error).all() and error.size and basis.rigid_modes < basis.modes:
             lines += ["", "missing static compliance at the contact nodes: "
-                          f"x {error[:, 0].max():.2%}, y {error[:, 1].max():.2%} at most, "
-                          f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
+                      f"x {error[:, 0].max():.2%}, y {error[:, 1].max():.2%} at most, "
+                      f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
                       *(f"missing static compliance at {name}: {axis} {error:.2%}"
                         for name, axis, error in self._loaded_points()),
                       f"effective mass kept: x {mass[0].sum():.2%}, y {mass[1].sum():.2%}",

@@ -1,4 +1,4 @@
-"""What the kept modes leave out of the body's response to forces at its points.
+"""Residual vectors: the static response at the points that the kept modes leave out.
 
 A force pattern f over the rows W of the points loads the free degrees of freedom with
 ``W^T f``. Beside the kept modes Phi with squared frequencies L, the elastic static response is

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
@@ -66,6 +67,7 @@ def rows_from_dofs(
     InputError
         For degrees of freedom that are not there, and places of another form.
     """
+    require_kind("rows_from_dofs", (Sequence, np.ndarray), contact=contact)
     if not len(contact):
         raise InputError("rows_from_dofs: contact is empty; name the degrees of freedom (ix, iy) "
                          "of at least one contact node.")

@@ -1,6 +1,8 @@
+from .sections import BasisSettings
 from .sweep_section import Distribution, Span, Strobing, SweepSettings
 
 __all__ = [
+    "BasisSettings",
     "Distribution",
     "Span",
     "Strobing",

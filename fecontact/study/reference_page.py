@@ -1,13 +1,12 @@
-"""The keys of study files, from the classes that read them: ``docs/study.md``."""
+"""Reference of all keys of study files, generated from their classes: ``docs/study.md``."""
 
-import inspect
 import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
-from fecontact.core.docstrings import documented
+from fecontact.core.docstrings import documented, summary
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import described
 from fecontact.laws.registry import is_kind, law_names
@@ -132,8 +131,9 @@ def _default(entry: Any) -> str:
 
 
 def _summary(cls: Any) -> str:
-    text = (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " ")
-    text = re.sub(r"^``\[[\w.]+\]``:? ?(with )?", "", text)
+    text = summary(cls)
+    if text.startswith("``["):  # the section's own name, which stands above
+        text = text.partition("]``")[2].removeprefix(":").strip().removeprefix("with ")
     return _cell(text[:1].upper() + text[1:])
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from fecontact.core.checks import require_frame_rate, require_scale
 from fecontact.core.errors import (
@@ -14,6 +14,7 @@ from fecontact.core.errors import (
     require_positive,
 )
 from fecontact.core.tables import located
+from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.points import Patch
@@ -55,7 +56,7 @@ class BodySettings:
     youngs_modulus: float | None = None
     poisson_ratio: float | None = None
     density: float | None = None
-    thickness: float = 1.0
+    thickness: Annotated[float, Unit("m")] = 1.0
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
     fixed: Mapping[str, Support] = field(default_factory=dict)
@@ -154,7 +155,8 @@ class BasisSettings:
     damping: float | tuple[float, ...] | Rayleigh | Loss = 0.0
     reduction: Literal["vibration", "residual", "craig-bampton"] = "vibration"
     tolerance: float = 0.1
-    dashpots: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    dashpots: Annotated[Mapping[str, tuple[float, float]], Unit("N s/m")] = field(
+        default_factory=dict)
     select: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -219,12 +221,12 @@ class SimulationSettings:
         motion.
     """
 
-    t_end: float | None = None
-    t_start: float = 0.0
+    t_end: Annotated[float | None, Unit("s")] = None
+    t_start: Annotated[float, Unit("s")] = 0.0
     outputs: int = 1001
     solver: str = "rodas5p"
     rtol: float = 1e-6
-    max_step: float | None = None
+    max_step: Annotated[float | None, Unit("s")] = None
     restitution: float | None = None
     static_coefficient: float | None = None
     scheme: str | None = None
@@ -308,8 +310,8 @@ class RenderSettings:
     colour: Literal["displacement", "von_mises"] = "displacement"
     scale: float | None = None
     title: str | None = None
-    t_start: float | None = None
-    t_end: float | None = None
+    t_start: Annotated[float | None, Unit("s")] = None
+    t_end: Annotated[float | None, Unit("s")] = None
 
     def __post_init__(self) -> None:
         if self.frames < 1:

@@ -1,4 +1,4 @@
-"""A whole study in one TOML file: from the geometry to the run and its pictures."""
+"""Studies: TOML files that describe everything from the geometry to the run and its plots."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -299,7 +299,8 @@ class Study(Summarised):
         return contact_system(self, self.modal_basis(), _title(self.path))
 
     def run(
-        self, progress: Callable[[float], None] | None = None, checkpoint: Path | None = None
+        self, progress: bool | Callable[[float], None] | None = None,
+        checkpoint: Path | None = None,
     ) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
 

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from numbers import Real
 from types import NoneType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, require_positive
+from fecontact.core.units import Unit
 
 _SUMMARIES = ("largest_displacement", "stick_fraction", "mean_normal_force", "peak_normal_force",
               "friction_power")
@@ -203,8 +204,8 @@ class SweepSettings:
     samples: int | None = None
     seed: int = 0
     summaries: tuple[str, ...] = _SUMMARIES
-    t_start: float | None = None
-    wear_coefficient: float | None = None
+    t_start: Annotated[float | None, Unit("s")] = None
+    wear_coefficient: Annotated[float | None, Unit("m^3/J")] = None
     keep: Literal["none", "histories", "fields"] = "none"
     batch: int | None = None
     strobe: Strobing | None = None

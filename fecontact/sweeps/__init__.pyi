@@ -1,8 +1,9 @@
 from .executors import dask_executor
-from .statistics import SobolIndices, sobol_indices, statistics
+from .statistics import Estimate, SobolIndices, sobol_indices, statistics
 from .table import SweepTable
 
 __all__ = [
+    "Estimate",
     "SobolIndices",
     "SweepTable",
     "dask_executor",

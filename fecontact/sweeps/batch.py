@@ -1,4 +1,4 @@
-"""What a worker does: a batch of cases, one after the other, into rows of numbers.
+"""Batches, the unit of work of a worker: cases go in, rows of numbers come out.
 
 A batch is all that goes to a worker and rows are all that come back, so that any executor will
 do. Workers import neither Gmsh nor VTK nor matplotlib, unless they are to make meshes.
@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
-from fecontact.core.atomic_write import unwritable
 from fecontact.core.dotted_parameters import with_parameters
 from fecontact.core.errors import AnalysisError, FecontactError, ModelWarning
+from fecontact.core.files.atomic_write import unwritable
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.output.files.hdf5 import read_basis

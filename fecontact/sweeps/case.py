@@ -1,4 +1,4 @@
-"""A case of a sweep, and what is kept of it."""
+"""A case of a sweep, and its row of results."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

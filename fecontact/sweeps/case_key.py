@@ -1,4 +1,4 @@
-"""How a case is known: by the hash of all that its numbers follow from."""
+"""Keys of cases: hashes of everything that their results depend on."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""Giving work to an executor and taking results from it, whatever happens to its workers."""
+"""Dispatch of jobs to an executor; jobs of workers that die are submitted again."""
 
 import queue
 from collections import deque

@@ -1,4 +1,4 @@
-"""Where batches are computed: processes on this machine, a Dask cluster, any other executor."""
+"""Executors of batches: processes on this machine, a Dask cluster, or any other."""
 
 import contextlib
 import multiprocessing

@@ -1,4 +1,4 @@
-"""Modal bases of a sweep: computed once where several batches share one, kept, sent along."""
+"""Modal bases that several batches share: computed once, stored, sent to the workers."""
 
 import pickle
 from collections import Counter

@@ -1,14 +1,13 @@
-"""What drawn samples say: moments, quantiles and Sobol indices, with confidence intervals."""
+"""Statistics of drawn samples: moments, quantiles and Sobol indices, with confidence intervals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.sweeps.table import SweepTable
 
 QUANTILES = (0.05, 0.5, 0.95)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fecontact.core.atomic_write import clear_leftovers, replaced
-from fecontact.core.locks import locked
-from fecontact.core.stored import DamagedError, from_json, reading
+from fecontact.core.files.atomic_write import clear_leftovers, replaced
+from fecontact.core.files.locks import locked
+from fecontact.core.files.stored import DamagedError, from_json, reading
 from fecontact.output.files.hdf5 import write_basis
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.sweeps.batch import case_file

@@ -1,4 +1,4 @@
-"""Cases of which only states once per period are kept: batches as compiled ensembles."""
+"""Stroboscopic sweeps: only states once per period are kept, batches are compiled ensembles."""
 
 from collections.abc import Callable, Sequence
 

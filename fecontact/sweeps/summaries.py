@@ -1,4 +1,4 @@
-"""Numbers that say what a run was like: plain functions of a :class:`Trajectory`.
+"""Summaries of a run: scalar functions of a :class:`Trajectory`.
 
 Each is known by a name, to study files and in the columns of a sweep's table. ``NAME@POINT`` asks
 for another point than the usual one: ``amplitude_x@C``, ``amplitude_y@0`` for the first contact
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.docstrings import summary
 from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.user_code import user_function
@@ -34,7 +35,7 @@ class Summary:
     @property
     def text(self) -> str:
         """What it is, for people."""
-        return (inspect.getdoc(self.function) or "").partition("\n")[0]
+        return summary(self.function)
 
 
 def summarise(

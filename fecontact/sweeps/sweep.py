@@ -1,4 +1,4 @@
-"""Many cases of a study on all cores, or on a cluster, kept so that none is computed twice."""
+"""Sweeps: many cases of a study on all cores or a cluster, stored so that they can be resumed."""
 
 import contextlib
 from collections import deque
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import FecontactError, InputError
+from fecontact.core.progress import shown
 from fecontact.core.tables import from_table, plain, require_known, to_table
 from fecontact.core.types import Array
 from fecontact.study.study import Study
@@ -21,6 +22,7 @@ from fecontact.sweeps.case_key import case_keys
 from fecontact.sweeps.dispatch import LostError, results
 from fecontact.sweeps.executors import opened, worker_count
 from fecontact.sweeps.plan import Plan, plan
+from fecontact.sweeps.progress import sweep_bar
 from fecontact.sweeps.shared_bases import Bases
 from fecontact.sweeps.store import Store, write_whole
 from fecontact.sweeps.summaries import functions_for
@@ -41,7 +43,7 @@ def sweep(
     overwrite: bool = False,
     retry: bool = False,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: bool | Progress | None = None,
     **settings: Any,
 ) -> SweepTable:
     """Run many cases of a study.
@@ -74,8 +76,9 @@ def sweep(
         Compute cases again that have failed.
     workers : int, optional
         Number of processes on this machine; as many as cores by default.
-    progress : callable, optional
-        Called with the numbers of cases that are done, that failed and of all.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is called with the
+        numbers of cases that are done, that failed and of all.
     **settings
         Other values for the keys of ``[sweep]``; see
         :class:`~fecontact.study.sweep_section.SweepSettings`.
@@ -124,7 +127,8 @@ def sweep(
             rows = {key: row for key, row in rows.items() if not row["reason"]}
         finished = False
         try:
-            _compute(work, store, rows, executor, workers, progress)
+            with shown(progress, sweep_bar) as tell:
+                _compute(work, store, rows, executor, workers, tell)
             finished = True
         except FecontactError as error:
             done = sum(case.key in rows for case in work.cases)
@@ -228,7 +232,7 @@ def _settings(
 
 @contextlib.contextmanager
 def _folder(folder: Path) -> Iterator[None]:
-    from fecontact.core.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder
 
     with output_folder(folder):
         yield

@@ -1,4 +1,4 @@
-"""A contact system as the compiled kernels take it."""
+"""Arrays of a contact system, as its compiled kernels take them."""
 
 from collections.abc import Iterable
 from typing import Any

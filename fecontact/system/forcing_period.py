@@ -1,4 +1,4 @@
-"""The period of what a contact system is given in time."""
+"""Period of the excitation of a contact system."""
 
 from typing import Any
 

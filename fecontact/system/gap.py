@@ -1,12 +1,21 @@
-"""The body's own distance from flat ground, before anything moves."""
+"""Gap between the undeformed contact face and flat ground."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.checks import as_floats, is_numeric
+from fecontact.core.errors import (
+    FecontactError,
+    InputError,
+    require_finite,
+    require_positive,
+    shown,
+)
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 
 
 @dataclass(frozen=True)
@@ -29,11 +38,12 @@ class Crown:
         For a radius that is not positive, and when it is used, one that a contact node exceeds.
     """
 
-    radius: float
-    centre: float = 0.0
+    radius: Annotated[float, Unit("m")]
+    centre: Annotated[float, Unit("m")] = 0.0
 
     def __post_init__(self) -> None:
         require_positive("Crown", radius=self.radius)
+        require_finite("Crown", centre=self.centre)
 
     def __call__(self, x: Array) -> Array:
         """Gap [m] at abscissae x [m]; InputError beyond the circle."""
@@ -56,12 +66,18 @@ def gap_values(gap: Gap, abscissae: Array) -> float | tuple[float, ...]:
     InputError
         For another number of values than nodes, or a value that is negative or not finite.
     """
-    given = gap(abscissae) if callable(gap) else gap
     try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"gap = {given!r} must be a number, one per contact node, or a function "
-                         f"of x.") from None
+        given = gap(abscissae) if callable(gap) else gap
+    except FecontactError:
+        raise
+    except Exception as error:
+        raise InputError(f"gap: the function of x fails for the abscissae of the contact nodes "
+                         f"({type(error).__name__}: {error}); it must take an array (n,) and give "
+                         f"as many gaps.") from None
+    if not is_numeric(given):
+        raise InputError(f"gap = {shown(given)} must be a number, one per contact node, or a "
+                         f"function of x.")
+    values = as_floats(given, "gap")
     if values.shape not in ((), abscissae.shape):
         raise InputError(f"gap has {values.size} values for {abscissae.size} contact nodes; give "
                          f"one number, one per node, or a function of x.")

@@ -1,4 +1,4 @@
-"""Where a motion leaves what the model holds for: small displacements, shallow penetration.
+"""Limits of the model: small displacements, shallow penetration.
 
 A wrong unit, or a load that nothing carries, shows in these first.
 """

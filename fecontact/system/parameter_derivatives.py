@@ -1,4 +1,4 @@
-"""Compiled derivatives of a contact system's equations to one of its parameters.
+"""Compiled derivatives of a contact system's equations with respect to a parameter.
 
 What the equations are linear in, or differentiate by themselves, goes by the chain rule; only a law
 whose own parameters move is differenced, at the state and the forces as they are. The system is

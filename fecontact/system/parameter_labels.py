@@ -1,4 +1,4 @@
-"""Labels of parameters with their units, from the docstrings of the classes that have them."""
+"""Labels of parameters with their units, from the annotations of the classes that have them."""
 
 import re
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from dataclasses import is_dataclass
 from functools import cache
 from typing import Any, get_args, get_type_hints
 
-from fecontact.core.docstrings import documented
+from fecontact.core.units import Unit
 from fecontact.laws.registry import is_kind, law_names
 from fecontact.system.contact_system import ContactSystem
 
@@ -30,14 +30,17 @@ def _units(owner: type) -> dict[str, frozenset[str]]:
     for entry, hint in get_type_hints(owner).items():
         section = entry.removesuffix("_settings")
         for place, cls in _classes(hint, section):
-            for names, meaning in documented(cls):
-                units = re.findall(r"\[([^\]]+)\]", meaning)
-                if len(units) != len(names):
-                    units = len(names) * (units if len(units) == 1 else [""])
-                for name, unit in zip(names, units, strict=True):
-                    found.setdefault(f"{place}.{name}", set()).add(unit)
+            for name, unit in _units_of(cls).items():
+                found.setdefault(f"{place}.{name}", set()).add(unit)
     return {place: frozenset(units) - {""} if "" not in units else frozenset()
             for place, units in found.items()}
+
+
+def _units_of(cls: type) -> dict[str, str]:
+    """Units that the annotations of a class's fields name; empty for fields without one."""
+    return {name: next((item.symbol for item in getattr(hint, "__metadata__", ())
+                        if isinstance(item, Unit)), "")
+            for name, hint in get_type_hints(cls, include_extras=True).items()}
 
 
 def _classes(hint: Any, place: str) -> Iterator[tuple[str, type]]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError
+from fecontact.core.errors import AnalysisError, require_finite
 from fecontact.core.types import Array
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
@@ -58,6 +58,7 @@ def static_equilibrium(
         hundred times the height of its roughness.
     """
     require_kind("static_equilibrium", ContactSystem, system=system)
+    require_finite("static_equilibrium", time=time)
     q = equilibrium(system, friction, time)
     state = np.concatenate([q, np.zeros(system.size - len(q))])
     warn_of_limits(limits_exceeded(system, np.array([time]), state[None]), "In equilibrium")

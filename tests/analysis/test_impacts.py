@@ -28,7 +28,7 @@ def ball(normal, nodes=1, weight=0.0, **parts):
     rows = np.zeros((nodes, 3, 1))
     rows[:, 1] = 1.0
     basis = basis_from_matrices([[MASS]], [[0.0]], {"contact": rows, "B": rows[0],
-                                                         "C": rows[0]})
+                                                    "C": rows[0]})
     return ContactSystem(basis, normal=normal, load=Load(weight), **parts)
 
 
@@ -100,7 +100,7 @@ def test_bouncing_ball_comes_to_rest():
     rests = find_rests(run, longer_than=0.01)
     assert len(rests) == 1
     assert rests[0].at_rest == pytest.approx(
-        fall * (1.0 + RESTITUTION) / (1.0 - RESTITUTION), rel=0.02)
+        fall * (1.0 + RESTITUTION) / (1.0 - RESTITUTION), rel=1e-3)
     assert rests[0].touch_down <= rests[0].at_rest
     assert np.isnan(rests[0].lift_off)
     assert rests[0].impacts == len(found)
@@ -236,7 +236,7 @@ def test_chatter_of_the_pendulum_comes_to_rest_once_a_period():
     rests = find_rests(late)
     # The last rest may have been cut off by the end of the run.
     assert len(rests) in (5, 6)
-    assert np.diff([rest.lift_off for rest in rests[:5]]) == pytest.approx(period, rel=0.1)
+    assert np.diff([rest.lift_off for rest in rests[:5]]) == pytest.approx(period, rel=0.04)
     for rest in rests[1:5]:
         assert rest.impacts >= 5
         assert rest.touch_down < rest.at_rest < rest.lift_off

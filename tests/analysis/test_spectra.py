@@ -67,6 +67,8 @@ def test_spectrogram_follows_a_rising_frequency():
     # The frequency sweeps over 5 Hz in a piece of resolution 4 Hz: peaks are a little lower.
     assert found.values.max(axis=0) == pytest.approx(1.0 + found.time, rel=0.08)
     assert np.diff(found.time) == pytest.approx(0.0625, abs=1.1e-3)
+    steady = spectrogram(T, 3.0 * np.sin(2.0 * np.pi * 60.0 * T), piece=0.25)
+    assert steady.values.max(axis=0) == pytest.approx(3.0, rel=1e-9)
 
 
 def test_uneven_times_are_refused_or_resampled():
@@ -79,7 +81,7 @@ def test_uneven_times_are_refused_or_resampled():
     assert peak.value == pytest.approx(1.0, rel=1e-3)
     t, same = evenly_sampled(T + 100.0, x)
     assert t == pytest.approx(T + 100.0)
-    assert same is not None
+    assert (same == x).all()
     # Two parts, each even, are not even together.
     with pytest.raises(InputError, match="even ones"):
         evenly_sampled(np.concatenate([[0.0], 1.0 + T]), np.zeros(4002))

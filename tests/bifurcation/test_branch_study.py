@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fecontact import InputError, Study, simulate
+from fecontact.bifurcation import BranchSettings
 from fecontact.bifurcation import diagram as module
 from fecontact.bifurcation.diagram import follow_branches
-from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.cli import execute
 from fecontact.io import read_branch, read_branches, write_branches
 

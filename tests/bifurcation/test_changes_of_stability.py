@@ -35,7 +35,7 @@ def assert_explained(branch, unresolved=0):
     reached = None
     for point in branch.points:
         if point.kind == "unresolved":
-            reached = {point.details["unstable_after"]}
+            reached = {point.unstable_after}
         elif point.kind is not None:
             reached = {count + change for count in reached for change in CHANGES[point.kind]}
         else:
@@ -108,8 +108,8 @@ def test_crossings_that_no_test_tells_apart_are_marked():
     branch = equilibrium_branch(field, parameter="p", bounds=(-0.3, 0.4))
     assert_explained(branch, unresolved=1)
     mark, = branch.special
-    assert (mark.details["unstable_before"], mark.details["unstable_after"]) == (0, 4)
-    assert abs(mark.parameter) <= mark.details["parameter_error"] < 1e-6
+    assert (mark.unstable_before, mark.unstable_after) == (0, 4)
+    assert abs(mark.parameter) <= mark.parameter_error < 1e-6
 
 
 def test_undamped_flutter_is_marked():
@@ -143,7 +143,7 @@ def test_orbits_whose_multipliers_cross_together():
                           method=Collocation(intervals=10), bounds=(-0.3, 0.3), scales=np.ones(6))
     assert_explained(branch, unresolved=1)
     mark, = branch.special
-    assert abs(mark.parameter) <= mark.details["parameter_error"] < 1e-6
+    assert abs(mark.parameter) <= mark.parameter_error < 1e-6
 
 
 @pytest.mark.parametrize(("values", "name", "bounds", "direction"), [
@@ -156,7 +156,9 @@ def test_orbits_of_two_masses(values, name, bounds, direction):
     field = two_masses_field(**values)
     sliding = equilibrium_branch(field, np.zeros(4), name, bounds=bounds, direction=direction)
     assert_explained(sliding)
-    for hopf in sliding.of_kind("Hopf"):
+    hopfs = sliding.of_kind("Hopf")
+    assert len(hopfs) == 2
+    for hopf in hopfs:
         branch = orbit_branch(field, hopf, method=Collocation(intervals=30), bounds=bounds,
                               options=ContinuationOptions(step=0.005, points=120))
         assert branch.special

@@ -9,9 +9,9 @@ from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
     PeriodicMotion,
+    codim2_curve,
     equilibrium_branch,
     find_equilibrium,
-    hopf_curve,
     orbit_branch,
     vector_field,
 )
@@ -136,9 +136,9 @@ def assert_none_unmarked(orbits, folder):
     """Special points of the mesh alone are marked, in the table and in files too."""
     assert {point.kind for point in orbits.special} == {"unresolved"}
     marked = [point for point in read_branch(write_branch(folder / "branch.h5", orbits)).special
-              if "instead_of" in point.details]
+              if point.instead_of is not None]
     assert marked
-    assert {point.details["instead_of"] for point in marked} <= {"fold", "branch point"}
+    assert {point.instead_of for point in marked} <= {"fold", "branch point"}
     remarks = list(special_table(orbits).columns[-1].cells)
     assert sum("not on finer ones" in remark for remark in remarks) == len(marked)
 
@@ -169,7 +169,7 @@ def test_a_conservative_family_has_no_special_points():
     field = vector_field(pendulum, {"a": 0.1}, 2)
     rest = equilibrium_branch(field, parameter="a", bounds=(-0.5, 0.5), direction=-1.0)
     centre, = rest.of_kind("Hopf")
-    assert centre.details["criticality"] == "undecided"
+    assert centre.criticality == "undecided"
     orbits = orbit_branch(field, centre, method=Collocation(intervals=50), bounds=(-0.5, 0.5),
                           options=ContinuationOptions(points=100))
     assert np.abs(orbits.parameter).max() < 1e-8
@@ -186,8 +186,8 @@ def test_terms_that_cancel_decide_nothing():
     """Lotka's equations have closed orbits only: l1 is zero, its terms are of the order of one."""
     field = vector_field(lotka, {"a": -0.1}, 2)
     point, = equilibrium_branch(field, [1.0, 1.0], "a", bounds=(-0.3, 0.3)).of_kind("Hopf")
-    assert abs(point.details["first_lyapunov"]) < 1e-12
-    assert point.details["criticality"] == "undecided"
+    assert abs(point.first_lyapunov) < 1e-12
+    assert point.criticality == "undecided"
 
 
 def takens(t, x, p, out):
@@ -200,9 +200,9 @@ def test_two_states_have_no_zero_hopf_point(k):
     field = vector_field(takens, {"b": -1.0 - 0.013 * k, "c": 1.5}, 2)
     rest = equilibrium_branch(field, [-np.sqrt(1.0 + 0.013 * k), 0.0], "c", bounds=(0.2, 1.9),
                               direction=-1.0)
-    curve = hopf_curve(field, ("c", "b"), rest.of_kind("Hopf")[0],
-                       bounds={"c": (-2.0, 2.0), "b": (-3.0, 1.0)},
-                       options=ContinuationOptions(points=200, largest_step=0.02 + 0.003 * k))
+    curve = codim2_curve(field, rest.of_kind("Hopf")[0], "b",
+                         bounds={"c": (-2.0, 2.0), "b": (-3.0, 1.0)},
+                         options=ContinuationOptions(points=200, largest_step=0.02 + 0.003 * k))
     assert [point.kind for point in curve.special] == ["Bogdanov-Takens"]
 
 

@@ -6,6 +6,7 @@ import pytest
 from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.points import details_of
 from fecontact.bifurcation.continuation.pseudo_arclength import Problem, continuation
 from fecontact.io import read_branch, write_branch
 
@@ -215,7 +216,7 @@ def test_files(tmp_path):
             return {"x": u[0], "mesh": np.arange(3 + int(u[0] > 0.0)), "pair": u[0] + 1j}
 
         def examine(self, kind, u, linearisation, tangent):
-            return {"vector": np.array([1.0, 2j]), "note": "as expected"}
+            return {"null_vector": np.array([1.0, 2j]), "note": "as expected"}
 
     branch = continue_branch(Ragged(CUBIC.function, CUBIC.slopes), np.array([-1.2, -0.5]),
                              ContinuationOptions(bounds=(-1.0, 1.0)), name="p",
@@ -229,9 +230,11 @@ def test_files(tmp_path):
         assert mine.kind == theirs.kind
         assert mine.values["pair"] == theirs.values["pair"]
         assert mine.values["mesh"].tolist() == theirs.values["mesh"].tolist()
-        assert mine.details.keys() == theirs.details.keys()
-    assert found.of_kind("fold")[0].details["note"] == "as expected"
-    assert found.of_kind("fold")[0].details["vector"].tolist() == [1.0, 2j]
+        assert type(mine) is type(theirs)
+        assert details_of(mine).keys() == details_of(theirs).keys()
+    fold = found.of_kind("fold")[0]
+    assert fold.null_vector.tolist() == [1.0, 2j]
+    assert details_of(fold)["note"] == "as expected"
     assert found.attributes["who"] == ["a", "b"]
     with pytest.raises(InputError, match="stores no value 'y'; it has: 'mesh', 'pair', 'x'"):
         branch.column("y")

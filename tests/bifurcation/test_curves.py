@@ -8,11 +8,11 @@ from fecontact import InputError
 from fecontact.bifurcation import (
     BranchStatus,
     ContinuationOptions,
-    Equilibrium,
+    DoubleHopfPoint,
+    ZeroHopfPoint,
+    codim2_curve,
     equilibrium_branch,
     find_equilibrium,
-    fold_curve,
-    hopf_curve,
     vector_field,
 )
 
@@ -41,7 +41,7 @@ def bautin(t, x, p, out):
 def test_bogdanov_takens():
     field = vector_field(takens, {"b": -1.0, "c": -1.0}, 2)
     branch = equilibrium_branch(field, [-0.6, 0.0], "b", bounds=(-2.0, 2.0))
-    hopf = hopf_curve(field, ("b", "c"), branch.of_kind("Hopf")[0], bounds=BOX)
+    hopf = codim2_curve(field, branch.of_kind("Hopf")[0], "c", bounds=BOX)
     assert hopf.status is BranchStatus.STOPPED
     end, = hopf.of_kind("Bogdanov-Takens")
     assert [end.values["b"], end.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-10)
@@ -50,7 +50,7 @@ def test_bogdanov_takens():
     assert hopf.column("b") == pytest.approx(np.zeros(len(hopf)), abs=1e-12)
     w = 2.0 * np.pi * hopf.column("frequency_hz")
     assert w**2 == pytest.approx(-hopf.column("c"), abs=1e-12)
-    fold = fold_curve(field, ("b", "c"), branch.of_kind("fold")[0], bounds=BOX)
+    fold = codim2_curve(field, branch.of_kind("fold")[0], "c", bounds=BOX)
     assert fold.column("b") == pytest.approx(0.25 * fold.column("c") ** 2, abs=1e-12)
     assert sorted([fold.points[0].values["c"], fold.points[-1].values["c"]]) == pytest.approx(
         [-2.0, 2.0], rel=1e-12)
@@ -62,7 +62,7 @@ def test_bogdanov_takens():
 def test_cusp():
     field = vector_field(cusp, {"b": -1.0, "c": 1.0}, 1)
     branch = equilibrium_branch(field, [-1.5], "b", bounds=(-2.0, 2.0))
-    curve = fold_curve(field, ("b", "c"), branch.of_kind("fold")[0], bounds=BOX)
+    curve = codim2_curve(field, branch.of_kind("fold")[0], "c", bounds=BOX)
     assert 27.0 * curve.column("b") ** 2 == pytest.approx(4.0 * curve.column("c") ** 3, abs=1e-10)
     point, = curve.special
     assert point.kind == "cusp"
@@ -74,7 +74,7 @@ def test_cusp():
 def test_bautin():
     field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
     start, = equilibrium_branch(field, parameter="b", bounds=(-2.0, 2.0)).of_kind("Hopf")
-    curve = hopf_curve(field, ("b", "c"), start, bounds=BOX)
+    curve = codim2_curve(field, start, "c", bounds=BOX)
     point, = curve.special
     assert point.kind == "Bautin"
     assert [point.values["b"], point.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-9)
@@ -88,10 +88,10 @@ def test_a_curve_starts_with_the_parameters_of_its_point():
     start, = equilibrium_branch(field, find_equilibrium(field, {"c": 0.5}), "b",
                                 bounds=(-2.0, 2.0)).of_kind("Hopf")
     assert start.first_lyapunov == pytest.approx(1.0, rel=1e-8)
-    curve = hopf_curve(field, ("b", "c"), start, options=ContinuationOptions(points=3), both=False)
+    curve = codim2_curve(field, start, "c", options=ContinuationOptions(points=3), both=False)
     assert curve.points[0].values["c"] == pytest.approx(0.5, abs=1e-12)
     with pytest.raises(InputError, match="is on no branch of equilibria or orbits"):
-        hopf_curve(field, ("b", "c"), curve.points[0])
+        curve.points[0].parameter_values(field)
 
 
 def zero_hopf(t, x, p, out):
@@ -111,20 +111,22 @@ def test_zero_hopf_and_double_hopf():
     field = vector_field(zero_hopf, {"a": 0.25, "b": 0.3}, 3)
     branch = equilibrium_branch(field, [0.5, 0.0, 0.0], "a", bounds=(-1.0, 1.0), direction=-1.0)
     box = {"a": (-1.0, 1.0), "b": (-1.0, 1.0)}
-    folds = fold_curve(field, ("a", "b"), branch.of_kind("fold")[0], bounds=box)
+    folds = codim2_curve(field, branch.of_kind("fold")[0], "b", bounds=box)
     point, = folds.special
-    assert point.kind == "zero-Hopf"
+    assert isinstance(point, ZeroHopfPoint)
     assert [point.values["a"], point.values["b"]] == pytest.approx([0.0, 0.0], abs=1e-10)
-    assert point.details["frequency_hz"] == pytest.approx(3.0 / (2.0 * np.pi), rel=1e-10)
-    curve = hopf_curve(field, ("a", "b"), branch.of_kind("Hopf")[0], bounds=box)
+    assert point.frequency_hz == pytest.approx(3.0 / (2.0 * np.pi), rel=1e-10)
+    curve = codim2_curve(field, branch.of_kind("Hopf")[0], "b", bounds=box)
     assert curve.column("a") == pytest.approx(curve.column("b") ** 2, abs=1e-12)
-    assert "zero-Hopf" in [point.kind for point in curve.special]
+    assert curve.of_kind("zero-Hopf")[0].frequency_hz == pytest.approx(1.5 / np.pi, rel=1e-9)
     field = vector_field(double_hopf, {"a": -1.0, "b": -0.5}, 4)
     start, = equilibrium_branch(field, parameter="a", bounds=(-1.0, 1.0)).of_kind("Hopf")
-    curve = hopf_curve(field, ("a", "b"), start, bounds=box)
+    curve = codim2_curve(field, start, "b", bounds=box)
     point, = curve.of_kind("double Hopf")
+    assert isinstance(point, DoubleHopfPoint)
+    assert point.frequency_hz == pytest.approx(0.5 / np.pi, rel=1e-9)
     assert point.values["b"] == pytest.approx(0.0, abs=1e-10)
-    assert point.details["second_frequency_hz"] == pytest.approx(1.0 / np.pi, rel=1e-9)
+    assert point.second_frequency_hz == pytest.approx(1.0 / np.pi, rel=1e-9)
     assert curve.column("unstable_besides")[[0, -1]].tolist() in ([0, 2], [2, 0])
 
 
@@ -141,7 +143,7 @@ def test_border_of_steady_sliding_in_force_and_speed():
     box = {"B": (0.0, 30.0), "ground.speed": (0.5, 3.0)}
     bautin_points = []
     for start in branch.of_kind("Hopf"):
-        curve = hopf_curve(field, ("B", "ground.speed"), start, bounds=box)
+        curve = codim2_curve(field, start, "ground.speed", bounds=box)
         B, speed = curve.column("B"), curve.column("ground.speed")
         assert (B.min() < 7.5) & (B.max() == pytest.approx(30.0, rel=1e-12))
         assert speed.min() == pytest.approx(0.5, rel=1e-12)
@@ -159,8 +161,8 @@ def test_lorenz_border():
     """Hopf points rho = sigma (sigma + b + 3) / (sigma - b - 1)."""
     field = lorenz_field()
     start = equilibrium_branch(field, [1.0, 1.0, 1.0], "rho", bounds=(1.5, 30.0)).of_kind("Hopf")[0]
-    curve = hopf_curve(field, ("rho", "sigma"), start,
-                       bounds={"rho": (1.0, 60.0), "sigma": (4.0, 40.0)})
+    curve = codim2_curve(field, start, "sigma",
+                         bounds={"rho": (1.0, 60.0), "sigma": (4.0, 40.0)})
     sigma, b = curve.column("sigma"), 8.0 / 3.0
     assert curve.column("rho") == pytest.approx(sigma * (sigma + b + 3.0) / (sigma - b - 1.0),
                                                 rel=1e-9)
@@ -168,13 +170,40 @@ def test_lorenz_border():
     assert (curve.column("first_lyapunov") > 0.0).all()
 
 
+def test_a_start_on_a_bound_of_the_second_parameter():
+    """From c = 1 the Hopf points b = 0 go down to c = -2, and not beyond the bound c = 1."""
+    field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
+    start, = equilibrium_branch(field, parameter="b", bounds=(-2.0, 2.0)).of_kind("Hopf")
+    curve = codim2_curve(field, start, "c", bounds={"c": (-2.0, 1.0)})
+    assert (curve.status, curve.parameter_names) == (BranchStatus.BOUND, ("b", "c"))
+    c = curve.column("c")
+    assert c[[0, -1]] == pytest.approx([-2.0, 1.0], rel=1e-9)
+    assert (np.diff(c) > 0.0).all()
+    outside = codim2_curve(field, start, "c", bounds={"c": (-2.0, 1.0)}, both=False)
+    assert (outside.status, len(outside)) == (BranchStatus.BOUND, 1)
+    inwards = codim2_curve(field, start, "c", bounds={"c": (-2.0, 1.0)}, both=False, direction=-1.0)
+    assert inwards.column("c")[[0, -1]] == pytest.approx([1.0, -2.0], rel=1e-12)
+    with pytest.raises(InputError, match="start lies at c = 1, outside its bounds, -2 to 0"):
+        codim2_curve(field, start, "c", bounds={"c": (-2.0, 0.0)})
+
+
 def test_kind_errors():
     field = two_mass_field(0.5)
-    start = Equilibrium(field, field.values, np.zeros(4))
-    with pytest.raises(InputError, match="two different parameters, not 'B' twice"):
-        hopf_curve(field, ("B", "B"), start)
+    branch = equilibrium_branch(field, parameter="B", bounds=(0.0, 12.0))
+    start = branch.of_kind("Hopf")[0]
+    with pytest.raises(InputError, match="parameter = 'B' is that of the branch; name another"):
+        codim2_curve(field, start, "B")
     with pytest.raises(InputError, match=r"bounds are given for 'v', .*: 'B', 'ground\.speed'"):
-        hopf_curve(field, ("B", "ground.speed"), start, bounds={"v": (0.0, 1.0)})
-    plain = vector_field(cusp, {"b": -1.0, "c": 1.0}, 1)
-    with pytest.raises(InputError, match="all eigenvalues are real"):
-        hopf_curve(plain, ("b", "c"), Equilibrium(plain, plain.values, np.zeros(1)))
+        codim2_curve(field, start, "ground.speed", bounds={"v": (0.0, 1.0)})
+    with pytest.raises(InputError, match=r"bounds\['B'\] = \(2, 1\) must be two values"):
+        codim2_curve(field, start, "ground.speed", bounds={"B": (2, 1)})
+    with pytest.raises(InputError, match=r"\(a regular point\) starts no curve; take a point of"):
+        codim2_curve(field, branch.points[0], "ground.speed")
+    plain = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
+    start, = equilibrium_branch(plain, parameter="b", bounds=(-2.0, 2.0)).of_kind("Hopf")
+    with pytest.raises(InputError, match="no Hopf point of this field: all eigenvalues are real"):
+        codim2_curve(vector_field(still, {"b": -1.0, "c": 1.0}, 2), start, "c")
+
+
+def still(t, x, p, out):
+    out[0], out[1] = -x[0], p[1] - x[1]

@@ -85,7 +85,7 @@ def test_predator_and_prey():
     hopf, = both.of_kind("Hopf")
     assert hopf.parameter == pytest.approx(0.671594, abs=6e-7)
     assert hopf.u[:2] == pytest.approx([1.0 / 3.0, 0.365762], abs=6e-7)
-    alone = replace(crossing, details={})
+    alone = replace(crossing, _details={})
     with pytest.raises(InputError, match=r"p1 = 0\.821904 \(branch point\) has no other_tangent"):
         equilibrium_branch(field, alone)
 
@@ -161,10 +161,10 @@ def test_two_masses_over_the_normal_force():
     for point in branch.special:
         h = 1e-5
         growth = [np.min(np.abs(np.linalg.eigvals(two_mass_jacobian(B, 1.0))
-                                - (1j * point.details["angular_frequency"] + 1.0)))
+                                - (1j * point.angular_frequency + 1.0)))
                   for B in (point.parameter - h, point.parameter + h)]
         slope = (growth[0] - growth[1]) / (2.0 * h)
-        assert point.details["crossing_speed"] == pytest.approx(slope, rel=1e-6)
+        assert point.crossing_speed == pytest.approx(slope, rel=1e-6)
     assert branch.status is BranchStatus.BOUND
     assert len(branch) < 120
 

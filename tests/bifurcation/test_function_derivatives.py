@@ -210,7 +210,7 @@ def test_normal_form_and_multipliers_with_powers():
     rest = equilibrium_branch(field, parameter="mu", bounds=(-0.3, 0.5))
     point, = rest.of_kind("Hopf")
     assert point.parameter == pytest.approx(0.0, abs=1e-10)
-    assert point.details["first_lyapunov"] == pytest.approx(-0.75, rel=1e-6)
+    assert point.first_lyapunov == pytest.approx(-0.75, rel=1e-6)
     orbits = orbit_branch(field, point, method=Collocation(intervals=30), bounds=(-0.3, 0.5))
     last = orbits.points[-1]
     assert last.parameter == pytest.approx(0.5, abs=1e-9)

@@ -40,7 +40,7 @@ def test_lorenz_cascade(lorenz, asymmetric):
         point, = branch.of_kind("period doubling")
         assert point.parameter == pytest.approx(rho, abs=6e-4)
         assert point.values["period"] == pytest.approx(period, rel=2e-6)
-        assert point.details["criticality"] == "supercritical"
+        assert point.criticality == "supercritical"
         assert point.values["trivial_error"] < 1e-10
         if rho > 217.0:
             branch = orbit_branch(lorenz, point, bounds=(215.0, 230.0),
@@ -122,7 +122,7 @@ def test_two_masses_further_doublings(masses, first):
     branch, intervals = first, 100
     for B in (9.26, 9.37):
         point = branch.of_kind("period doubling")[0]
-        assert point.details["criticality"] == "supercritical"
+        assert point.criticality == "supercritical"
         intervals = min(2 * intervals, 200)
         branch = orbit_branch(masses, point, method=Collocation(intervals=intervals),
                               bounds=(8.0, 9.6),
@@ -136,7 +136,7 @@ def test_two_masses_coexisting_branch(masses, sliding):
     branch = orbit_branch(masses, hopf, method=Collocation(intervals=80), bounds=(0.3, 9.6))
     doublings = branch.of_kind("period doubling")
     assert doublings[-1].parameter == pytest.approx(7.25, abs=5e-3)
-    assert doublings[-1].details["criticality"] == "subcritical"
+    assert doublings[-1].criticality == "subcritical"
     # From there on the orbits are stable, beside those of the first branch.
     assert branch.points[-1].values["unstable"] == 0
 
@@ -206,8 +206,8 @@ def test_normal_form_of_a_doubling(c):
     point, = branch.special
     assert point.kind == "period doubling"
     assert point.parameter == pytest.approx(0.0, abs=1e-10)
-    assert point.details["coefficient"] == pytest.approx(c * np.pi / 1.08, rel=1e-4)
-    assert point.details["criticality"] == ("supercritical" if c < 0.0 else "subcritical")
+    assert point.coefficient == pytest.approx(c * np.pi / 1.08, rel=1e-4)
+    assert point.criticality == ("supercritical" if c < 0.0 else "subcritical")
 
 
 @pytest.mark.parametrize("c", [-0.7, 0.4])
@@ -216,10 +216,10 @@ def test_normal_form_of_a_torus(c):
     point, = branch.special
     assert point.kind == "Neimark-Sacker"
     assert point.parameter == pytest.approx(0.0, abs=1e-10)
-    assert point.details["angle"] == pytest.approx(0.7 * np.pi, rel=1e-8)
-    assert point.details["coefficient"] == pytest.approx(
+    assert point.angle == pytest.approx(0.7 * np.pi, rel=1e-8)
+    assert point.coefficient == pytest.approx(
         2.0 * c * np.pi / (1.0 + (0.5 / 0.7) ** 2 / 2.0), rel=1e-4)
-    assert point.details["criticality"] == ("supercritical" if c < 0.0 else "subcritical")
+    assert point.criticality == ("supercritical" if c < 0.0 else "subcritical")
 
 
 def test_kind_errors(masses, sliding, first):

@@ -9,9 +9,9 @@ from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
     PeriodicMotion,
+    codim2_curve,
     equilibrium_branch,
     orbit_branch,
-    orbit_curve,
     vector_field,
 )
 
@@ -33,8 +33,8 @@ def masses():
 def test_curve_agrees_with_branches(masses, kind, second, tolerance):
     field, branch = masses
     start, = branch.of_kind(kind)
-    curve = orbit_curve(field, start, second, bounds=(0.2, 20.0),
-                        options=ContinuationOptions(step=0.005, largest_step=0.03, points=12))
+    curve = codim2_curve(field, start, second, bounds={"B": (0.2, 20.0)}, both=False,
+                         options=ContinuationOptions(step=0.005, largest_step=0.03, points=12))
     assert len(curve) == 12
     assert curve.parameter[0] == pytest.approx(start.parameter, rel=tolerance)
     end = curve.points[-1]
@@ -63,8 +63,9 @@ def test_curve_of_tori():
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
                           method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     point, = branch.of_kind("Neimark-Sacker")
-    curve = orbit_curve(field, point, "a", direction=-1.0, bounds=(-0.1, 0.5),
-                        options=ContinuationOptions(points=30), width=1.0)
+    curve = codim2_curve(field, point, "a", direction=-1.0, both=False,
+                         bounds={"lam": (-0.1, 0.5), "a": (-0.5, 0.5)},
+                         options=ContinuationOptions(points=30))
     assert curve.parameter == pytest.approx(curve.column("a") ** 2, abs=1e-9)
     # It goes through the turning point a = 0, and on.
     assert curve.column("a").min() < -0.1
@@ -101,8 +102,8 @@ def test_cusp_of_cycles():
     folds = branch.of_kind("fold")
     assert sorted(at.parameter for at in folds) == pytest.approx(
         [-2.0 * 0.1**1.5, 2.0 * 0.1**1.5], rel=1e-8)
-    curve = orbit_curve(field, folds[0], "q", both=True, bounds=(-0.2, 0.2), width=1.0,
-                        options=ContinuationOptions(largest_step=0.03, points=60))
+    curve = codim2_curve(field, folds[0], "q", bounds={"p": (-0.2, 0.2), "q": (-0.5, 0.5)},
+                         options=ContinuationOptions(largest_step=0.03, points=60))
     p, q = curve.parameter, curve.column("q")
     assert p**2 == pytest.approx(4.0 * (q / 3.0) ** 3, abs=1e-9)
     assert p.min() < -0.1
@@ -133,7 +134,10 @@ def test_generalised_period_doubling():
                           method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     point, = branch.of_kind("period doubling")
     assert point.parameter == pytest.approx(-0.15, abs=1e-9)
-    curve = orbit_curve(field, point, "k", bounds=(-0.3, 0.15), width=1.0)
+    curve = codim2_curve(field, point, "k", bounds={"lam": (-0.3, 0.15), "k": (-0.6, 0.4)})
+    assert curve.parameter_names == ("lam", "k")
+    # It ends on the bounds of both parameters, one to each side.
+    assert [curve.parameter[-1], curve.column("k")[0]] == pytest.approx([0.12, -0.6], rel=1e-9)
     assert curve.parameter == pytest.approx(0.3 * curve.column("k"), abs=1e-9)
     found, = curve.special
     assert found.kind == "generalised period doubling"
@@ -157,7 +161,8 @@ def test_strong_resonances():
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
                           method=Collocation(intervals=16), bounds=(0.3, 0.9), scales=np.ones(3))
     point, = branch.of_kind("Neimark-Sacker")
-    curve = orbit_curve(field, point, "nu", direction=-1.0, bounds=(0.3, 0.9), width=1.0)
+    curve = codim2_curve(field, point, "nu", direction=-1.0, both=False,
+                         bounds={"lam": (0.3, 0.9), "nu": (0.0, 1.0)})
     assert [(at.kind, at.values["nu"]) for at in curve.special] == [
         ("resonance 1:3", pytest.approx(2.0 / 3.0, abs=1e-8)),
         ("resonance 1:4", pytest.approx(0.5, abs=1e-8))]
@@ -165,10 +170,10 @@ def test_strong_resonances():
 
 def test_kind_errors(masses):
     field, branch = masses
-    with pytest.raises(InputError, match="starts no curve; curves start at 'fold'"):
-        orbit_curve(field, branch.points[3], "v0")
+    with pytest.raises(InputError, match="starts no curve; take a point of the kind 'fold'"):
+        codim2_curve(field, branch.points[3], "v0")
     fold, = branch.of_kind("fold")
     with pytest.raises(InputError, match="no parameter 'speed'"):
-        orbit_curve(field, fold, "speed")
-    with pytest.raises(InputError, match="second = 'B' is the parameter of the branch"):
-        orbit_curve(field, fold, "B")
+        codim2_curve(field, fold, "speed")
+    with pytest.raises(InputError, match="parameter = 'B' is that of the branch"):
+        codim2_curve(field, fold, "B")

@@ -1,6 +1,7 @@
 """Special points and events on branches of orbits: their places, coefficients, and their errors."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -37,11 +38,10 @@ def circle_branch(function, c, intervals):
 def test_error_of_a_coefficient_in_closed_form(function, coefficient, intervals):
     """On two intervals of a circle already the errors stated hold, of coefficient and place."""
     point, = circle_branch(function, 0.4, intervals).special
-    details = point.details
-    assert details["criticality"] == "subcritical"
-    assert abs(details["coefficient"] - coefficient) <= 1.5 * details["coefficient_error"]
-    assert details["coefficient_error"] < 0.02 * coefficient
-    assert abs(point.parameter) <= 1.5 * details["parameter_error"] + 1e-10
+    assert point.criticality == "subcritical"
+    assert abs(point.coefficient - coefficient) <= 1.5 * point.coefficient_error
+    assert point.coefficient_error < 0.02 * coefficient
+    assert abs(point.parameter) <= 1.5 * point.parameter_error + 1e-10
 
 
 @pytest.mark.parametrize(("coefficient", "error", "expected"), [
@@ -73,17 +73,16 @@ def slow_doubling():
 def test_criticality_is_that_of_finer_meshes_or_undecided(slow_doubling, intervals):
     """From 400 intervals on the coefficient is 0.382 to 0.387; on 60 it is 43, on 100 1.2."""
     point = slow_doubling(intervals)
-    details = point.details
-    assert abs(point.parameter - 0.04009165) <= 1.2 * details["parameter_error"] + 1e-8
+    assert abs(point.parameter - 0.04009165) <= 1.2 * point.parameter_error + 1e-8
     if intervals == 40:  # from mesh to mesh it moves farther than it is looked for
         assert point.kind == "unresolved"
-        assert details["instead_of"] == "period doubling"
+        assert point.instead_of == "period doubling"
         return
-    assert details["criticality"] in ("undecided", "subcritical")
+    assert point.criticality in ("undecided", "subcritical")
     if intervals >= 60:
-        assert details["criticality"] == "subcritical"
-        assert details["coefficient"] == pytest.approx(0.3822, abs=details["coefficient_error"])
-        assert details["coefficient_error"] < 0.06
+        assert point.criticality == "subcritical"
+        assert point.coefficient == pytest.approx(0.3822, abs=point.coefficient_error)
+        assert point.coefficient_error < 0.06
 
 
 @pytest.fixture(scope="module")
@@ -102,13 +101,13 @@ def test_points_on_sharp_turns_are_found_again(second):
     assert fold.parameter == pytest.approx(2.5394064336, abs=1e-9)
     doublings = second.of_kind("period doubling")
     for point, wanted in zip(doublings, (2.5385714591, 2.3468776149), strict=True):
-        error = point.details["parameter_error"]
+        error = point.parameter_error
         # The steps before it double rounding again and again: its mesh, and with it the error on
         # 50 intervals, between 1e-10 and 3e-8, depends on the last digit of the scales.
         assert error < 1e-7
         assert abs(point.parameter - wanted) <= 1.2 * error + 1e-10
-        assert point.details["criticality"] == "subcritical"
-    assert all(point.details.get("located", True) for point in second.special)
+        assert point.criticality == "subcritical"
+    assert all(point.located for point in second.special)
 
 
 def test_points_that_are_not_found_again_say_so(tmp_path, monkeypatch):
@@ -118,23 +117,23 @@ def test_points_that_are_not_found_again_say_so(tmp_path, monkeypatch):
     branch = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=(0.3, 9.6),
                           options=ContinuationOptions(step=0.005))
     for point, exact in zip(branch.special, (0.890686833, 8.0921923845), strict=True):
-        assert not point.details["located"]
-        assert abs(point.parameter - exact) < point.details["parameter_error"]
+        assert not point.located
+        assert abs(point.parameter - exact) < point.parameter_error
     assert [point.kind for point in branch.special] == ["unresolved", "unresolved"]
-    assert [point.details["instead_of"] for point in branch.special] == ["fold", "period doubling"]
+    assert [point.instead_of for point in branch.special] == ["fold", "period doubling"]
     loaded = read_branch(write_branch(tmp_path / "branch.h5", branch))
     for mine, theirs in zip(branch.special, loaded.special, strict=True):
-        assert theirs.details["located"] is False
-        assert theirs.details["parameter_error"] == mine.details["parameter_error"]
-    observed = [type(point)(point.u, point.tangent, {**point.values, "observed_minimum": 0.0,
-                "observed_maximum": 0.0, "observed_amplitude": 0.0}, point.kind, point.details)
+        assert not theirs.located
+        assert theirs.parameter_error == mine.parameter_error
+    observed = [replace(point, values={**point.values, "observed_minimum": 0.0,
+                                       "observed_maximum": 0.0, "observed_amplitude": 0.0})
                 for point in branch.special]
     shown = Branch("B", tuple(observed))
     rows = list(csv.DictReader(branches_csv({"orbits": shown}).splitlines()))
     assert [float(row["parameter_error"]) for row in rows] == [
-        point.details["parameter_error"] for point in branch.special]
+        point.parameter_error for point in branch.special]
     columns = [list(column.cells) for column in special_table(shown).columns]
-    assert f"known to {branch.special[0].details['parameter_error']:.1g} only" in columns[-1][0]
+    assert f"known to {branch.special[0].parameter_error:.1g} only" in columns[-1][0]
     assert "period doubling on this mesh, not on finer ones" in columns[-1][1]
 
 
@@ -146,14 +145,14 @@ def test_doublings_of_a_mesh_too_coarse_are_marked():
                           bounds=(0.3, 9.6), options=ContinuationOptions(step=0.005))
     fold, *others = branch.special
     assert fold.kind == "fold"
-    assert abs(fold.parameter - 0.890686833041) <= 1.2 * fold.details["parameter_error"] < 1e-4
+    assert abs(fold.parameter - 0.890686833041) <= 1.2 * fold.parameter_error < 1e-4
     assert others
     for point in others:
         if point.kind == "period doubling":
-            assert abs(point.parameter - 8.0921923845) <= 1.2 * point.details["parameter_error"]
+            assert abs(point.parameter - 8.0921923845) <= 1.2 * point.parameter_error
         else:
             assert point.kind == "unresolved"
-            assert point.details["instead_of"] == "period doubling"
+            assert point.instead_of == "period doubling"
 
 
 def swirl(t, x, p, out):

@@ -11,12 +11,12 @@ from tiny_study import TINY
 
 from fecontact import InputError
 from fecontact.cli import execute
-from fecontact.core.locks import locked
+from fecontact.core.files.locks import locked
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from fecontact.core.locks import locked
+from fecontact.core.files.locks import locked
 with locked(Path(sys.argv[1]), "taken"):
     print("held", flush=True)
     time.sleep(60.0)
@@ -74,7 +74,7 @@ def test_locks_are_held_by_one_at_a_time(tmp_path):
     script = ("import sys, time\n"
               "from pathlib import Path\n"
               "from fecontact.core.errors import InputError\n"
-              "from fecontact.core.locks import locked\n"
+              "from fecontact.core.files.locks import locked\n"
               "count, done = Path(sys.argv[1]), 0\n"
               "while done < 50:\n"
               "    try:\n"

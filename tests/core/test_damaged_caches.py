@@ -4,11 +4,13 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from unittest import mock
 
+import numba
 import pytest
 
-import fecontact
-from fecontact.core import compiled
+from fecontact.core import compiled, simd
+from fecontact.core.simd import WIDTH
 
 MODULE = '''
 from fecontact.core.compiled import compile_law, f8, kernel
@@ -94,8 +96,70 @@ def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path):
     assert hits(tmp_path) == ["0", "0"]
 
 
-def test_compiled_code_is_known_by_all_sources_that_it_calls():
-    """Else a changed law or helper would leave the code of kernels in other files as it was."""
-    package = Path(fecontact.__file__).parent
-    reached = compiled._imported(package / "system" / "kernels.py")
-    assert {package / "laws" / "signatures.py", package / "core" / "compiled.py"} <= reached
+HELPERS = '''
+from numba import njit
+
+FACTOR = 2.0
+
+
+@njit
+def scaled(x):
+    """Scale a number."""
+    return FACTOR * x
+'''
+CALLING = '''
+import helpers
+from fecontact.core.compiled import f8, helper, kernel
+
+
+@helper
+def shifted(x):
+    return helpers.scaled(x) + 1.0
+
+
+@kernel(f8(f8))
+def outer(x):
+    return shifted(x)
+
+
+print(*outer.stats.cache_hits.values() or [0], outer(3.0))
+'''
+
+
+@pytest.mark.parametrize(("old", "new", "result"), [
+    ("FACTOR = 2.0", "FACTOR = 3.0", ["0", "10.0"]),
+    ("FACTOR * x", "FACTOR - x", ["0", "0.0"]),
+    ("Scale a number.", "A longer docstring,\n\n    with lines.", ["1", "7.0"]),
+    ("FACTOR = 2.0", "# A comment.\nFACTOR = 2.0", ["1", "7.0"]),
+])
+def test_code_is_compiled_again_if_anything_changes_that_it_calls(tmp_path, old, new, result):
+    """Else a changed helper would leave the code of kernels in other files as it was."""
+    assert old in HELPERS
+    (tmp_path / "own_kernels.py").write_text(CALLING)
+    (tmp_path / "helpers.py").write_text(HELPERS)
+    assert hits(tmp_path) == ["0", "7.0"]
+    assert hits(tmp_path) == ["1", "7.0"]
+    (tmp_path / "helpers.py").write_text(HELPERS.replace(old, new))
+    for path in (tmp_path / "__pycache__").glob("helpers.*.pyc"):
+        path.unlink()  # Python would take it for that of the new file, of the same size and second
+    assert hits(tmp_path) == result
+
+
+def _outer(x):
+    return x + WIDTH
+
+
+def test_digest_depends_on_options_and_is_that_of_any_copy():
+    digest = compiled.source_digest(compiled.helper(_outer))
+    assert compiled.source_digest(compiled.helper(_outer)) == digest
+    assert compiled.source_digest(numba.njit(_outer)) != digest
+
+
+def test_intrinsics_count_with_their_whole_file():
+    """Operators on their values are overloads, which no kernel names."""
+    digest = compiled.source_digest(simd.read)
+    source = Path(simd.__file__).read_bytes()
+    with mock.patch.object(Path, "read_bytes", return_value=source + b"# more"):
+        compiled._own_digest.cache_clear()
+        assert compiled.source_digest(simd.read) != digest
+    compiled._own_digest.cache_clear()

@@ -16,11 +16,11 @@ from synthetic import basis, run
 
 from fecontact import Beam, InputError, generate, read_case, render, write_case, write_mesh
 from fecontact.cli import execute
-from fecontact.core import atomic_write
-from fecontact.core.atomic_write import clear_leftovers, replaced, replaced_folder
+from fecontact.core.files import atomic_write
+from fecontact.core.files.atomic_write import clear_leftovers, replaced, replaced_folder
 from fecontact.io import export_csv, export_pvd
 from fecontact.output.files.hdf5 import new_file
-from fecontact.output.render.offscreen import can_render
+from fecontact.plot import rendering_problem
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="locks and limits of Linux")
 
@@ -115,7 +115,7 @@ def test_only_files_are_replaced(tmp_path):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from fecontact.core.atomic_write import replaced, replaced_folder
+from fecontact.core.files.atomic_write import replaced, replaced_folder
 with (replaced_folder if sys.argv[2] == "folder" else replaced)(Path(sys.argv[1])) as part:
     (part / "x" if part.is_dir() else part).write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -138,7 +138,8 @@ def test_leftovers_of_killed_processes_are_cleared_and_no_others(tmp_path):
     with replaced(tmp_path / "a.txt") as part:
         # While it is written, another process neither clears it nor is kept from writing.
         clear_leftovers(tmp_path)
-        in_process("import sys; from pathlib import Path; from fecontact.core import atomic_write\n"
+        in_process("import sys; from pathlib import Path\n"
+                   "from fecontact.core.files import atomic_write\n"
                    "atomic_write.clear_leftovers(Path(sys.argv[1]))\n"
                    "with atomic_write.replaced(sys.argv[1] + '/a.txt') as part:\n"
                    "    part.write_text('of another process')", tmp_path)
@@ -156,7 +157,7 @@ def test_a_folder_whose_replacing_was_cut_short_comes_back(tmp_path):
     code = """
         import os, signal, sys
         from pathlib import Path
-        from fecontact.core import atomic_write
+        from fecontact.core.files import atomic_write
         real = os.replace
         def stop(source, target):
             real(source, target)
@@ -201,7 +202,7 @@ def test_many_writers_of_one_name(tmp_path):
     assert listed(tmp_path) == ["a.txt"]
 
 
-@pytest.mark.skipif(can_render() is not None, reason=str(can_render()))
+@pytest.mark.skipif(rendering_problem() is not None, reason=str(rendering_problem()))
 def test_pictures_and_frames_leave_what_is_not_theirs(tmp_path):
     trajectory = run(basis(columns=4, rows=2), times=5)
     for name in ("pics.part", "frames.old", "frames.part", "run.part"):

@@ -27,8 +27,8 @@ def test_runs_are_those_of_single_runs_bit_for_bit():
         assert run.statistics["steps"] == steps
         # The energy balance of a full run shortens some steps.
         full = simulate(system, 0.6, initial=state, outputs=times, rtol=1e-9)
-        assert np.abs(full.states[:3] - got[:3]).max(axis=0) == pytest.approx(
-            0.0, abs=2e-4 * np.abs(full.states).max())
+        off = np.abs(full.states[:3] - got[:3]).max(axis=0)
+        assert (off < 3e-3 * np.abs(full.states).max(axis=0)).all()
 
 
 def test_strobed_motion_repeats_where_the_motion_does():

@@ -185,6 +185,7 @@ def test_kinds_and_functions_that_are_no_events_are_named():
         simulate(drop(), 1.0, initial=np.zeros(2), events=Event(root))
 
 
+@pytest.mark.long
 def test_more_events_than_steps_of_a_piece(tmp_path, monkeypatch):
     """80,000 turning points of a fast oscillator fill the table of events hundreds of times.
 

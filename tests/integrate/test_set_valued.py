@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import friction_oscillator
 
 from fecontact import (
     ContactSystem,
@@ -123,20 +124,8 @@ def test_belt_with_a_jump_from_static_to_kinetic_friction():
     assert imbalance(system, run) < 1e-9
 
 
-def section_4(amplitude=0.0, **friction):
-    row = np.zeros((3, 2))
-    row[0, 0] = row[1, 1] = 1.0
-    basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
-                                {"contact": row[None], "B": row, "C": row})
-    return ContactSystem(
-        basis, normal=RoughSurface(10e6, 10e-6, 40.0), load=Load(14.0),
-        friction=ExponentialFriction(0.8, 0.55, 1000.0, **friction), ground=Ground(speed=1e-3),
-        drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=amplitude,
-                    angular_frequency=13.8))
-
-
 def test_friction_oscillator_without_excitation():
-    system = section_4()
+    system = friction_oscillator(2, **{"drive.amplitude_x": 0.0})
     run = integrate_set_valued(system, start(system, 0.0), np.linspace(0.0, 8.0, 8001), rtol=1e-10)
     assert period(system, run, 1.5e-3) == pytest.approx(1.361213293, rel=1e-9)
     x, rate = along(system, run)
@@ -173,6 +162,7 @@ def test_den_hartog(ratio, beta, amplitude, periods):
     assert 0.5 * np.ptp(x) == pytest.approx(amplitude, rel=2e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ratio", "limit"), [(0.8, 0.8174063857), (1.5, 0.6465790873)])
 def test_den_hartog_stops(ratio, limit):
     for beta, stops in ((limit - 0.004, False), (limit + 0.004, True)):
@@ -274,7 +264,7 @@ def test_mass_lifted_off_a_rigid_stop():
 
 
 def test_cost_of_smoothing():
-    system = section_4(0.5e-3)
+    system = friction_oscillator(2)
     period = 2.0 * np.pi / 13.8
     cost = smoothing_cost(system, 20.0 * period, outputs=4001)
     assert cost.break_away == pytest.approx(0.8, rel=1e-9)
@@ -282,7 +272,8 @@ def test_cost_of_smoothing():
     assert cost.component == "x of B"
     assert 0.2 < cost.orbit_difference < 2.0
     assert "0.8 F_N" in cost.sentence
-    finer = smoothing_cost(section_4(0.5e-3, smoothing_slope=1e8), 20.0 * period, outputs=4001)
+    finer = smoothing_cost(system.with_(**{"friction.smoothing_slope": 1e8}), 20.0 * period,
+                           outputs=4001)
     assert finer.orbit_difference < 0.1 * cost.orbit_difference
 
 
@@ -331,11 +322,11 @@ def test_from_rest_under_point_loads():
     parts = {"normal": LinearContact(1e8), "friction": ConstantFriction(0.3)}
     system = ContactSystem(basis, load=Load(0.0, (
         PointLoad("C", "y", signal=Constant(-14.0)), PointLoad("B", "x", signal=Constant(20.0)))),
-        **parts)
+                           **parts)
     # The same forces through springs so soft that they stay as they are.
     springs = ContactSystem(basis, drive=Drive(
         stiffness_x=1e-6, motion_x=Constant(2e7), stiffness_y=1e-6, motion_y=Constant(-1.4e7)),
-        **parts)
+                            **parts)
     times = np.linspace(0.0, 10.0, 101)
     run, other = (integrate_set_valued(each, np.zeros(4), times, scheme="stepping")
                   for each in (system, springs))

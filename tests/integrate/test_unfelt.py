@@ -25,11 +25,11 @@ from fecontact.laws import (
     HarmonicSpeed,
     LinearContact,
     PrescribedForce,
+    Profile,
     RoughSurface,
     TwoSidedStop,
+    ground_profile,
 )
-from fecontact.laws.ground.profile import Profile
-from fecontact.laws.signatures import ground_profile
 
 UP = np.array([[0.0], [1.0]])
 ALONG = np.array([[1.0], [0.0]])

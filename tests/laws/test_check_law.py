@@ -30,10 +30,10 @@ from fecontact.laws import (
     TwoSidedStop,
     check_law,
     friction_law,
+    law_names,
     memory_friction_law,
     normal_law,
 )
-from fecontact.laws.registry import law_names
 from fecontact.laws.sampling import cycle_work
 
 NEEDED = {

@@ -132,6 +132,7 @@ def test_hopf_point_of_the_friction_oscillator():
     assert speed == pytest.approx(8.424483793e-3, abs=1e-11)
 
 
+@pytest.mark.long
 def test_period_of_leines_oscillator():
     law = HyperbolicFriction(1.0, 0.0, 1.0 / 3.0, smoothing_slope=1e3)
     p = law.table(np.ones(1))[0]

@@ -10,9 +10,15 @@ import numpy as np
 import pytest
 
 from fecontact import Ground, InputError
-from fecontact.laws import Flat, FourierSeries, MeasuredProfile, RandomRoughness, Sine
-from fecontact.laws.ground.profile import Profile
-from fecontact.laws.signatures import ground_profile
+from fecontact.laws import (
+    Flat,
+    FourierSeries,
+    MeasuredProfile,
+    Profile,
+    RandomRoughness,
+    Sine,
+    ground_profile,
+)
 
 RNG = np.random.default_rng(3)
 TRACE_X = np.cumsum(RNG.uniform(0.5e-4, 2e-4, 40)) - 1e-3

@@ -10,7 +10,8 @@ from synthetic import basis, run
 
 from fecontact import InputError, Range, read_case, sweep, write_case
 from fecontact.bifurcation import Branch, BranchPoint, BranchStatus
-from fecontact.core.stored import DamagedError, npz_arrays
+from fecontact.bifurcation.continuation.points import details_of
+from fecontact.core.files.stored import DamagedError, npz_arrays
 from fecontact.integrate import Events
 from fecontact.io import read_basis, read_branches, read_table, write_basis, write_branches
 
@@ -183,7 +184,8 @@ def test_a_damaged_branch_is_one_sentence(change, tmp_path):
     path = write_branches(tmp_path / "b.h5", branches())
     found = read_branches(path)["main"]
     assert [point.kind for point in found.points] == [None, "fold", None, None]
-    assert found.points[1].details == {"coefficient": 3.0}
+    assert details_of(found.points[1]) == {"coefficient": 3.0}
+    assert found.points[1].coefficient == 3.0
     assert np.array_equal(found.column("observed"), 0.2 * np.arange(4))
     with h5py.File(path, "a") as file:
         change(file)

@@ -13,9 +13,10 @@ from fecontact.bifurcation import (
     BranchPoint,
     PoincareScan,
     basins,
+    contact_field,
     poincare_scan,
 )
-from fecontact.plot import Inset, plot_basins, plot_branches
+from fecontact.plot import Inset, phase_inset, plot_basins, plot_branches
 
 
 def orbit(p, section, stable=True):
@@ -43,7 +44,7 @@ def test_sections_over_runs():
 
 
 def test_phase_planes_stand_in_the_order_of_their_places(tmp_path):
-    insets = [Inset(p, 1.0, np.cos(CURVE) * 1e-3, np.sin(CURVE), f"w = {p:g}", p < 2.0)
+    insets = [Inset(orbit(p, [p + 0.5], p < 2.0), np.cos(CURVE) * 1e-3, np.sin(CURVE), f"w = {p:g}")
               for p in (3.0, 1.0)]
     figure = plot_branches([BRANCH], "observed_section", insets=insets)
     _, first, second = figure.axes
@@ -51,9 +52,35 @@ def test_phase_planes_stand_in_the_order_of_their_places(tmp_path):
     assert [axis.lines[0].is_dashed() for axis in (first, second)] == [False, True]
     assert first.lines[0].get_xdata().max() == pytest.approx(1.0)
     assert first.get_xlabel() == "displacement [mm]"
-    assert len(figure.artists) == 2
+    assert [join.xy2 for join in figure.artists] == [(1.0, 1.5), (3.0, 3.5)]
     plot_branches(BRANCH, "observed_section", insets=insets, path=tmp_path / "with_insets.png")
     assert (tmp_path / "with_insets.png").stat().st_size > 10_000
+
+
+def test_phase_plane_of_an_orbit():
+    """y = a cos(w t) is an ellipse with the half axes a and a w."""
+    w, a = 64.0, 2e-4
+    field = contact_field(impact_oscillator(2), {"drive.angular_frequency": None})
+    y = field.displacement_row("B", "y")[:2]
+    t = 2.0 * np.pi / w * np.arange(80) / 80.0
+    q = a * y / (y @ y)
+    nodes = np.concatenate([np.cos(w * t)[:, None] * q, -w * np.sin(w * t)[:, None] * q], axis=1)
+    values = {"mesh": np.linspace(0.0, 1.0, 21), "period": 2.0 * np.pi / w, "stable": False,
+              "minimum": nodes.min(axis=0), "maximum": nodes.max(axis=0)}
+    branch = Branch("drive.angular_frequency", (
+        BranchPoint(np.append(nodes.ravel(), w), np.zeros(nodes.size + 1), values),), attributes={
+            "periods": 1, "degree": 4, "parameter_values": np.array([w])})
+    inset = phase_inset(field, branch.points[0], observe=("B", "y"))
+    assert inset.title == "drive.angular_frequency = 64"
+    assert inset.displacement[0] == pytest.approx(a, rel=1e-12)
+    assert (inset.displacement / a)**2 + (inset.velocity / (a * w))**2 == pytest.approx(
+        np.ones(len(inset.velocity)), abs=1e-5)
+    # It turns clockwise, as every phase plane.
+    assert (np.diff(inset.displacement) * (inset.velocity[:-1] + inset.velocity[1:]) >= 0.0).all()
+    with pytest.raises(InputError, match=r"of an inset, stores no value 'observed_section'"):
+        plot_branches(BRANCH, "observed_section", insets=[inset])
+    with pytest.raises(InputError, match="is no periodic orbit"):
+        phase_inset(field, BRANCH.points[0])
 
 
 def test_maps_of_basins(tmp_path):

@@ -11,19 +11,18 @@ from synthetic import basis, run
 from fecontact import InputError, MissingLibraryError, render
 from fecontact.laws import ConstantFriction
 from fecontact.output.files.frames import frame_indices
-from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render import movie
 from fecontact.output.render import offscreen as probe
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.scene import NODE_COLOURS, Scene, needed_height
-from fecontact.plot import picture
+from fecontact.plot import STATE_COLOURS, picture
 
 SMALL = (480, 270)
 
-rendering = pytest.mark.skipif(probe.can_render() is not None,
-                               reason=str(probe.can_render()))
+rendering = pytest.mark.skipif(probe.rendering_problem() is not None,
+                               reason=str(probe.rendering_problem()))
 
 
 def motion_of(trajectory, frames=50, **options):

@@ -15,7 +15,7 @@ from fecontact.io import export_pvd, write_basis
 from fecontact.output.files import case as store
 from fecontact.output.files import pvd
 from fecontact.output.files.frames import frame_indices, von_mises
-from fecontact.reduction.modal_basis import ModeShapes
+from fecontact.reduction import ModeShapes
 
 LENGTH, HEIGHT = 0.2, 0.02
 

@@ -15,8 +15,7 @@ from fecontact import (
     modal_basis,
 )
 from fecontact.io import AssembledMatrix
-from fecontact.reduction import rows_from_dofs
-from fecontact.reduction.from_modes import normalisation
+from fecontact.reduction import normalisation, rows_from_dofs
 from fecontact.reduction.null_space import null_space, relative_energies
 
 SUPPORTS = {"free": {}, "hinged": {"hinge": "xy"}, "on rollers": {"left": "x"},

@@ -151,7 +151,7 @@ def test_unknown_points(point, message):
     (np.eye(2), np.eye(2), {"damping": -0.1}, "-0.1 must be zero or above"),
     (np.eye(2), np.eye(2), {"damping": [0.1, 0.1, 0.1]}, "2 ratios"),
     (np.eye(2), np.eye(2), {"damping": float("inf")}, "inf is not finite"),
-    (np.eye(2), np.eye(2), {"damping": "light"}, "'light' is not a number"),
+    (np.eye(2), np.eye(2), {"damping": "light"}, "must be real numbers, not 'light'"),
     (np.eye(2), np.eye(2), {"contact_x": [0.0, 1.0]}, "contact_x must have one value .* 1 contact"),
     (np.eye(2), np.eye(2), {"tributary": [1.0, 1.0]}, "tributary must have one value"),
     (np.eye(2), np.eye(2), {"tributary": [0.0]}, "tributary lengths must be above zero"),

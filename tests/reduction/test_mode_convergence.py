@@ -5,7 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 
 from fecontact import ElasticBody, modal_basis
-from fecontact.output.plots.modes import plot_convergence
+from fecontact.plot import plot_convergence
 from fecontact.reduction import BasisReport, mode_convergence
 
 

@@ -9,7 +9,8 @@ import pytest
 from fecontact import Study
 from fecontact.cli import execute
 from fecontact.core.docstrings import documented
-from fecontact.laws.registry import is_kind, law_names
+from fecontact.laws import law_names
+from fecontact.laws.registry import is_kind
 from fecontact.study.reference_page import study_keys
 
 PAGE = Path(__file__).parents[2] / "docs" / "study.md"

@@ -10,7 +10,7 @@ import pytest
 from sweep_study import Serial, files_below, is_alive, write_study
 
 from fecontact import AnalysisError, InputError, Study, read_case, sweep
-from fecontact.core.atomic_write import _MARK
+from fecontact.core.files.atomic_write import _MARK
 from fecontact.io import read_table
 from fecontact.study import Span
 from fecontact.sweeps.batch import UnwritableError, changed
@@ -195,7 +195,7 @@ def test_files_of_cases_are_those_of_single_runs(study, tmp_path):
 
 
 def test_bodies_that_change_are_computed_once_each(study, tmp_path, monkeypatch):
-    from fecontact.study.sections import BasisSettings
+    from fecontact.study import BasisSettings
 
     made = []
     original = BasisSettings.basis

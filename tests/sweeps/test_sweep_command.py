@@ -13,11 +13,11 @@ from sweep_study import Serial, write_study
 from fecontact import InputError, sweep
 from fecontact.cli import execute
 from fecontact.cli.commands import sweep as command
-from fecontact.cli.sweep_progress import clock, note
+from fecontact.core.progress import clock
 from fecontact.io import read_table
 from fecontact.plot import plot_sobol, plot_sweep
-from fecontact.sweeps import SobolIndices, SweepTable, executors, plots
-from fecontact.sweeps.statistics import Estimate
+from fecontact.sweeps import Estimate, SobolIndices, SweepTable, executors, plots
+from fecontact.sweeps.progress import note
 
 SWEEP = """
 [sweep]

@@ -5,6 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 from model_for_tests import Model
 from scipy.optimize import brentq, minimize
+from systems import mass_in_plane
 
 from fecontact import (
     AnalysisError,
@@ -30,13 +31,8 @@ deep = pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 
 
 def mass_point(**parts):
-    """5.632 kg, free in x and y: the oscillator of section 4."""
-    rows = np.zeros((3, 2))
-    rows[0, 0] = rows[1, 1] = 1.0
-    basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
-                                {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": NORMAL,
-                                   "load": Load(14.0), **parts})
+    """The mass of the friction oscillator, without ground motion and drive."""
+    return mass_in_plane(5.632, **{"normal": NORMAL, "load": Load(14.0), **parts})
 
 
 def beam(contact_nodes=8, modes=12, B=(0.0, 0.01), C=(0.1, 0.02), fixed=None, **parts):

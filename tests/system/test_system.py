@@ -18,7 +18,7 @@ from fecontact import (
     basis_from_matrices,
     modal_basis,
 )
-from fecontact.integrate.initial_state import initial_state
+from fecontact.integrate import initial_state
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.system import kernels as kernels
 from fecontact.system.kernels import POWERS, powers
@@ -389,7 +389,9 @@ def test_copies_with_several_changes():
     whole = system.with_(ground=Ground(speed=0.1), drive=Drive())
     assert whole.ground == Ground(speed=0.1)
     assert whole.drive == Drive()
-    assert system.with_() is not None
+    same = system.with_()
+    assert type(same) is ContactSystem
+    assert (same.ground, same.drive, same.gap) == (system.ground, system.drive, system.gap)
 
 
 @pytest.mark.parametrize("order", [1, -1])

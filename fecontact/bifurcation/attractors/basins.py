@@ -1,4 +1,4 @@
-"""Basins of attraction: to which motion a start on a plane of initial states leads."""
+"""Basins of attraction on a plane of initial states."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,11 +6,10 @@ from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing
 from fecontact.system.contact_system import ContactSystem
@@ -102,9 +101,9 @@ def basins(
     tolerance: float = 1e-3,
     rtol: float = 1e-6,
     workers: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: bool | Callable[[int], None] | None = None,
 ) -> Basins:
-    """Run from a grid of initial states, and tell the motions apart that they settle on.
+    """Run from a grid of initial states, and classify the motions on which they settle.
 
     Parameters
     ----------
@@ -209,7 +208,7 @@ def _scale(system: ContactSystem, starts: Array, sets: list[Array | None]) -> Ar
 def _told_apart(
     sets: list[Array | None], still: list[bool], scale: Array, tolerance: float
 ) -> tuple[Integers, tuple[Attractor, ...]]:
-    """Label of each set of points, and the attractors, the most frequent first."""
+    """Label of each set of points, and the attractors by frequency."""
     labels = np.full(len(sets), -1)
     kinds: list[Literal["equilibrium", "periodic", "aperiodic"]] = []
     prototypes: list[Array] = []

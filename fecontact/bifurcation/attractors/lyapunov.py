@@ -1,4 +1,4 @@
-"""Lyapunov exponents: how fast neighbouring motions part."""
+"""Lyapunov exponents: mean growth rates of small differences."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_positive
+from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
@@ -16,7 +17,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
 # Intervals integrated in one call, and blocks for the error of the mean.
-_CALL, _BLOCKS = 256, 10
+_INTERVALS, _BLOCKS = 256, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ def lyapunov_exponents(
     interval: float | None = None,
     count: int = 1,
     rtol: float = 1e-6,
-    progress: Callable[[float], None] | None = None,
+    progress: bool | Callable[[float], None] | None = None,
 ) -> LyapunovExponents:
     r"""Lyapunov exponents from the derivative of the motion to its start.
 
@@ -79,8 +80,9 @@ def lyapunov_exponents(
         Number of exponents.
     rtol : float
         Relative tolerance of the run.
-    progress : callable, optional
-        Called with the time reached [s] now and then.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is called with the time
+        reached [s] now and then.
 
     Raises
     ------
@@ -105,23 +107,24 @@ def lyapunov_exponents(
             interval = min(forcing_period(system), duration)
         except FecontactError:
             interval = duration / 1000.0
-    state, time = initial_state(system, initial, 0.0), 0.0
-    if transient > 0.0:
-        run = start(system, state, np.array([0.0, transient]), rtol=rtol, work=False)
-        _reach_end(finish(run, progress), run.time)
-        state, time = run.states[-1], float(transient)
+    state, time = initial_state(system, initial, 0.0), float(transient)
     steps = max(round(duration / interval), 1)
     instants = time + interval * np.arange(steps + 1)
     Q = np.linalg.qr(np.random.default_rng(0).normal(size=(system.size, count)))[0]
     growth = np.empty((steps, count))
-    for first in range(0, steps, _CALL):
-        piece = instants[first : first + _CALL + 1]
-        run = start(system, state, piece, rtol=rtol, work=False, vary=True)
-        _reach_end(finish(run, progress), run.time)
-        state = run.states[-1]
-        for k, columns in enumerate(run.variation.transitions[1:], first):
-            Q, R = np.linalg.qr(columns.T @ Q)
-            growth[k] = np.log(np.maximum(np.abs(np.diag(R)), np.finfo(float).tiny))
+    with shown(progress, lambda: progress_bar("Lyapunov exponents", instants[-1])) as tell:
+        if transient > 0.0:
+            run = start(system, state, np.array([0.0, transient]), rtol=rtol, work=False)
+            _reach_end(finish(run, tell), run.time)
+            state = run.states[-1]
+        for first in range(0, steps, _INTERVALS):
+            piece = instants[first : first + _INTERVALS + 1]
+            run = start(system, state, piece, rtol=rtol, work=False, vary=True)
+            _reach_end(finish(run, tell), run.time)
+            state = run.states[-1]
+            for k, columns in enumerate(run.variation.transitions[1:], first):
+                Q, R = np.linalg.qr(columns.T @ Q)
+                growth[k] = np.log(np.maximum(np.abs(np.diag(R)), np.finfo(float).tiny))
     times = instants[1:] - time
     history = np.cumsum(growth, axis=0) / times[:, None]
     parts = np.array([part.mean(axis=0) / interval

@@ -1,4 +1,4 @@
-"""Brute force beside continuation: Poincare sections over a parameter, up and down."""
+"""Poincare sections of runs over a parameter, swept up and down."""
 
 import os
 from collections.abc import Callable
@@ -7,11 +7,10 @@ from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensemble import strobe
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
@@ -71,7 +70,7 @@ def poincare_scan(
     chains: int | None = None,
     rtol: float = 1e-5,
     workers: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: bool | Callable[[int], None] | None = None,
 ) -> PoincareScan:
     """Move a parameter up and down in small steps and keep states once per period.
 
@@ -127,7 +126,7 @@ def poincare_scan(
     count = len(points)
     most = chains or min(8 * (os.cpu_count() or 1), max(count // 8, 1))
     length = -(-count // min(most, count))
-    # All chains have the same length: the last values are run twice where they do not divide.
+    # All chains have the same length; where the values do not divide, the last ones are run twice.
     order = np.arange(length * -(-count // length))
     order = np.minimum(order, count - 1)
     both = [order] + ([count - 1 - order] if down else [])

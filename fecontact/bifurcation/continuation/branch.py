@@ -1,4 +1,4 @@
-"""A branch of solutions."""
+"""Branches: solutions in their order over a parameter."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -25,8 +25,8 @@ from fecontact.core.errors import AnalysisError, InputError, choices, require_fi
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, span
 
-# Relative distance from a value of the parameter that counts as there.
-_MET = 1e-9
+# Relative distance within which a value of the parameter is reached.
+_REACHED = 1e-9
 
 __all__ = ["Branch", "BranchStatus"]
 
@@ -44,9 +44,9 @@ class Branch(Summarised):
     status : BranchStatus
         How its forward end was reached.
     message : str
-        What the last failed step complained of; empty without.
+        Error of the last failed step; empty if none failed.
     attributes : mapping
-        What else belongs to the branch: numbers, texts, arrays.
+        Further data of the branch: numbers, texts, arrays.
     """
 
     parameter_name: str
@@ -83,6 +83,11 @@ class Branch(Summarised):
     def parameter(self) -> Array:
         """Parameter (N,) of each point."""
         return np.array([point.parameter for point in self.points])
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Name of the parameter, or of both along a curve over two: (first, second)."""
+        return tuple(self.attributes.get("parameters", (self.parameter_name,)))
 
     @property
     def special(self) -> tuple[BranchPoint, ...]:
@@ -155,15 +160,15 @@ class Branch(Summarised):
         bounds = (-np.inf, float(value)) if start.parameter < value else (float(value), np.inf)
         *_, found = continuation(problem, u, ContinuationOptions(bounds=bounds, locate=False),
                                  tangent=sign * tangent)
-        if abs(found.parameter - value) > _MET * max(abs(value), abs(value - start.parameter)):
+        if abs(found.parameter - value) > _REACHED * max(abs(value), abs(value - start.parameter)):
             raise AnalysisError(f"The solution at {self.parameter_name} = {value:.6g} was not "
                                 f"found from that at {start.parameter:.6g}; follow the branch in "
                                 f"shorter steps there.")
         return on_branch(found, BranchHeader(self.parameter_name, self.attributes))
 
     def _passed(self, value: float) -> list[tuple[int, float]]:
-        """Points from which a value of the parameter is near, and whether it lies before (-1) or
-        behind them (1) along the branch.
+        """Indices of points beside a value of the parameter, with the direction to it along the
+        branch: 1 forwards, -1 backwards.
         """
         found = []
         for index, (here, there) in enumerate(pairwise([*self.points, None])):
@@ -171,7 +176,7 @@ class Branch(Summarised):
             if here.parameter == value:
                 found.append((index, 1.0))
             elif there is not None and (here.parameter - value) * (there.parameter - value) < 0.0:
-                # The direction at a branch point is not defined.
+                # A branch point has no unique tangent: start from its neighbour.
                 found.append((index + 1, -1.0) if here.kind and not there.kind else (index, 1.0))
         return found
 

@@ -1,8 +1,7 @@
-"""How many unstable directions a branch may have behind its special points.
+"""Balance of the unstable directions along a branch.
 
-Along a branch the number of unstable directions, eigenvalues or multipliers, changes at special
-points alone: by one at a fold, by two at a Hopf point. A step whose special points do not explain
-the change has passed over some.
+The number of unstable eigenvalues or multipliers changes at special points alone: by one at a fold,
+by two at a Hopf point. A step whose special points do not explain the change has missed some.
 """
 
 from collections.abc import Container, Iterable
@@ -12,31 +11,28 @@ from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem
 
-# Kind of a point at which the number changes though no test function has a zero.
-UNRESOLVED = "unresolved"
-
-_CHANGES = {"fold": (-1, 1), "branch point": (-1, 0, 1), "period doubling": (-1, 1),
-            "Hopf": (-2, 2), "Neimark-Sacker": (-2, 2)}
-# For the test functions of problems that are not known here.
-_ANY = (-2, -1, 0, 1, 2)
+_CHANGES_AT = {"fold": (-1, 1), "branch point": (-1, 0, 1), "period doubling": (-1, 1),
+               "Hopf": (-2, 2), "Neimark-Sacker": (-2, 2)}
+# Of kinds that a problem of the user defines.
+_CHANGES_AT_OTHERS = (-2, -1, 0, 1, 2)
 
 
 def counted(
     problem: Problem, here: Solution, there: Solution, special: Iterable[BranchPoint],
     events: Container[str],
 ) -> int | None:
-    """Number of unstable directions at the second of two points; None where it is unexplained.
+    """Number of unstable directions at the second of two points; None if it is unexplained.
 
-    It is that of the first one, changed as the special points between the two may change it. Where
-    eigenvalues are too close to the border for their side to be known, of the numbers that agree
-    with them the one counts that is nearest to what was found.
+    It is the number at the first point plus the changes that the special points in between allow.
+    Eigenvalues within rounding of the stability border may lie on either side of it; the admissible
+    number nearest to the computed one is taken.
     """
     if "unstable" not in here.values:
         return 0
     reached = {int(here.values["unstable"])}
     for point in special:
         if point.kind not in events:
-            changes = _CHANGES.get(str(point.kind), _ANY)
+            changes = _CHANGES_AT.get(str(point.kind), _CHANGES_AT_OTHERS)
             reached = {number + change for number in reached for change in changes}
     found = int(there.values["unstable"])
     least, most = problem.unstable_range(there.linearisation, there.values)

@@ -1,4 +1,4 @@
-"""Whole branches, to one side or to both."""
+"""Continuation of a whole branch, to one side or to both."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,6 +8,7 @@ from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import End, continuation, start_of
 from fecontact.core.errors import require_finite
+from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array
 
 
@@ -22,7 +23,7 @@ def continue_branch(
     both: bool = False,
     attributes: dict[str, Any] | None = None,
 ) -> Branch:
-    """The branch through a solution, as far as the options allow; Ctrl-C keeps what is there.
+    """Follow the branch through a solution; Ctrl-C keeps the points computed so far.
 
     Parameters
     ----------
@@ -31,8 +32,8 @@ def continue_branch(
     name : str
         Name of the parameter.
     both : bool
-        Follow it to both sides; the points then go from the one end to the other. From a start on
-        a bound it goes inwards alone.
+        Follow it to both sides; the points then go from one end to the other. From a start on a
+        bound only inwards.
     attributes : dict, optional
         Kept with the branch.
 
@@ -42,10 +43,10 @@ def continue_branch(
         If there is no solution near the start.
     """
     require_finite("A branch", direction=direction)
-    points, end = _collected(problem, u, options, tangent, direction)
+    points, end = _collected(problem, u, options, tangent, direction, name)
     if both and end.status not in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
         start = start_of(problem, u, options, tangent, direction)
-        others, _ = _collected(problem, u, options, -start.tangent, direction)
+        others, _ = _collected(problem, u, options, -start.tangent, direction, name)
         turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
         points = [*turned, *points]
     return Branch(name, tuple(points), end.status, end.message, attributes or {})
@@ -53,18 +54,20 @@ def continue_branch(
 
 def _collected(
     problem: Problem, u: Array, options: ContinuationOptions, tangent: Array | None,
-    direction: float
+    direction: float, name: str,
 ) -> tuple[list[BranchPoint], End]:
     points: list[BranchPoint] = []
     steps = continuation(problem, u, options, tangent=tangent, direction=direction)
-    try:
-        while True:
-            points.append(next(steps))
-            if options.progress is not None:
-                options.progress(len(points))
-    except StopIteration as stop:
-        return points, stop.value
-    except KeyboardInterrupt:
-        if not points:
-            raise
-        return points, End(BranchStatus.INTERRUPTED)
+    with shown(options.progress,
+               lambda: progress_bar(f"Following {name}", options.points)) as tell:
+        try:
+            while True:
+                points.append(next(steps))
+                if tell is not None:
+                    tell(len(points))
+        except StopIteration as stop:
+            return points, stop.value
+        except KeyboardInterrupt:
+            if not points:
+                raise
+            return points, End(BranchStatus.INTERRUPTED)

@@ -1,9 +1,9 @@
-"""Round a turn of a branch that is too sharp for steps along its tangent.
+"""Hairpins: folds too sharp for steps along the tangent.
 
-Two sheets that run side by side and meet in a fold, as slipping and sticking orbits do where they
-touch, leave the tangent no length to step along: the turn is some 1e-7 of the diagram wide. Across
-it the branch is harmless. With n at right angles to the tangent, in the plane in which the branch
-turns, s = <n, u> grows through the whole turn, and u is a smooth function of it, about a parabola.
+Two sheets run side by side and meet in a fold some 1e-7 of the diagram wide, as slipping and
+sticking orbits do. No step along the tangent is short enough there, but the branch is smooth over
+``s = <n, u>``, with n normal to the tangent in the plane in which the branch turns: s grows through
+the whole hairpin, and the branch is nearly a parabola over it.
 """
 
 import numpy as np
@@ -11,34 +11,35 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
-from fecontact.bifurcation.continuation.special_points import locate_between
+from fecontact.bifurcation.continuation.special_points import located_on
+from fecontact.bifurcation.continuation.step import Step
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 
-_TOLERANCE = 1e-9  # of Newton's method, where the sheets are close to each other
-_STRAIGHT = 1e-5  # turn below which there is no telling where the branch turns to [rad]
-# Part of the slope at the beginning by which that of one step may change.
-_CHANGE = 0.4
-_TRIES = 60
+_TOLERANCE = 1e-9  # of Newton's method: both sheets are close to each other
+_LEAST_TURN = 1e-5  # between the last two tangents, to define the plane of the hairpin [rad]
+# Largest change of the slope d<t, u>/ds over one step, relative to the first slope.
+_SLOPE_CHANGE = 0.4
+_STEPS = 60
 
 
-def follow_hairpin(
+def round_hairpin(
     problem: Problem, before: Solution, here: Solution, step: float, options: ContinuationOptions
 ) -> list[tuple[Solution, list[BranchPoint]]] | None:
-    """Points round a sharp turn ahead, up to where it is as far behind, or to a bound.
+    """Points round a hairpin ahead, until it lies ``step`` behind or a bound is met.
 
-    None if there is no such turn.
+    None if there is no hairpin.
 
     Parameters
     ----------
     problem : Problem
         What is continued.
     before, here : Solution
-        The last two points; the plane of the turn is that of their tangents.
+        The last two points; their tangents span the plane of the hairpin.
     step : float
-        Length of the first step, and of the one after which the turn lies behind.
+        Length of the first step along the tangent, and of the last one.
     options : ContinuationOptions
-        How.
+        Of the branch.
 
     Returns
     -------
@@ -49,19 +50,19 @@ def follow_hairpin(
     along = weights * before.tangent
     across = here.tangent - float(along @ here.tangent) * before.tangent
     size = norm(problem, across)
-    if size < _STRAIGHT:
+    if size < _LEAST_TURN:
         return None
     row = weights * across / size
     first = float(along @ here.tangent) / size
     at, slope, length = here, first, step / first
     found: list[tuple[Solution, list[BranchPoint]]] = []
-    for _ in range(_TRIES):
+    for _ in range(_STEPS):
         there = _next(problem, at, row, length, options)
         change = np.inf if there is None else float(along @ there.tangent / (row @ there.tangent))
         change = abs(change - slope) / abs(first)
         reached = None
-        if there is not None and change <= _CHANGE:
-            reached = locate_between(problem, at, there, options, row)
+        if there is not None and change <= _SLOPE_CHANGE:
+            reached = located_on(Step(problem, at, there, options, row))
         if reached is None:
             length *= 0.5
             if length * first < 0.05 * step:
@@ -77,14 +78,14 @@ def follow_hairpin(
             and norm(problem, there.u - at.u) >= step):
             return found
         at, slope = there, float(along @ there.tangent / (row @ there.tangent))
-        length *= min(2.0, 0.7 * _CHANGE / max(change, 1e-3))
+        length *= min(2.0, 0.7 * _SLOPE_CHANGE / max(change, 1e-3))
     return None
 
 
 def _next(
     problem: Problem, at: Solution, row: Array, length: float, options: ContinuationOptions
 ) -> Solution | None:
-    """The solution at a distance along the row; None where there is none to be found."""
+    """The solution at a distance along the row; None if Newton's method fails."""
     guess = at.u + length / float(row @ at.tangent) * at.tangent
     try:
         found = corrected(problem, guess, row, _TOLERANCE, 2 * options.iterations)

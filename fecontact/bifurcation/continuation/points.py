@@ -1,7 +1,8 @@
-"""Points of branches: what each stores, and the kinds of special points.
+"""Points of branches, and the classes of special points.
 
 A point knows the parameter and the attributes of its branch, so that other branches can start from
-it alone.
+it alone. What a method finds at a special point is kept by name in private; each class reads its
+own names as attributes, and files store them all.
 """
 
 from collections.abc import Mapping
@@ -18,10 +19,14 @@ from fecontact.core.types import Array, ComplexArray
 if TYPE_CHECKING:
     from fecontact.bifurcation.orbits.motions import PeriodicMotion
 
+# Kind of a point at which the stability changes though no test function has a zero, or that finer
+# meshes do not have.
+UNRESOLVED = "unresolved"
+
 
 @dataclass(frozen=True, eq=False)
 class BranchHeader:
-    """What belongs to all points of a branch.
+    """Parameter and attributes of a branch, known to all its points.
 
     Attributes
     ----------
@@ -46,21 +51,19 @@ class BranchPoint:
     tangent : (N + 1,) array
         Direction of the branch.
     values : mapping
-        What the problem stores of each solution, such as states and stability.
+        Stored values of the solution, such as state and stability.
     kind : str or None
-        What is special about the point: 'fold', 'Hopf', ...; None for the others.
-    details : mapping
-        What is known of a special point; those of :class:`HopfPoint`, :class:`FoldPoint` and the
-        other kinds are their properties too.
+        What is special about the point: 'fold', 'Hopf', ...; None for the others. On a branch a
+        special point has the class of its kind, such as :class:`HopfPoint`.
     header : BranchHeader or None
-        What belongs to the whole branch; None while the point is on no branch.
+        Parameter and attributes of its branch; None while the point is on no branch.
     """
 
     u: Array
     tangent: Array
     values: Mapping[str, Any] = field(default_factory=dict)
     kind: str | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)
+    _details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     header: BranchHeader | None = field(default=None, repr=False)
 
     @property
@@ -86,7 +89,7 @@ class BranchPoint:
 
     @property
     def branch(self) -> BranchHeader:
-        """What belongs to the whole branch.
+        """Parameter and attributes of the branch.
 
         Raises
         ------
@@ -111,7 +114,7 @@ class BranchPoint:
         """
         require_field(field)
         known, values = self.branch.attributes, field.values
-        if "second" in known or "parameter_values" not in known:
+        if "parameters" in known or "parameter_values" not in known:
             raise InputError(f"{self.place} is on no branch of equilibria or orbits over one "
                              f"parameter.")
         names = known.get("parameter_names", list(field.parameters))
@@ -159,42 +162,54 @@ class BranchPoint:
         periods = int(self.branch.attributes["periods"]) if self.header is not None else 1
         return replace(found, periods=periods, parameter_values=values)
 
-    def _detail(self, name: str) -> Any:
-        if name not in self.details:
-            known = f"; known are {choices(self.details)}" if self.details else ""
-            raise InputError(f"{self.place} has no {name}{known}.")
-        return self.details[name]
+    @property
+    def located(self) -> bool:
+        """Whether a special point was located to the precision of its method.
 
-
-class _LocatedAgain:
-    """Points that are located again on finer meshes."""
+        If not, :attr:`parameter_error` says how far it may be off.
+        """
+        return bool(self._details.get("located", True))
 
     @property
-    def parameter_error(self: Any) -> float:
-        """By how much the parameter changes on finer meshes; of orbits by collocation."""
-        return float(self._detail("parameter_error"))
+    def parameter_error(self) -> float:
+        """Error of a special point's parameter; NaN where it is not estimated.
+
+        On branches of orbits by collocation it is the change of the parameter on finer meshes.
+        """
+        return float(self._details.get("parameter_error", np.nan))
+
+    @property
+    def criticality(self) -> str | None:
+        """'supercritical', 'subcritical' or 'undecided'; None where no normal form tells it.
+
+        It is known at Hopf points, and of orbits by collocation at period doublings and
+        Neimark-Sacker points.
+        """
+        found = self._details.get("criticality")
+        return None if found is None else str(found)
+
+    def _detail(self, name: str) -> Any:
+        if name not in self._details:
+            known = f"; known are {choices(self._details)}" if self._details else ""
+            raise InputError(f"{self.place} has no {name}{known}.")
+        return self._details[name]
 
 
-class _NormalForm:
+class _NormalForm(BranchPoint):
     """Points of orbits whose normal form says where others begin."""
 
     @property
-    def coefficient(self: Any) -> float:
+    def coefficient(self) -> float:
         """Coefficient of the normal form; of orbits by collocation."""
         return float(self._detail("coefficient"))
 
     @property
-    def coefficient_error(self: Any) -> float:
+    def coefficient_error(self) -> float:
         """Error of the coefficient."""
         return float(self._detail("coefficient_error"))
 
-    @property
-    def criticality(self: Any) -> str:
-        """'supercritical', 'subcritical' or 'undecided'; of orbits by collocation."""
-        return str(self._detail("criticality"))
 
-
-class FoldPoint(_LocatedAgain, BranchPoint):
+class FoldPoint(BranchPoint):
     """Where a branch of equilibria or orbits turns."""
 
     @property
@@ -246,17 +261,11 @@ class HopfPoint(BranchPoint):
         """Error of the first Lyapunov coefficient."""
         return float(self._detail("first_lyapunov_error"))
 
-    @property
-    def criticality(self) -> str:
-        """'supercritical', 'subcritical' or 'undecided'."""
-        return str(self._detail("criticality"))
-
-
-class PeriodDoublingPoint(_LocatedAgain, _NormalForm, BranchPoint):
+class PeriodDoublingPoint(_NormalForm):
     """Where orbits of twice the period begin."""
 
 
-class NeimarkSackerPoint(_LocatedAgain, _NormalForm, BranchPoint):
+class NeimarkSackerPoint(_NormalForm):
     """Where a torus is born of an orbit."""
 
     @property
@@ -265,7 +274,7 @@ class NeimarkSackerPoint(_LocatedAgain, _NormalForm, BranchPoint):
         return float(self._detail("angle"))
 
 
-class CrossingPoint(_LocatedAgain, BranchPoint):
+class CrossingPoint(BranchPoint):
     """A branch point: where two branches cross."""
 
     @property
@@ -279,24 +288,83 @@ class CrossingPoint(_LocatedAgain, BranchPoint):
         return np.asarray(self._detail("other_tangent"))
 
 
-class UnresolvedPoint(_LocatedAgain, BranchPoint):
-    """Where the stability changes without a reason that was found, or a mesh is too coarse."""
+class UnresolvedPoint(BranchPoint):
+    """Where the stability changes but no test function has a zero, or the mesh is too coarse."""
 
     @property
     def instead_of(self) -> str | None:
-        """What the point looks like on the mesh of the branch alone."""
-        found = self.details.get("instead_of")
+        """Kind that the point has on the mesh of the branch, but not on finer ones."""
+        found = self._details.get("instead_of")
         return None if found is None else str(found)
+
+    @property
+    def unstable_before(self) -> int:
+        """Number of unstable directions before the point; where no test function has a zero."""
+        return int(self._detail("unstable_before"))
+
+    @property
+    def unstable_after(self) -> int:
+        """Number of unstable directions behind it."""
+        return int(self._detail("unstable_after"))
+
+
+class ZeroHopfPoint(BranchPoint):
+    """Where a curve of folds or Hopf points has both a zero and an imaginary pair."""
+
+    @property
+    def frequency_hz(self) -> float:
+        """Frequency of the pair [Hz]."""
+        return float(self.values["frequency_hz"] if "frequency_hz" in self.values
+                     else self._detail("frequency_hz"))
+
+
+class DoubleHopfPoint(BranchPoint):
+    """Where a curve of Hopf points has a second imaginary pair."""
+
+    @property
+    def frequency_hz(self) -> float:
+        """Frequency of the pair that is followed [Hz]."""
+        return float(self.values["frequency_hz"])
+
+    @property
+    def second_frequency_hz(self) -> float:
+        """Frequency of the other pair [Hz]."""
+        return float(self._detail("second_frequency_hz"))
 
 
 _KINDS: Mapping[str | None, type[BranchPoint]] = {
     "fold": FoldPoint, "Hopf": HopfPoint, "period doubling": PeriodDoublingPoint,
     "Neimark-Sacker": NeimarkSackerPoint, "branch point": CrossingPoint,
-    "unresolved": UnresolvedPoint}
+    UNRESOLVED: UnresolvedPoint, "zero-Hopf": ZeroHopfPoint, "double Hopf": DoubleHopfPoint}
+
+
+def special_point(
+    u: Array, tangent: Array, values: Mapping[str, Any], kind: str | None,
+    details: Mapping[str, Any], header: BranchHeader | None = None,
+) -> BranchPoint:
+    """A point of the class of its kind, with what was found there by name."""
+    return _KINDS.get(kind, BranchPoint)(u, tangent, values, kind, details, header)
 
 
 def on_branch(point: BranchPoint, header: BranchHeader) -> BranchPoint:
     """The point as one of a branch, of the class of its kind."""
     require_kind("A branch", BranchPoint, point=point)
-    return _KINDS.get(point.kind, BranchPoint)(point.u, point.tangent, point.values, point.kind,
-                                               point.details, header)
+    return special_point(point.u, point.tangent, point.values, point.kind, point._details, header)
+
+
+def details_of(point: BranchPoint) -> Mapping[str, Any]:
+    """What was found at a special point by name, for files."""
+    return point._details
+
+
+def with_details(point: BranchPoint, **details: Any) -> BranchPoint:
+    """The point with more, or other, that was found there."""
+    return replace(point, _details={**point._details, **details})
+
+
+def unresolved(point: BranchPoint) -> BranchPoint:
+    """A special point that finer meshes do not have; how well it was located is kept."""
+    kept = {name: value for name, value in point._details.items()
+            if name in ("located", "parameter_error")}
+    return special_point(point.u, point.tangent, point.values, UNRESOLVED,
+                         {**kept, "instead_of": point.kind}, point.header)

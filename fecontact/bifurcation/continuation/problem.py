@@ -1,4 +1,4 @@
-"""What is continued, how, and how it ended."""
+"""Interface of continuation problems, options of a branch, and the status at its end."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -6,17 +6,16 @@ from enum import Enum
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
-_PARALLEL = 0.9  # cosine between directions that count as the same
+_SAME_DIRECTION = 0.9  # cosine between directions that count as the same
 
 
 class BranchStatus(Enum):
-    """How a branch ended; the value is the sentence for people."""
+    """How a branch ended; the value is a sentence to show."""
 
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
@@ -40,15 +39,15 @@ class Linearisation(Protocol):
 
 
 class Problem(Protocol):
-    """What is continued. Subclass it to get the defaults of the optional methods.
+    """Equations G(u) = 0 to be continued. Subclass it; methods with a body are optional.
 
     Attributes
     ----------
     keeps_matrix : bool
-        Whether Newton's method goes on with the matrix that it has as long as that serves; for
-        problems whose factorisation costs far more than a residual and a solution.
+        Whether the corrector reuses its factorised matrix (chord method with Broyden updates); for
+        problems whose factorisation costs far more than a residual and a solve.
     precision : float
-        Part of a step to which special points are located on it.
+        Part of a step to which special points are located.
     event_precision : float
         The same for events.
     confirms : frozenset of str
@@ -62,14 +61,14 @@ class Problem(Protocol):
     confirms: ClassVar[frozenset[str]] = frozenset()
 
     def linearise(self, u: Array) -> Linearisation:
-        """The equations about u.
+        """Linearise the equations at u.
 
-        A FecontactError or values that are not finite make the step fail, and be halved.
+        A FecontactError or values that are not finite make the step fail; it is then halved.
         """
         ...
 
     def evaluate(self, u: Array) -> Linearisation:
-        """The equations about u, of which only the residual will be asked for."""
+        """The equations at u, for the residual alone."""
         return self.linearise(u)
 
     def weights(self) -> Array:
@@ -77,10 +76,10 @@ class Problem(Protocol):
         ...
 
     def point(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, Any]:
-        """What is stored of a solution: numbers, arrays; the same names for each.
+        """Values to store of a solution, numbers and arrays, with the same names for each.
 
-        Where it holds 'unstable', a number of unstable directions, a step is halved whose special
-        points do not explain the change of it.
+        With 'unstable', the number of unstable directions, a step is halved unless its special
+        points explain the change of that number.
         """
         ...
 
@@ -92,29 +91,30 @@ class Problem(Protocol):
         return count, count
 
     def tests(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, float]:
-        """Functions whose zeros are special points, by kind; folds are found without."""
+        """Test functions by kind; special points are their zeros. Folds need none."""
         return {}
 
     def examine(
         self, kind: str, u: Array, linearisation: Linearisation, tangent: Array
     ) -> Mapping[str, Any] | None:
-        """Details of a special point that was located; None if it is none of that kind.
+        """Data of a located special point; None if it is not of that kind after all.
 
-        The key 'kind' replaces the kind.
+        The names are those of the attributes of the kind's class, such as ``criticality`` of
+        :class:`fecontact.bifurcation.HopfPoint`; 'kind' replaces the kind.
         """
         return {}
 
     @property
     def rounding(self) -> float:
-        """Newton steps of this relative size that grow again are rounding."""
+        """Relative size of Newton steps below which growing steps are rounding."""
         return 1e-7
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Where Newton's method begins, a step from u."""
+        """The predictor, a step from u."""
         return u + step * tangent
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
-        """The problem on a better mesh, with u and tangent on it, after each step; None to stay."""
+        """Problem, u and tangent on a new mesh, asked for after each step; None to keep the old."""
         return None
 
     def met_again(
@@ -127,7 +127,7 @@ class Problem(Protocol):
         ``heading`` are those of the point that was reached, on this problem. A start that is
         surely farther from ``like`` than ``within`` need not be given.
         """
-        if len(u) != len(like) or float(self.weights() * heading @ tangent) < _PARALLEL:
+        if len(u) != len(like) or float(self.weights() * heading @ tangent) < _SAME_DIRECTION:
             return None
         return u
 
@@ -141,7 +141,7 @@ class Problem(Protocol):
 
 @dataclass(frozen=True)
 class ContinuationOptions:
-    """How a branch is followed.
+    """Step control, bounds and events of a branch.
 
     Lengths are those of the problem's inner product; the problems of this package scale it so
     that one is the width of the diagram.
@@ -155,21 +155,22 @@ class ContinuationOptions:
     bounds : tuple
         Least and largest value of the parameter; the last point lies on the bound.
     tolerance : float
-        Newton's method ends with a step of this size, relative to 1 + the size of u; what is left
-        then is of the order of its square. Special points and events are located to 1e-10.
+        Newton's method ends with a step of this size relative to 1 + |u|; the remaining error is of
+        the order of its square. Special points and events are located to 1e-10.
     iterations : int
         Newton steps before a step counts as failed.
     largest_turn : float
         Largest angle between tangents of neighbouring points [rad].
     locate : bool
-        Whether special points are located, besides the events, and changes of stability explained.
+        Whether to locate special points, besides the events, and check changes of stability.
     stop_at : sequence of str
-        Kinds of special points, or events, at which the branch ends.
+        Kinds of special points, or names of events, at which the branch ends.
     events : mapping
-        Functions of the stored values (and 'parameter') whose zeros are points of the kind by
-        which they are called.
-    progress : callable, optional
-        Told the number of points after each.
+        Functions by name of the stored values (and 'parameter'); their zeros become points of the
+        kind of that name.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is told the number of
+        points after each.
     """
 
     step: float = 0.01
@@ -183,7 +184,7 @@ class ContinuationOptions:
     locate: bool = True
     stop_at: Iterable[str] = ()
     events: Mapping[str, Callable[[Mapping[str, Any]], float]] = field(default_factory=dict)
-    progress: Callable[[int], None] | None = field(default=None, compare=False)
+    progress: bool | Callable[[int], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         require_positive("ContinuationOptions", step=self.step, smallest_step=self.smallest_step,
@@ -207,14 +208,14 @@ class ContinuationOptions:
 def options_of(
     options: ContinuationOptions | None, bounds: tuple[float, float] | None
 ) -> ContinuationOptions:
-    """The options, with other bounds if these are given."""
+    """The options, default ones if None, with the bounds if given."""
     require_kind("A branch", (ContinuationOptions, type(None)), options=options)
     chosen = options or ContinuationOptions()
     return chosen if bounds is None else replace(chosen, bounds=bounds)
 
 
 def sizes_of(given: ArrayLike | None, found: Array) -> tuple[Array, Array | None]:
-    """Scales (d,) of the states, and up to where they grow with the orbit."""
+    """Scales (d,) of the states, and their upper limits where they grow with the orbit."""
     if given is None:
         return found, 100.0 * found
     sizes = as_floats(given, "scales")

@@ -1,8 +1,8 @@
-"""Pseudo-arclength continuation of the solutions of N equations in N + 1 unknowns.
+"""Pseudo-arclength continuation of G(u) = 0, N equations in N + 1 unknowns.
 
-Solutions G(u) = 0 form branches. From a point on one, a step goes along the tangent and Newton's
-method comes back to the branch at right angles to it. Sizes and angles are those of an inner
-product ``<a, b> = sum w a b`` that the problem gives. The last unknown is the parameter.
+The predictor goes along the tangent, the corrector is Newton's method at right angles to it.
+Lengths and angles are those of the problem's inner product ``<a, b> = sum w a b``. The last unknown
+is the parameter.
 """
 
 from collections.abc import Generator
@@ -10,42 +10,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.crossings import UNRESOLVED
-from fecontact.bifurcation.continuation.hairpin import follow_hairpin
+from fecontact.bifurcation.continuation.hairpin import round_hairpin
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.points import UNRESOLVED, BranchPoint
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
     Linearisation,
     Problem,
 )
-from fecontact.bifurcation.continuation.special_points import hermite, locate_between
+from fecontact.bifurcation.continuation.special_points import located_on
+from fecontact.bifurcation.continuation.step import Step
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array
 
-# Part of the first step below which corners are taken for corners of the branch itself, as contact
-# laws with kinks make them.
-_SHORT = 1e-3
-# So many times a step is halved before a sharp turn is looked for, and each so many times again.
-_PATIENCE = 2
-# Steps go so far beyond a bound of the parameter, in what is left up to it: behind it there may be
-# no motion of the kind that is followed.
-_BEYOND = 1.2
+# Steps shorter than this part of the first one may turn by any angle: contact laws with kinks give
+# branches with corners.
+_CORNER_STEP = 1e-3
+# Try a hairpin after every second halving of a step.
+_HALVINGS = 2
+# Overshoot of a bound by at most this factor: beyond it the motion may not exist.
+_OVERSHOOT = 1.2
 # Relative distance from a bound at which a start lies on it.
 _ON_BOUND = 1e-13
-
-# Distance in the diagram at which the start of a branch, found on another mesh, is met again.
-_AGAIN = 1e-5
-# Solutions whose distance is this many times what Newton's method leaves are the same.
-_ALIKE = 10.0
+# Distance at which the start of a branch, interpolated to another mesh, counts as met again.
+_MET_AGAIN = 1e-5
+# Solutions closer than this many times the error of Newton's method are the same.
+_SAME_SOLUTION = 10.0
 
 __all__ = ["ContinuationOptions", "End", "Linearisation", "Problem", "continuation", "start_of"]
 
 
 @dataclass(frozen=True)
 class End:
-    """How a continuation ended, and what the last failed step complained of."""
+    """How a continuation ended, and the error of the last failed step."""
 
     status: BranchStatus
     message: str = ""
@@ -59,19 +57,19 @@ def continuation(
     tangent: Array | None = None,
     direction: float = 1.0,
 ) -> Generator[BranchPoint, None, End]:
-    """Points of a branch one by one, from a solution (or something near to one) on.
+    """Yield the points of a branch one by one, from a solution or a guess of it.
 
-    Special points come in their places between the regular ones. The generator returns how the
-    branch ended.
+    Special points stand in order between the regular ones. The generator returns the
+    :class:`End` of the branch.
 
     Parameters
     ----------
     problem : Problem
-        What is continued.
+        The equations.
     u : (N + 1,) array
         Start; corrected at right angles to ``tangent``, or at the given parameter.
     options : ContinuationOptions
-        How.
+        Steps, bounds, events.
     tangent : (N + 1,) array, optional
         Direction of the first step.
     direction : float
@@ -92,7 +90,7 @@ def continuation(
     before: Solution | None = None
     halved, whole = 0, step
     while count < options.points:
-        step = min(step, _BEYOND * _room(here, options))
+        step = min(step, _OVERSHOOT * _room(here, options))
         try:
             reached = _step(problem, here, step, options)
         except FecontactError as error:
@@ -100,8 +98,8 @@ def continuation(
         if reached is None:
             whole = step if halved == 0 else whole
             step, halved = 0.5 * step, halved + 1
-            if before is not None and halved % _PATIENCE == 0:
-                reached = follow_hairpin(problem, before, here, step, options)
+            if before is not None and halved % _HALVINGS == 0:
+                reached = round_hairpin(problem, before, here, step, options)
         if reached is None:
             if step < options.smallest_step:
                 return End(BranchStatus.STALLED, message)
@@ -121,7 +119,7 @@ def continuation(
             count += 1
             last, here = here, there
         before = last
-        # Short steps across a change that has no special point are of no use beyond it.
+        # An unresolved change of stability has halved the step; restore its length behind it.
         unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
         step = whole if unresolved else _next_step(problem, last, here, step, options)
         halved = 0
@@ -136,7 +134,7 @@ def continuation(
 
 
 def inside(value: float, options: ContinuationOptions) -> float:
-    """A value of the parameter, moved to the bound that it passes by no more than rounding.
+    """A value of the parameter; one beyond a bound by rounding is moved onto it.
 
     Raises
     ------
@@ -152,7 +150,7 @@ def inside(value: float, options: ContinuationOptions) -> float:
 
 
 def _leaves(start: Solution, options: ContinuationOptions) -> bool:
-    """Whether the branch leaves the bounds of the parameter right where it starts."""
+    """Whether the branch starts on a bound of the parameter and heads outwards."""
     slope, value = float(start.tangent[-1]), float(start.u[-1])
     bound = options.bounds[1] if slope > 0.0 else options.bounds[0]
     ahead = np.copysign(1.0, slope) * (bound - value)
@@ -180,30 +178,31 @@ def start_of(
 def _step(
     problem: Problem, here: Solution, step: float, options: ContinuationOptions
 ) -> list[tuple[Solution, list[BranchPoint]]] | None:
-    """The solution at a step, with the special points before it; None to be tried with less."""
+    """The solution a step ahead, with the special points before it; None if the step fails."""
     row = problem.weights() * here.tangent
     found = corrected(problem, problem.predicted(here.u, here.tangent, step), row,
                       options.tolerance, options.iterations, known=here.linearisation)
     if found is None:
         return None
     there = finished(problem, *found, row, options)
-    short = step < _SHORT * options.step
+    short = step < _CORNER_STEP * options.step
     if not (short or _believable(problem, here, there, options)):
         return None
-    reached = locate_between(problem, here, there, options, row, strict=not short)
+    reached = located_on(Step(problem, here, there, options, row), strict=not short)
     return None if reached is None else [reached]
 
 
 def _room(here: Solution, options: ContinuationOptions) -> float:
-    """Length along the tangent up to a bound of the parameter."""
+    """Length along the tangent to the bound of the parameter ahead."""
     slope = float(here.tangent[-1])
     bound = options.bounds[1] if slope > 0.0 else options.bounds[0]
     return (bound - float(here.u[-1])) / slope if slope != 0.0 else np.inf
 
 
-def _believable(problem: Problem, here: Solution, there: Solution,
-                options: ContinuationOptions) -> bool:
-    """Whether a step does not turn too much."""
+def _believable(
+    problem: Problem, here: Solution, there: Solution, options: ContinuationOptions
+) -> bool:
+    """Whether tangent and chord turn by no more than the largest turn."""
     row = problem.weights() * here.tangent
     chord = there.u - here.u
     return min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) >= np.cos(
@@ -213,7 +212,7 @@ def _believable(problem: Problem, here: Solution, there: Solution,
 def _next_step(
     problem: Problem, here: Solution, there: Solution, step: float, options: ContinuationOptions
 ) -> float:
-    """Longer after quick convergence on a straight piece, shorter after slow."""
+    """Step length from the Newton steps that the last one took, and from the turn on it."""
     factor = {1: 2.0, 2: 2.0, 3: 1.5, 4: 1.1}.get(there.iterations, 0.7)
     turn = np.arccos(min(1.0, float(problem.weights() * here.tangent @ there.tangent)))
     if turn > 0.0:
@@ -228,16 +227,17 @@ def _passes(
     """Whether the start of the branch lies on the step from here to there."""
     weights = problem.weights()
     row = weights * here.tangent
-    length = float(row @ (there.u - here.u))
+    step = Step(problem, here, there, options, row)
+    length = step.length
     away = min(abs(float(start.u[-1] - end.u[-1])) for end in (here, there))
     if away * np.sqrt(weights[-1]) > length:
         return False
     again = problem.met_again(origin, start.u, start.tangent, here.u, here.tangent,
-                              2.0 * length + _AGAIN)
-    if again is None or not 0.0 < (along := float(row @ (again - here.u))) <= length:
+                              2.0 * length + _MET_AGAIN)
+    if again is None or not 0.0 < (along := step.along(again)) <= length:
         return False
-    near = hermite(here, there, along, row)
-    return (norm(problem, again - near) < 1e-2 * length + _AGAIN
+    near = step.cubic(along)
+    return (norm(problem, again - near) < 1e-2 * length + _MET_AGAIN
             and _lead_to_one(problem, again, near, row, options))
 
 
@@ -255,5 +255,5 @@ def _lead_to_one(
         return False
     if found[0] is None or found[1] is None:
         return False
-    near = _ALIKE * max(options.tolerance, problem.rounding) * (1.0 + norm(problem, one))
+    near = _SAME_SOLUTION * max(options.tolerance, problem.rounding) * (1.0 + norm(problem, one))
     return norm(problem, found[0][0] - found[1][0]) < near

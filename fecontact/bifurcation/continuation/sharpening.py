@@ -1,12 +1,13 @@
-"""Special points of branches of orbits, located on meshes of their own and judged on finer ones.
+"""Refinement of special points of orbits: each on a mesh of its own, confirmed on finer ones.
 
-A branch finds its special points roughly, on the mesh of a neighbour. Each is located once more on
-the mesh that suits its own orbit. The coefficient of a normal form holds third derivatives along
-the orbit and may need a far finer mesh than the orbit: intervals are doubled until it settles.
+A branch locates its special points coarsely, on the mesh of a neighbour. Each is then located on
+the mesh equidistributed for its own orbit. The coefficient of a normal form contains third
+derivatives along the orbit and may need a far finer mesh than the orbit: the intervals are doubled
+until it converges.
 
-Where a mesh is too coarse, its error alone makes the parameter turn, or a test function change its
-sign. So each special point must be there on a finer mesh too, and the test functions of folds
-and branch points be the same on both sides of it. Those that are not are 'unresolved'.
+On too coarse a mesh the discretisation error alone makes the parameter turn, or a test function
+change sign. A special point must therefore exist on a finer mesh too, and the test functions of
+folds and branch points must agree on both sides of it; otherwise it becomes 'unresolved'.
 """
 
 from dataclasses import replace
@@ -14,9 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.crossings import UNRESOLVED
 from fecontact.bifurcation.continuation.newton import corrected, finished, norm
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.points import (
+    BranchPoint,
+    NeimarkSackerPoint,
+    PeriodDoublingPoint,
+    unresolved,
+    with_details,
+)
 from fecontact.bifurcation.continuation.pseudo_arclength import ContinuationOptions, continuation
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import FLAT
@@ -29,32 +35,33 @@ from fecontact.core.types import Array
 Place = tuple[CollocationProblem, Array, Array]
 
 SHARPENED = ("fold", "period doubling", "Neimark-Sacker", "branch point")
-_JUDGED = ("period doubling", "Neimark-Sacker")
+_WITH_NORMAL_FORM = ("period doubling", "Neimark-Sacker")
 
-# Parts of a step to which a branch locates special points, and to which they are sharpened.
-ROUGHLY, _SHARPLY = 1e-3, 1e-9
-# Distances from the rough place at which the search begins, one after the other.
-_NEAR = (1e-3, 1e-2, 1e-4, 3e-2)
-# Points of a search, whose steps may have to be shorter than the whole way.
-_POINTS = 30
-# The intervals of a branch are multiplied by this at the most, to judge a coefficient.
-_FINEST = 16
-# A change of a coefficient from one mesh to the next that settles it at once, in parts of it.
-_AT_ONCE = 1e-3
-# So many times the intervals are doubled to confirm a fold or a branch point, and the change of its
-# test function from mesh to mesh, in parts of it, that still does.
-_DOUBLINGS, _ALIKE = 2, 0.5
-# Parts of a distance at which test functions are compared: the longest at which there is a branch.
-_SHORTER = np.array([1.0, 1e-1, 1e-2, 1e-3, 1e-4])
+# Precision of special points on the branch and after refinement, in parts of a step.
+ROUGHLY, _REFINED = 1e-3, 1e-9
+# Distances from the coarse location at which a search starts, in this order.
+_DISTANCES = (1e-3, 1e-2, 1e-4, 3e-2)
+# Largest number of points in one search.
+_MOST_POINTS = 30
+# Finest mesh for a coefficient, in intervals of the branch.
+_FINEST_MESH = 16
+# Relative change between two meshes at which a coefficient counts as converged.
+_CONVERGED = 1e-3
+# Largest number of mesh doublings to confirm a fold or a branch point, and largest relative
+# difference of its test function on two meshes that agree.
+_DOUBLINGS, _AGREEMENT = 2, 0.5
+# Factors of the distance at which test functions are compared; beside a hairpin the corrector
+# converges at short distances only.
+_SHORTER_DISTANCES = np.array([1.0, 1e-1, 1e-2, 1e-3, 1e-4])
 
 
 def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
-    """A special point located once more, with its criticality where it has one.
+    """Refine a special point and, where it has a normal form, determine its criticality.
 
     Parameters
     ----------
     point : BranchPoint
-        What the branch located roughly.
+        As located on the branch.
     own, neighbour : (CollocationProblem, array, array)
         Problem, unknowns and tangent of the point and of a regular one before it. At branch points
         the tangent is not defined; that of the neighbour serves for all kinds.
@@ -62,11 +69,10 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     Returns
     -------
     BranchPoint
-        'parameter_error' in the details is the change of the parameter on finer meshes. A point
-        that is not found again stays where it was, and 'located' in its details is False;
-        'parameter_error' is what the parameter changes by over the stretch that was searched if
-        nothing better is known. A point that finer meshes do not have becomes 'unresolved', and
-        'instead_of' in its details says what it looked like.
+        With ``parameter_error``, the change of the parameter on finer meshes. A point that is not
+        found again stays where it was, not ``located``; its ``parameter_error`` is then the change
+        of the parameter over the stretch that was searched, if nothing better is known. A point
+        that finer meshes do not have becomes 'unresolved', ``instead_of`` its kind.
     """
     kind = str(point.kind)
     problem, u, _ = own
@@ -76,33 +82,28 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     _, start, _ = problem.on_mesh(mesh, start, tangent)
     place = _unit(*problem.on_mesh(mesh, u, tangent))
     found = _found(place, kind) or _found_from(place, start, kind)
-    details = {**point.details, "located": False} if found is None else {**found.details}
-    if kind in _JUDGED:
+    result = found or with_details(point, located=False)
+    if kind in _WITH_NORMAL_FORM:
         judged = _on_finer_meshes(point, found, place)
     else:
         away = abs(float(problem.weights() * place[2] @ (u - start)))
-        judged = _change_on_finer_meshes(point, found, place, max(away, _NEAR[0]))
-    if judged is None:
-        details = {name: value for name, value in details.items()
-                   if name in ("located", "parameter_error")}
-        kind, details["instead_of"] = UNRESOLVED, kind
-    else:
-        details |= judged
-    if found is None:
-        details.setdefault("parameter_error", _reach(place))
-    return replace(found or point, kind=kind, details=details)
+        judged = _change_on_finer_meshes(point, found, place, max(away, _DISTANCES[0]))
+    result = unresolved(result) if judged is None else with_details(result, **judged)
+    if np.isnan(result.parameter_error) and not result.located:
+        result = with_details(result, parameter_error=_reach(place))
+    return result
 
 
 def _unit(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
     """The place with a tangent of length one; the scales may have grown along the branch."""
-    problem = replace(problem, renewal=0, precision=_SHARPLY)
+    problem = replace(problem, renewal=0, precision=_REFINED)
     return problem, u, tangent / norm(problem, tangent)
 
 
 def _found(place: Place, kind: str) -> BranchPoint | None:
-    """The special point near a place; None if it is not found from any distance."""
+    """The special point near a place; None if no search finds it."""
     _, u, tangent = place
-    for near in _NEAR:
+    for near in _DISTANCES:
         found = _searched(place, u - near * tangent, 2.0 * near, kind)
         if found is not None:
             return found
@@ -110,17 +111,17 @@ def _found(place: Place, kind: str) -> BranchPoint | None:
 
 
 def _found_from(place: Place, start: Array, kind: str) -> BranchPoint | None:
-    """The special point on the way from a neighbour to a bit beyond the place."""
+    """The special point between a neighbour and a bit beyond the place."""
     problem, u, tangent = place
     away = float(problem.weights() * tangent @ (u - start))
     return _searched(place, start, 1.2 * away, kind) if away > 0.0 else None
 
 
 def _searched(place: Place, start: Array, length: float, kind: str) -> BranchPoint | None:
-    """The special point nearest to a place, on the branch from a start on over a length."""
+    """The special point nearest to a place on a piece of the branch."""
     problem, u, tangent = place
     row, weights = problem.weights() * tangent, problem.weights()
-    options = ContinuationOptions(step=length, largest_step=length, points=_POINTS,
+    options = ContinuationOptions(step=length, largest_step=length, points=_MOST_POINTS,
                                   smallest_step=min(1e-7, length))
     points = []
     try:
@@ -135,23 +136,22 @@ def _searched(place: Place, start: Array, length: float, kind: str) -> BranchPoi
 
 
 def _reach(place: Place) -> float:
-    """Change of the parameter over the stretch that is searched."""
-    return max(_NEAR) * abs(float(place[2][-1]))
+    """Change of the parameter over the longest search."""
+    return max(_DISTANCES) * abs(float(place[2][-1]))
 
 
 def _on_finer_meshes(
     rough: BranchPoint, found: BranchPoint | None, place: Place
 ) -> dict[str, Any] | None:
-    """Coefficient and criticality of a special point, and by how much its parameter changes.
+    """Coefficient, criticality and parameter error of a special point, from finer meshes.
 
-    None if no finer mesh has the point.
-
-    The error of the coefficient is its change from the last mesh but one, or half of that before:
-    two meshes may agree by accident.
+    None if no finer mesh has the point. The error of the coefficient is its last change from mesh
+    to mesh, and at least half the change before: two meshes may agree by accident.
     """
     problem, u, tangent = place
-    kind, parameter, most = str(rough.kind), (found or rough).parameter, _FINEST * problem.intervals
-    coefficients = [] if found is None else [float(found.details["coefficient"])]
+    kind, parameter = str(rough.kind), (found or rough).parameter
+    most = _FINEST_MESH * problem.intervals
+    coefficients = [] if found is None else [_normal_form(found)[0]]
     u, error, before = u if found is None else found.u, float("nan"), float("inf")
     confirmed = False
     while 2 * problem.intervals <= most:
@@ -162,13 +162,13 @@ def _on_finer_meshes(
             error = float("nan")
             continue
         found, u, confirmed = finer, finer.u, True
-        coefficients.append(float(found.details["coefficient"]))
+        coefficient, own_error = _normal_form(found)
+        coefficients.append(coefficient)
         if len(coefficients) == 1:
             continue
         change = abs(coefficients[-1] - coefficients[-2])
-        at_once = change <= _AT_ONCE * abs(coefficients[-1])
-        error = max(float(found.details["coefficient_error"]), change,
-                    0.0 if at_once else 0.5 * before)
+        at_once = change <= _CONVERGED * abs(coefficients[-1])
+        error = max(own_error, change, 0.0 if at_once else 0.5 * before)
         before = change
         if verdict(coefficients[-1], error)["criticality"] != "undecided":
             break
@@ -176,6 +176,12 @@ def _on_finer_meshes(
         return None
     return {**verdict(coefficients[-1], error),
             "parameter_error": abs(found.parameter - parameter)}
+
+
+def _normal_form(point: BranchPoint) -> tuple[float, float]:
+    """Coefficient of the normal form on one mesh, and its error there."""
+    assert isinstance(point, PeriodDoublingPoint | NeimarkSackerPoint)
+    return point.coefficient, point.coefficient_error
 
 
 def _with_twice_the_intervals(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
@@ -186,11 +192,10 @@ def _with_twice_the_intervals(problem: CollocationProblem, u: Array, tangent: Ar
 def _change_on_finer_meshes(
     rough: BranchPoint, found: BranchPoint | None, place: Place, reach: float
 ) -> dict[str, Any] | None:
-    """By how much the parameter of a fold or branch point changes; None if two meshes in a row do
-    not agree on it.
+    """Parameter error of a fold or branch point; None if no two successive meshes agree on it.
 
-    They do if both have the point, and on both its test function is the same at a distance
-    ``reach`` before and behind it.
+    They agree if both have the point, and the same test function a distance ``reach`` before and
+    behind it.
     """
     kind, parameter = str(rough.kind), (found or rough).parameter
     problem, u, tangent = place
@@ -203,18 +208,18 @@ def _change_on_finer_meshes(
             return None
         u = finer.u
         here = problem, u, tangent
-        if before is not None and _alike(before, here, kind, reach):
+        if before is not None and _agree(before, here, kind, reach):
             return {"parameter_error": abs(finer.parameter - parameter)}
         before = here
     return None
 
 
-def _alike(one: Place, other: Place, kind: str, reach: float) -> bool:
-    """Whether a test function is the same about a special point on two meshes, beyond rounding.
+def _agree(one: Place, other: Place, kind: str, reach: float) -> bool:
+    """Whether a test function agrees on two meshes on both sides of a special point.
 
-    Beside a sharp turn the branch is met at short distances only.
+    Beside a hairpin the corrector converges at short distances only.
     """
-    for distance in reach * _SHORTER:
+    for distance in reach * _SHORTER_DISTANCES:
         found = np.array([[_test_beside(place, kind, side * distance) for place in (one, other)]
                           for side in (-1.0, 1.0)])
         if not np.isnan(found).any():
@@ -222,11 +227,11 @@ def _alike(one: Place, other: Place, kind: str, reach: float) -> bool:
     size = np.abs(found).max(axis=1)
     if kind == "fold" and size.max() < FLAT * one[0].scales[-1]:
         return False
-    return bool((np.abs(found[:, 0] - found[:, 1]) <= _ALIKE * size).all())
+    return bool((np.abs(found[:, 0] - found[:, 1]) <= _AGREEMENT * size).all())
 
 
 def _test_beside(place: Place, kind: str, along: float) -> float:
-    """A test function on the branch at a distance from a place; NaN where there is none."""
+    """A test function on the branch at a distance from a place; NaN if the corrector fails."""
     problem, u, tangent = place
     options, row = ContinuationOptions(), problem.weights() * tangent
     try:

@@ -1,11 +1,10 @@
-"""Branches of equilibria over one parameter, their folds, Hopf and branch points."""
+"""Branches of equilibria over one parameter, with folds, Hopf points and branch points."""
 
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
@@ -25,7 +24,7 @@ from fecontact.bifurcation.equilibria.equilibrium import (
 from fecontact.bifurcation.equilibria.problem import EquilibriumProblem, equilibrium_at
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import InputError, require_finite
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 _GROWTH = 1e4
 
@@ -129,7 +128,7 @@ def _crossing(
     points: list[BranchPoint] = []
     ends = []
     for side in (-1.0, 1.0) if both else (1.0,):
-        # The first step leaves the branch point, where the two directions cannot be told apart.
+        # At the branch point the system is singular; correct the first step away from it.
         first = point.u + side * options.step * tangent
         if not options.bounds[0] <= first[-1] <= options.bounds[1]:
             continue
@@ -160,7 +159,7 @@ def _problem(
 ) -> tuple[EquilibriumProblem, ContinuationOptions]:
     chosen = options_of(options, bounds)
     for bound in map(float, chosen.bounds):
-        # A parameter may be what drives the system, as an amplitude that begins at zero.
+        # The parameter may be the excitation itself, as an amplitude that starts at zero.
         there = begin.values.copy()
         there[index] = bound
         with suppress(InputError):

@@ -1,11 +1,11 @@
-"""The continuation problems of folds and of Hopf points of equilibria in two parameters.
+"""Continuation problems of folds and Hopf points of equilibria in two parameters.
 
-Both are minimally augmented systems: beside f(x, p) = 0 the border g of
+Both are minimally augmented systems: f(x, p) = 0 and g = 0, with g from the bordered system
 
     [[J - l I, b], [c, 0]] [v, g] = [0, 1]      (states in units of their scales)
 
-is to vanish, which it does where l is an eigenvalue: l = 0 for a fold, l = i w for a Hopf point.
-Its derivatives follow from those of J along v, ``dg = -w (dJ) v``, w the left solution.
+g vanishes where l is an eigenvalue: l = 0 at a fold, l = i w at a Hopf point. Its derivative is
+``dg = -w (dJ) v`` with the left solution w.
 
 References
 ----------
@@ -28,13 +28,13 @@ from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 
-# Part of the first w^2 that takes its place in divisions by l where it is smaller.
+# Smallest |w^2| in divisions by l, relative to w^2 at the start.
 _NEAR_ZERO = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class _Augmented:
-    """Residual and derivative (N, N + 1) of an augmented system, with what was made on the way."""
+    """Residual and derivative (N, N + 1) of an augmented system, with intermediate results."""
 
     residual: Array
     matrix: Array
@@ -46,7 +46,10 @@ class _Augmented:
 
 
 class PlaneCurve(Problem):
-    """What both curves have in common; u = [x, (w^2,) first parameter, second parameter]."""
+    """Equilibria with a border at zero; u = [x, (w^2,) second parameter, first parameter].
+
+    ``active`` are the indices of both parameters, in the order in which they stand in u.
+    """
 
     def __init__(
         self, field: VectorField, values: Array, active: tuple[int, int], sizes: Array,
@@ -87,18 +90,18 @@ class PlaneCurve(Problem):
         return right[:d] * self.scales, left[:d] / self.scales, right[d]
 
     def curvature(self, x: Array, u: Array, direction: Array) -> Array:
-        """Derivative (d, d + 2) of [J, P] along a direction (d,)."""
+        """Directional derivative (d, d + 2) of [J, P] along a direction (d,)."""
         return bend(self.field, x, self.values(u), np.ascontiguousarray(direction), self.scales,
                     self.active, every=4)[0].first
 
     def renewed(self, u: Array, b: Array, c: Array) -> "PlaneCurve":
-        """The same curve with other borders, and sizes that grow with the states."""
+        """The same curve with new borders, and scales that grow with the states."""
         larger = np.clip(np.abs(u), self._sizes, self._limits)
         sizes = np.where(larger > 1.5 * self._sizes, larger, self._sizes)
         return type(self)(self.field, self._values, self.active, sizes, self._limits, b, c)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
-        """State, parameters by name, and what the curve adds."""
+        """State, parameters by name, and the values of :meth:`stored`."""
         names = list(self.field.parameters)
         named = {names[index]: float(value)
                  for index, value in zip(self.active, u[-2:], strict=True)}
@@ -107,7 +110,7 @@ class PlaneCurve(Problem):
 
     @abstractmethod
     def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
-        """What the points hold besides state and parameters."""
+        """Values stored at points besides state and parameters."""
 
 
 class FoldCurve(PlaneCurve):
@@ -128,7 +131,7 @@ class FoldCurve(PlaneCurve):
                             v if v @ self._c > 0.0 else -v), u, tangent
 
     def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
-        """Stability besides what is critical."""
+        """Stability besides the critical eigenvalues."""
         others = _others(linearisation.jacobian, 0.0, 1)
         return {"unstable_besides": int((others.real > 0.0).sum())}
 
@@ -145,7 +148,7 @@ class FoldCurve(PlaneCurve):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> Mapping[str, Any] | None:
-        """Details of a point of codimension two; None for none."""
+        """Data of a point of codimension two; None if it is none."""
         if kind == "zero-Hopf":
             others = _others(linearisation.jacobian, 0.0, 1)
             nearest = others[np.argmin(np.abs(others.real))] if len(others) else 0.0
@@ -196,7 +199,7 @@ class HopfCurve(PlaneCurve):
         return self.renewed(u, b, c), u, tangent
 
     def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
-        """Stability besides what is critical."""
+        """Stability besides the critical eigenvalues."""
         square = float(u[self.field.dimension])
         others = _others(linearisation.jacobian, square, 2)
         return {"frequency_hz": float(np.sqrt(max(square, 0.0))) / (2.0 * np.pi),
@@ -211,7 +214,7 @@ class HopfCurve(PlaneCurve):
         sign = np.linalg.slogdet(J)[0]
         found = {"Bogdanov-Takens": square, "Bautin": self._lyapunov(u, linearisation),
                  "double Hopf": pair_test(_others(linearisation.jacobian, square, 2))}
-        # With two states an eigenvalue of zero is one of the pair.
+        # With two states a zero eigenvalue belongs to the pair.
         if len(J) > 2:
             found["zero-Hopf"] = float(sign * np.linalg.svd(J, compute_uv=False)[-1])
         return found
@@ -231,7 +234,7 @@ class HopfCurve(PlaneCurve):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> Mapping[str, Any] | None:
-        """Details of a point of codimension two; None for none."""
+        """Data of a point of codimension two; None if it is none."""
         square = float(u[self.field.dimension])
         others = _others(linearisation.jacobian, square, 2)
         if kind == "zero-Hopf" and square < 1e-3 * np.abs(others).max(initial=0.0) ** 2:

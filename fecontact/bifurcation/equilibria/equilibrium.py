@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.core.types import Array, ComplexArray, Integers
+from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 
-_CONSISTENT = 1e-8
+_RESIDUAL = 1e-8
 
 
 def solution(matrix: Array, rhs: Array) -> Array:
@@ -29,7 +28,7 @@ def solution(matrix: Array, rhs: Array) -> Array:
     except np.linalg.LinAlgError:
         x = np.linalg.lstsq(matrix, rhs, rcond=None)[0]
     left = np.abs(matrix @ x - rhs)
-    if (left > _CONSISTENT * (np.abs(matrix) @ np.abs(x) + np.abs(rhs))).any():
+    if (left > _RESIDUAL * (np.abs(matrix) @ np.abs(x) + np.abs(rhs))).any():
         raise AnalysisError("The equations are singular and have no solution there: nothing "
                             "holds the solution in some direction.")
     return np.asarray(x)
@@ -153,7 +152,7 @@ def find_equilibrium(
     start: ArrayLike | None = None,
     tolerance: float = 1e-12,
 ) -> Equilibrium:
-    """An equilibrium f(x, p) = 0 by Newton's method with shortened steps.
+    """An equilibrium f(x, p) = 0 by damped Newton's method.
 
     Parameters
     ----------
@@ -201,9 +200,9 @@ def find_equilibrium(
 def newton(
     field: VectorField, start: Array, values: Array, tolerance: float
 ) -> tuple[Array, Array] | None:
-    """Newton's method with steps that are halved until the next step is shorter.
+    """Damped Newton's method: halve each step until the next one is shorter.
 
-    Gives x (d,) and the Jacobian (d, d) about it, from before the last step.
+    Gives x (d,) and the Jacobian (d, d) before the last step.
     """
     x, t = start, np.zeros(1)
     least = 1e-14 * float(np.linalg.norm(field.state_scales(values)))
@@ -221,13 +220,13 @@ def newton(
         part = 1.0
         while part > 1e-6:
             trial = x + part * step
-            # The size of the step that the old Jacobian would take next.
+            # Natural monotonicity test: the next step with the old Jacobian.
             ahead = field.rates(t, trial[None], values)[0]
             if np.isfinite(ahead).all() and _simplified(J[0], ahead) < (1.0 - 0.5 * part) * size:
                 break
             part *= 0.5
         else:
-            # Only rounding is left where the rates are as small as they can be.
+            # The rates are as small as rounding allows.
             return (x, J[0]) if size <= 1e-7 * np.linalg.norm(x) else None
         x = trial
     return None
@@ -241,7 +240,7 @@ def _simplified(J: Array, f: Array) -> float:
 
 
 def steady_sliding(field: ContactField, values: Array) -> Array:
-    """State [q, 0, z] of steady sliding of a contact system, the start for Newton's method."""
+    """State [q, 0, z] of steady sliding of a contact system, to start Newton's method."""
     from fecontact.system.statics import equilibrium
     from fecontact.system.steady_memory import settled
 

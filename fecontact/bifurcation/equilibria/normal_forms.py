@@ -1,4 +1,4 @@
-"""Normal forms of bifurcations of equilibria, as far as they tell what is born."""
+"""Normal form coefficients of folds, Hopf points and branch points of equilibria."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,9 @@ from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 
-# Parts of the terms of l1, and of what a change of the Jacobian by itself over the scales would
-# make of it, that are rounding.
-_CANCELLED, _CONSTANT = 1e-9, 1e-15
+# Rounding of l1: relative to the sum of its terms, and to the l1 of a Jacobian that changes by its
+# own size over the scales.
+_CANCELLATION, _JACOBIAN_ROUNDING = 1e-9, 1e-15
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,10 @@ def hopf(
                      for part in (np.ascontiguousarray(q.real), np.ascontiguousarray(q.imag)))
     (fine, terms), (coarse, _) = (_first_lyapunov(J[0], w, q, p, one, other)
                                   for one, other in zip(along, across, strict=True))
-    # A Jacobian that changes by less than its rounding over the scales is constant.
+    # A Jacobian is constant if it changes by less than its rounding over the scales.
     constant = (np.abs(J[0] * scales / scales[:, None]).max() / w
                 * float(np.linalg.norm(q / scales)) ** 2)
-    error = abs(fine - coarse) + _CANCELLED * terms + _CONSTANT * float(constant)
+    error = abs(fine - coarse) + _CANCELLATION * terms + _JACOBIAN_ROUNDING * float(constant)
     return Hopf(w, q, fine, error)
 
 

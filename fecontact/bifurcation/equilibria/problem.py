@@ -1,4 +1,4 @@
-"""The continuation problem of equilibria over one parameter."""
+"""Continuation problem of equilibria over one parameter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,16 +30,16 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
 
 # Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.
-_TRANSVERSAL = 1e-5
-_HUGE = 1e100
-# Rate along the branch, relative to the largest eigenvalue, below which a pair does not cross the
-# imaginary axis but lies on it, as those of undamped modes do.
+_TRANSVERSALITY = 1e-5
+_OVERFLOW = 1e100
+# Crossing speed along the branch, relative to the largest eigenvalue, below which a pair stays on
+# the imaginary axis, as those of undamped modes do.
 _CROSSING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class _Bordered:
-    """df/dx, df/dp and f at one place."""
+    """f and [df/dx, df/dp] at one u."""
 
     residual: Array
     matrix: Array
@@ -78,7 +78,7 @@ class EquilibriumProblem(Problem):
         f, J, P = self.field.derivatives(np.zeros(1), np.ascontiguousarray(u[None, :-1]),
                                          self.values(u), (self.index,))
         matrix = np.concatenate([J[0], P[0]], axis=1)
-        if not max(np.abs(f).max(), np.abs(matrix).max()) < _HUGE:
+        if not max(np.abs(f).max(), np.abs(matrix).max()) < _OVERFLOW:
             raise AnalysisError("The rates grow beyond all numbers there.")
         return _Bordered(f[0], matrix)
 
@@ -123,14 +123,14 @@ class EquilibriumProblem(Problem):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> Mapping[str, Any] | None:
-        """Details of a fold, Hopf or branch point; None for what only looks like one."""
+        """Data of a fold, Hopf or branch point; None if it is none."""
         if kind == "Hopf":
             return self._hopf(u, linearisation, tangent)
         x, values = np.ascontiguousarray(u[:-1]), self.values(u)
         v, w = null_vectors(linearisation.jacobian)
         if kind == "fold":
             P = linearisation.matrix[:, -1]
-            if abs(w @ P) <= _TRANSVERSAL * np.linalg.norm(P):
+            if abs(w @ P) <= _TRANSVERSALITY * np.linalg.norm(P):
                 return None
             return {"null_vector": v,
                     "coefficient": fold_coefficient(self.field, x, values, self.scales)}
@@ -140,7 +140,7 @@ class EquilibriumProblem(Problem):
         return {}
 
     def _hopf(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any] | None:
-        """Details of a Hopf point; None for real eigenvalues, or a pair that does not cross."""
+        """Data of a Hopf point; None for real eigenvalues, or a pair that does not cross."""
         if not crossing_is_complex(linearisation.eigenvalues):
             return None
         x = np.ascontiguousarray(u[:-1])
@@ -158,7 +158,6 @@ class EquilibriumProblem(Problem):
             "first_lyapunov_error": found.error,
             "criticality": found.criticality,
         }
-
 
     def _crossing_speed(self, u: Array, linearisation: Any, tangent: Array) -> float:
         """Rate of the critical pair's real part along the branch: Re p^H (dJ/ds) q."""

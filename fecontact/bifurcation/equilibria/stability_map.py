@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
@@ -15,7 +14,8 @@ from fecontact.bifurcation.equilibria.equilibrium import (
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.core.types import Array, ComplexArray, Integers
+from fecontact.core.progress import progress_bar, shown
+from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.core.units import Summarised, span
 
 
@@ -69,12 +69,12 @@ class StabilityMap(Summarised):
 def stability_map(
     field: VectorField, grid: Mapping[str, ArrayLike], *,
     start: Equilibrium | ArrayLike | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: bool | Callable[[float], None] | None = None,
 ) -> StabilityMap:
     """Stability of an equilibrium over a grid of two parameters, such as speed and friction.
 
-    The equilibrium is followed from point to point by Newton's method; where it gets lost it is
-    looked for anew (for contact systems), and where there is none the map has NaN.
+    The equilibrium is followed from point to point by Newton's method; where that fails it is
+    searched anew (for contact systems), and where there is none the map has NaN.
 
     Parameters
     ----------
@@ -85,8 +85,9 @@ def stability_map(
     start : Equilibrium or (d,) sequence, optional
         An equilibrium near that of the first values; see
         :func:`fecontact.bifurcation.equilibria.equilibrium.find_equilibrium`.
-    progress : callable, optional
-        Told the part of the map that is done, 0 to 1.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is told the part of the
+        map that is done, 0 to 1.
 
     Raises
     ------
@@ -113,18 +114,19 @@ def stability_map(
     d = field.dimension
     states, jacobians = np.full((*shape, d), np.nan), np.zeros((*shape, d, d))
     values = field.values
-    for i in range(shape[0]):
-        x = row_start
-        for j in range(shape[1]):
-            values[indices] = axes[0][i], axes[1][j]
-            found = _equilibrium(field, values, x)
-            x = None if found is None else found[0]
-            if found is not None:
-                states[i, j], jacobians[i, j] = found
-            if j == 0 and x is not None:
-                row_start = x
-        if progress is not None:
-            progress((i + 1) / shape[0])
+    with shown(progress, lambda: progress_bar("Mapping stability", 1.0)) as tell:
+        for i in range(shape[0]):
+            x = row_start
+            for j in range(shape[1]):
+                values[indices] = axes[0][i], axes[1][j]
+                found = _equilibrium(field, values, x)
+                x = None if found is None else found[0]
+                if found is not None:
+                    states[i, j], jacobians[i, j] = found
+                if j == 0 and x is not None:
+                    row_start = x
+            if tell is not None:
+                tell((i + 1) / shape[0])
     eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
     order = np.lexsort((-eigenvalues.imag, -eigenvalues.real), axis=-1)
     critical = np.take_along_axis(eigenvalues, order[..., :1], axis=-1)[..., 0]

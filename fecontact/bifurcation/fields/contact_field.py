@@ -17,11 +17,11 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period
 
 _COMPONENTS = ("x", "y", "phi")
-# Step of differences in a parameter, relative to its value.
+# Relative step of differences in a parameter.
 _STEP = 2e-4
-# Part of the base value below which the step does not get any smaller.
-_LEAST = 1e-3
-# Arrays that decide on what is given in time.
+# Smallest value for that step, relative to the base value.
+_LEAST_VALUE = 1e-3
+# Arrays that prescribe functions of time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
                       "ground_motion_parameters"})
@@ -89,7 +89,7 @@ class ContactField(VectorField):
     def _step(self, values: Array, index: int) -> float:
         """Step for laws; their parameters need not be small where the value is."""
         base = abs(float(self._base_values[index]))
-        return _STEP * (max(abs(float(values[index])), _LEAST * base) or 1.0)
+        return _STEP * (max(abs(float(values[index])), _LEAST_VALUE * base) or 1.0)
 
     def forcing_period(self, values: Array) -> float | None:
         """Common period [s] of drive, loads and ground; None where nothing depends on time.

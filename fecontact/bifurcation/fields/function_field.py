@@ -1,4 +1,4 @@
-"""A vector field from a user's function of one state."""
+"""Vector fields from a user's function of one state."""
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -6,19 +6,19 @@ from types import CodeType, MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields import function_kernels as kernels
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 _FORM = "f(t, x, p, out)"
 _WAYS = ("automatic", "complex", "differences")
-# Places at which the complex step is compared with differences before it is used.
+# Samples at which the complex step is checked against differences before it is used.
 _SAMPLES = 16
-# What takes complex numbers and loses their imaginary part.
+# Functions that accept complex numbers but are not analytic.
 _NOT_ANALYTIC = {"abs", "absolute", "fabs", "sign", "real", "imag", "conj", "conjugate", "angle"}
 
 
@@ -85,7 +85,7 @@ class FunctionField(VectorField):
     def checked(
         self, t: Array, x: Array, values: Array, active: NDArray[np.int64]
     ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        """As :meth:`derivatives`; and at how many places (d + a,) the complex step was wrong."""
+        """As :meth:`derivatives`, with counts (d + a,) of failures of the complex step."""
         n, d = x.shape
         f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(active)))
         wrong = np.zeros(d + len(active), dtype=np.int64)
@@ -105,7 +105,7 @@ class FunctionField(VectorField):
         return f, J, P, wrong
 
     def complaint(self, wrong: NDArray[np.int64], active: NDArray[np.int64]) -> str:
-        """Sentence that says for which states and parameters the complex step is wrong."""
+        """Message for which states and parameters the complex step fails."""
         parameters = list(self.parameters)
         names = [*self.state_names, *(parameters[index] for index in active)]
         listed = ", ".join(repr(name) for name, count in zip(names, wrong, strict=True) if count)
@@ -203,7 +203,7 @@ def vector_field(
 
 
 def _wrong_at_samples(field: FunctionField) -> str | None:
-    """What is wrong with the complex step up to twice the scales, of either sign; None if nothing.
+    """Why the complex step fails at samples within twice the scales; None if it does not.
 
     The samples are those of a Kronecker sequence: without order, but always the same.
     """
@@ -218,7 +218,7 @@ def _wrong_at_samples(field: FunctionField) -> str | None:
 
 
 def _analytic(function: Callable[..., Any], required: bool) -> CompiledLaw | None:
-    """The function for complex numbers, if it is analytic as far as can be seen."""
+    """The function for complex numbers; None if it is visibly not analytic."""
     used = _names(function, set()) & _NOT_ANALYTIC
     if used:
         if required:

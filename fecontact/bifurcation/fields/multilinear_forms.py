@@ -1,4 +1,4 @@
-"""Second and third derivatives of vector fields along directions, by differences of Jacobians."""
+"""The forms B and C: second and third directional derivatives, by differences of Jacobians."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ from fecontact.core.types import Array
 _FIRST = (np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280]), np.array([3 / 4, -3 / 20, 1 / 60, 0.0]))
 _SECOND = (np.array([8 / 5, -1 / 5, 8 / 315, -1 / 560]), np.array([3 / 2, -3 / 20, 1 / 90, 0.0]))
 
-# Steps that are tried, in units of the scales of the states.
+# Trial steps, in units of the scales of the states.
 _STEPS = 3.0 ** np.arange(3.0, -19.0, -1.0)
-# Where both orders agree this well, the step with the best agreement is taken.
-_GOOD = 1e-3
+# Relative difference of both orders up to which the step with the best agreement is taken.
+_AGREEMENT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -92,5 +92,5 @@ def _best(
         size = np.abs(fine * balance).max(axis=(1, 2))
     error[~np.isfinite(error)] = np.inf
     relative = np.where(size > 0.0, error / np.where(size > 0.0, size, 1.0), np.inf)
-    at = int(np.argmin(relative)) if relative.min() < _GOOD else int(np.argmin(error))
+    at = int(np.argmin(relative)) if relative.min() < _AGREEMENT else int(np.argmin(error))
     return fine[at], coarse[at]

@@ -1,9 +1,9 @@
-"""A contact system as a function of parameters, quick to evaluate.
+"""Contact systems as functions of parameters, with interpolated arrays.
 
-Making a system and its arrays takes some 0.2 ms of Python. Most arrays are affine in each
-parameter (or constant); where that is found to hold, they are interpolated between the corners of a
-box in which it was checked. Which box it is depends on the values alone, not on those asked for
-before: boxes about the base values, each twice as wide as the one before.
+Building a system and its arrays takes some 0.2 ms of Python. Most arrays are constant or affine in
+each parameter; these are interpolated between the corners of a box, after a check at further
+points of it. The boxes lie about the base values, each twice as wide as the one before, so that the
+result depends on the parameter values alone and not on earlier calls.
 """
 
 from collections import OrderedDict
@@ -22,11 +22,11 @@ from fecontact.system.kernels import SystemArrays
 
 Setter = Callable[[ContactSystem, float], ContactSystem]
 
-_KEPT = 64
-# More corners than these take longer to make than they save.
+_CACHED_BOXES = 64
+# With more parameters the corners cost more than they save.
 _MOST_PARAMETERS = 4
-_RELATIVE = 1e-12
-# Values more doublings away from the base values are not interpolated.
+_AFFINE_ERROR = 1e-12
+# Largest number of doublings of the box; values farther away are not interpolated.
 _MOST_LEVELS = 50
 
 
@@ -62,7 +62,7 @@ class ParametrisedSystem:
         self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
         self._base, self._width = values, np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
         self._first: _Corners | None = None
-        # The box that was asked for last, and between which values it is asked for.
+        # The box used last, and its range of values.
         self._recent: tuple[list[tuple[float, float]], _Corners] | None = None
         if 0 < len(values) <= _MOST_PARAMETERS:
             self.system(values)
@@ -89,7 +89,7 @@ class ParametrisedSystem:
                              f"{made.size} states from one of {self._size}; their number must "
                              f"stay the same.")
         self._made[key] = made
-        if len(self._made) > _KEPT:
+        if len(self._made) > _CACHED_BOXES:
             self._made.popitem(last=False)
         return made
 
@@ -106,7 +106,7 @@ class ParametrisedSystem:
         return found
 
     def slopes(self, values: Array, index: int, step: float) -> SystemArrays:
-        """Derivatives of the arrays to one value; all else, as the addresses of laws, as it is.
+        """Derivatives of the arrays to one parameter; addresses of laws and the like unchanged.
 
         Where arrays are not affine they are differences of fourth order over a step, which may
         leave the allowed range.
@@ -143,7 +143,7 @@ class ParametrisedSystem:
         return corners
 
     def _box(self, levels: tuple[int, ...]) -> "_Corners | None":
-        """The box of so many doublings in each parameter; None where nothing is affine in it."""
+        """The box of given doublings in each parameter; None if no array is affine in it."""
         if levels not in self._boxes:
             low, high = np.array([self._interval(index, level)
                                   for index, level in enumerate(levels)]).T
@@ -155,12 +155,12 @@ class ParametrisedSystem:
         return self._boxes[levels]
 
     def _interval(self, index: int, level: int) -> tuple[float, float]:
-        """Values of one parameter about its base value, as far as its range allows."""
+        """Interval of one parameter about its base value, within its range."""
         key = (index, level)
         if key not in self._intervals:
             base, width = float(self._base[index]), float(self._width[index])
             far = base + np.copysign(1.0, level) * width * 2.0 ** (abs(level) - 1 if level else 0)
-            # Many ranges end at zero.
+            # Zero is a likely end of a range.
             ends = [end for end in (far, 0.0) if self._allowed(index, end)
                     and abs(end - base) <= abs(far - base)]
             beside = base - np.copysign(1.0, level) * width
@@ -207,7 +207,7 @@ class _Corners:
                     raise _NotAffineError
                 stacked[name] = np.stack(values)
         self.varying = frozenset(stacked)
-        # All varying arrays side by side, so that one product interpolates them.
+        # All varying arrays in one matrix: one product interpolates them.
         self._flat = np.hstack([array.reshape(len(corners), -1) for array in stacked.values()]
                                or [np.empty((len(corners), 0))])
         self._limits = list(zip(low.tolist(), high.tolist(), strict=True))
@@ -261,7 +261,7 @@ class _Corners:
             if expected.shape != found.shape:
                 return False
             scale = np.abs(expected).max(initial=0.0)
-            if np.abs(expected - found).max(initial=0.0) > _RELATIVE * scale:
+            if np.abs(expected - found).max(initial=0.0) > _AFFINE_ERROR * scale:
                 return False
         return True
 
@@ -286,7 +286,7 @@ def _level(off: float, width: float) -> int:
 
 
 def _offsets(level: int, width: float) -> tuple[float, float]:
-    """Between which offsets :func:`_level` surely gives a level."""
+    """Offsets between which :func:`_level` gives a level in spite of rounding."""
     far = (1.0 - 1e-9) * width * 2.0 ** (abs(level) - 1 if level else 0)
     near = (1.0 + 1e-9) * width * 2.0 ** (abs(level) - 2) if abs(level) > 1 else 0.0
     return (near, far) if level >= 0 else (-far, -near)

@@ -98,7 +98,7 @@ class VectorField(ABC):
 
 
 def require_field(given: object) -> None:
-    """InputError for what is no vector field, such as a contact system itself."""
+    """Raise InputError unless this is a vector field; a contact system itself is none."""
     if not isinstance(given, VectorField):
         raise InputError(f"A vector field is needed, not a {type(given).__name__}; make one with "
                          f"contact_field(system, names of parameters), or with "

@@ -1,11 +1,10 @@
-"""Branches of periodic orbits: what they start from, and by which method they are followed."""
+"""Branches of periodic orbits, from any start and by either method."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
@@ -28,13 +27,13 @@ from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.shooting import require_segments
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError, require_finite, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.trajectory import Trajectory
 
-# Parts of the first step that are tried one after the other to leave a special point.
-_FIRST = (1.0, 0.2, 0.04)
-# Kinds of special points of orbits at which others begin.
-_LEAVING = ("period doubling", "branch point")
+# Factors of the first step, tried in this order to leave a special point.
+_FIRST_STEPS = (1.0, 0.2, 0.04)
+# Kinds of special points of orbits at which other orbits branch off.
+_BRANCHING = ("period doubling", "branch point")
 
 T = TypeVar("T")
 
@@ -150,13 +149,13 @@ def orbit_branch(
         outside the unit circle), 'stable', 'trivial_error' (distance from one of the multiplier
         that is one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
 
-        - 'fold': with parameter_error, by which its parameter changes on a finer mesh,
-        - 'period doubling' and 'Neimark-Sacker': with coefficient, coefficient_error,
-          criticality ('supercritical', 'subcritical' or 'undecided') and parameter_error,
-        - 'branch point': where two branches of orbits cross, with parameter_error as well,
+        - 'fold': with ``parameter_error``, the change of its parameter on a finer mesh,
+        - 'period doubling' and 'Neimark-Sacker': with ``coefficient``, ``coefficient_error``,
+          ``criticality`` ('supercritical', 'subcritical' or 'undecided') and ``parameter_error``,
+        - 'branch point': where two branches of orbits cross, with ``parameter_error``,
         - 'period halving': where doubled orbits become single again; there the branch ends,
-        - 'unresolved': where 'unstable' changes though nothing of the kind was found; or what
-          instead_of says on this mesh alone, though finer ones do not have it.
+        - 'unresolved': where 'unstable' changes but no test function has a zero; or a point of
+          the kind ``instead_of`` that finer meshes do not have.
 
     Raises
     ------
@@ -183,7 +182,7 @@ def orbit_branch(
                          f"or one of a branch of orbits.")
     known = start.branch.parameter_name
     name = known if parameter is None else field.parameter_or_only(parameter)
-    if name == known and start.kind in _LEAVING:
+    if name == known and start.kind in _BRANCHING:
         _require_one_side(start, both)
         return _beyond(field, start, method, chosen, scales, width, direction)
     if name == known and _keeps(start, method):
@@ -236,7 +235,7 @@ def _keeps(point: BranchPoint, method: Collocation | Shooting | None) -> bool:
 
 
 def _first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch:
-    """The branch from the first start from which there is one."""
+    """The branch from the first attempt that succeeds."""
     failed: FecontactError = InputError("There is nothing to start from.")
     for attempt in attempts:
         try:
@@ -308,14 +307,14 @@ def _beyond(
         found, method.intervals if isinstance(method, Collocation) else None)
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
 
-    # The first step leaves the point, where the branches cannot be told apart; the new one may be
-    # strongly bent there.
+    # At the point both branches are indistinguishable, and the new one may bend strongly: step off
+    # it, by less if the corrector fails.
     def go(part: float) -> Branch:
         step = max(part * options.step, options.smallest_step)
         return _followed((problem, u + step * tangent, tangent), replace(options, step=step),
                          None)
 
-    return _first_that_goes(iter(_FIRST), go)
+    return _first_that_goes(iter(_FIRST_STEPS), go)
 
 
 def _goes_on(
@@ -342,7 +341,7 @@ def _followed(
     start: tuple[CollocationProblem, Array, Array | None], options: ContinuationOptions,
     limits: Array | None, **how: Any,
 ) -> Branch:
-    """The branch of orbits by collocation, its special points on meshes of their own."""
+    """Follow a branch by collocation and refine its special points."""
     problem, u, tangent = start
     field = problem.field
     attributes: dict[str, Any] = {
@@ -354,10 +353,9 @@ def _followed(
     name = list(field.parameters)[problem.free]
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     ended = replace(options, stop_at=[*stops, HALVING])
-    # What is special is located once more below, on a mesh of its own.
+    # Locate special points coarsely here; they are refined below on meshes of their own.
     branch = continue_branch(replace(problem, limits=limits, precision=ROUGHLY), u, ended,
-                             name=name,
-                             tangent=tangent, attributes=attributes, **how)
+                             name=name, tangent=tangent, attributes=attributes, **how)
     if branch.points[-1].kind == HALVING and HALVING not in stops:
         branch = replace(branch, status=BranchStatus.CLOSED)
     points = list(branch.points)
@@ -371,7 +369,7 @@ def _followed(
 
 
 def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
-    """A special point located once more, on the mesh that suits its own orbit."""
+    """A special point, refined on the mesh of its own orbit."""
     point = branch.points[index]
     before = next((one for one in branch.points[index::-1] if one.kind is None), branch.points[-1])
     return sharpened(point, restored(field, point), restored(field, before))

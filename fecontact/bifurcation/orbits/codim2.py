@@ -1,29 +1,28 @@
-"""Curves of folds, period doublings and torus bifurcations of orbits over two parameters."""
+"""Continuation problem of folds, period doublings and Neimark-Sacker points of orbits.
 
+An orbit by collocation with two free parameters, and a test function at zero.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem, options_of
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.normal_forms import Expansion
-from fecontact.bifurcation.orbits.restored import restored
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.core.types import Array
 
-_KINDS = ("fold", "period doubling", "Neimark-Sacker")
-_DIFFERENCE = 1e-5  # step of the differences of the test function, in the inner product
-_EXPANSION = 1e-3  # step of the differences of normal forms, in ranges of the states
-_CUSP = 1e-3  # both parameters change by less than this part of a step
+_TEST_STEP = 1e-5  # step of the differences of the test function, in the inner product
+_NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
+_CUSP_RATE = 1e-3  # both parameters change by less than this part of a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class OrbitCurve(Problem):
 
     The test function is the product of mu + 1 over the multipliers at period doublings, of
     mu_i mu_k - 1 over pairs at torus bifurcations. At folds it is the component of the first
-    parameter in the tangent that the orbits have while the second one rests.
+    parameter in the tangent of the branch at fixed second parameter.
 
     The unknowns are those of the orbit, ``u = [nodes, T if it is unknown, second, first]``.
 
@@ -67,7 +66,7 @@ class OrbitCurve(Problem):
         return result, moved, turned
 
     def rest(self, u: Array) -> Array:
-        """Direction (n,) in which the orbits go while the second parameter rests."""
+        """Tangent (n,) of the branch of orbits at fixed second parameter."""
         linearised = self.orbit.linearise(u)
         bordered = linearised.with_rows([_unit(len(u), -2)])
         _, _, vectors = np.linalg.svd(_even(bordered.matrix))
@@ -99,7 +98,7 @@ class OrbitCurve(Problem):
             return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}
         if self.kind == "period doubling":
             expansion = Expansion(self.orbit, u, linearisation.orbit)
-            return {"generalised period doubling": expansion.doubling(_EXPANSION)}
+            return {"generalised period doubling": expansion.doubling(_NORMAL_FORM_STEP)}
         mean = _critical_mean(linearisation.orbit.floquet.others)
         return {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
                 for order in (1, 2, 3, 4)}
@@ -107,11 +106,11 @@ class OrbitCurve(Problem):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        """Nothing more is known of points of codimension two; at a cusp the curve turns as well."""
+        """No data at points of codimension two. A fold is a cusp if both parameters turn."""
         if kind != "fold":
             return {}
         both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
-        return {"kind": "turning point"} if both.max() > _CUSP else None
+        return {"kind": "turning point"} if both.max() > _CUSP_RATE else None
 
 
 class CurveLinearised:
@@ -146,7 +145,7 @@ class CurveLinearised:
         size = float(np.sqrt(self.problem.weights() @ direction**2))
         if size == 0.0:
             return 0.0
-        h = _DIFFERENCE / size
+        h = _TEST_STEP / size
         up, down = (self.problem.test(self.problem.orbit.linearise(self.u + sign * direction))
                     for sign in (h, -h))
         return (up - down) / (2.0 * h)
@@ -165,69 +164,35 @@ class CurveLinearised:
 
 
 def orbit_curve(
-    field: VectorField, point: BranchPoint, second: str, *,
-    options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
-    width: float | None = None, direction: float = 1.0, both: bool = False,
-) -> Branch:
-    """The curve of a special point of orbits over two parameters.
+    field: VectorField, point: BranchPoint, second: str, widths: Mapping[str, float],
+    scales: ArrayLike | None,
+) -> tuple[OrbitCurve, Array, dict[str, Any]]:
+    """Problem, unknowns and attributes of the curve through a special point of orbits.
 
     Parameters
     ----------
-    field : VectorField
-        The system, with both parameters.
-    point : BranchPoint
-        A special point of the kind 'fold', 'period doubling' or 'Neimark-Sacker' on a branch from
-        :func:`fecontact.bifurcation.orbit_branch` by collocation.
-    second : str
-        The second parameter.
-    options, bounds : optional
-        How the curve is followed; the bounds are those of the branch's parameter.
-    width : float, optional
-        Width of the diagram in the second parameter; by default its value.
-    direction, both
-        Sign of the first change of the branch's parameter; whether to go to both sides.
-
-    Returns
-    -------
-    Branch
-        Each point stores both parameters by their names, and what orbits store. Special points
-        are 'cusp' on curves of folds, 'generalised period doubling', where doublings turn from
-        super- to subcritical, and 'resonance 1:1' to 'resonance 1:4' on curves of tori, where
-        the multipliers pass 1, -1, or the angle 120 or 90 degrees; and 'turning point'.
+    field, point, second, scales
+        As for :func:`fecontact.bifurcation.codim2_curve`.
+    widths : mapping
+        Width of the diagram in each parameter by name; by default that of the branch in the first
+        parameter, and the size of the second one.
 
     Raises
     ------
     InputError
-        If the point is of another kind, or a parameter is unknown.
+        If the point is none of a branch of orbits by collocation, or of another field.
     """
-    require_field(field)
-    require_kind("orbit_curve", BranchPoint, point=point)
-    require_finite("orbit_curve", direction=direction)
-    if point.kind not in _KINDS:
-        raise InputError(f"{point.place} starts no curve; curves start at "
-                         f"{', '.join(repr(kind) for kind in _KINDS)}.")
-    index, first = field.index(second), point.branch.parameter_name
-    if second == first:
-        raise InputError(f"second = {second!r} is the parameter of the branch; name another one.")
     problem, u, _ = restored(field, point)
+    problem = rescaled(problem, scales, widths.get(point.branch.parameter_name))
+    index = field.index(second)
     value = float(problem.values[index])
-    if width is None:
-        width = abs(value) or 1.0
-    require_positive("orbit_curve", width=width)
-    scales = np.insert(problem.scales, -1, width)
-    orbit = replace(problem, second=index, scales=scales)
+    width = widths.get(second, abs(value) or 1.0)
+    orbit = replace(problem, second=index, scales=np.insert(problem.scales, -1, width))
     start = np.insert(u, -1, value)
-    curve = OrbitCurve(orbit, point.kind, np.zeros(len(start)))
+    curve = OrbitCurve(orbit, str(point.kind), np.zeros(len(start)))
     if point.kind == "fold":
         curve = replace(curve, row=orbit.weights() * curve.rest(start))
-    attributes = {**point.branch.attributes, "second": second, "kind": point.kind}
-    unit = _unit(len(start), -1)
-    tangent = CurveLinearised(curve, start).solve(unit, unit)
-    if not np.isfinite(tangent).all():
-        tangent = CurveLinearised(curve, start).solve(_unit(len(start), -2), unit)
-    tangent = np.copysign(1.0, direction) * tangent
-    return continue_branch(curve, start, options_of(options, bounds), name=first, tangent=tangent,
-                           both=both, attributes=attributes)
+    return curve, start, {**point.branch.attributes, "scales": orbit.scales}
 
 
 def _unit(size: int, place: int) -> Array:

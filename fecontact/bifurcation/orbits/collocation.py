@@ -1,4 +1,4 @@
-"""Periodic orbits by orthogonal collocation as a problem of continuation."""
+"""Continuation problem of periodic orbits by orthogonal collocation."""
 
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -19,11 +19,10 @@ from fecontact.bifurcation.orbits.same_orbit import HALVING, halves_meet, in_pha
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
-# The most by which a guess is bent away from the tangent, in steps.
+# Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
-# Part of its amplitude by which that of an orbit differs from one mesh and phase to others, at the
-# most.
-_UNLIKE = 0.1
+# Largest relative difference of the amplitude of one orbit on two meshes.
+_AMPLITUDE_CHANGE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class CollocationProblem(Discretisation, Problem):
     confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
 
     def linearise(self, u: Array) -> CollocationLinearisation:
-        """Residual and linearisation at u; what is not asked for is not computed."""
+        """Residual and linearisation at u, each computed on demand."""
         return CollocationLinearisation(self, u)
 
     def evaluate(self, u: Array) -> CollocationLinearisation:
@@ -66,7 +65,7 @@ class CollocationProblem(Discretisation, Problem):
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, float]:
-        """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
+        """Test functions of 'period doubling', 'torus' and 'branch point'."""
         found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
         return found
 
@@ -85,7 +84,7 @@ class CollocationProblem(Discretisation, Problem):
                 "maximum": high}
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Multipliers as close to the unit circle as their error may lie on either side."""
+        """Range of the number of unstable multipliers, given their errors."""
         found: tuple[int, int] = linearisation.floquet.unstable_range
         return found
 
@@ -108,34 +107,34 @@ class CollocationProblem(Discretisation, Problem):
         if not (isinstance(origin, CollocationProblem)
                 and same_heading(self.weights(), tangent, heading, self.common)):
             return None
-        # No shift in time changes period, parameter and amplitude.
+        # Period, parameter and amplitude do not depend on the phase.
         common = slice(-self.common, None)
         if weighted_norm(self.weights()[common], u[common] - like[common]) > within:
             return None
         one, other = origin._amplitude(u, self.scales), self._amplitude(like, self.scales)
-        if abs(one - other) > within + _UNLIKE * max(one, other):
+        if abs(one - other) > within + _AMPLITUDE_CHANGE * max(one, other):
             return None
         return in_phase(self, origin._on_other_mesh(self.mesh, [u])[0], like)
 
     def _amplitude(self, u: Array, scales: Array) -> float:
-        """Distance of the orbit's states from their mean, the root of its mean square."""
+        """Root mean square of the states about their mean."""
         nodes = self.nodes(u) / scales[: self.field.dimension]
         weights = np.repeat(self.widths / self.degree, self.degree)
         return float(np.sqrt((weights @ (nodes - weights @ nodes) ** 2).sum()))
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Along the tangent, and bent like the step before."""
+        """Predictor along the tangent, with the curvature of the last step."""
         guess = u + step * tangent
         if len(self.before) < 3:
             return guess
-        # The tangent of old has another length in the mesh and scales of today.
+        # The old tangent has another length on the new mesh and scales.
         length = step / weighted_norm(self.weights(), self.before[1])
         aside = 0.5 * length * length * self.before[2]
         straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
         return guess if straight else guess + aside
 
     def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
-        """The problem for the next step: the phase fixed by u, from time to time a new mesh."""
+        """The problem for the next step: phase condition at u, now and then a new mesh."""
         bend = self._bend(u, tangent)
         vectors = [u, tangent] if bend is None else [u, tangent, bend]
         mesh, age = self.mesh, self.age + 1
@@ -155,7 +154,7 @@ class CollocationProblem(Discretisation, Problem):
         return (tangent - direction) / length if length > 0.0 else None
 
     def _grown(self, u: Array) -> Array:
-        """Scales of states, period and parameter, larger where the orbit has outgrown them."""
+        """Scales of states, period and parameter, enlarged with the orbit."""
         d = self.field.dimension
         if self.limits is None:
             return self.scales

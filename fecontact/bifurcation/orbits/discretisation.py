@@ -122,7 +122,7 @@ class Discretisation:
 
     @cached_property
     def phase_border(self) -> Array:
-        """The same over all unknowns."""
+        """Row of the phase condition over all unknowns."""
         row = np.empty(self.size + self.common)
         fill_phase_row(self.reference, self.rule.weights, self.rule.values, self.rule.slopes, row)
         return row

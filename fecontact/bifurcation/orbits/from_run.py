@@ -1,4 +1,4 @@
-"""The periodic motion on which a run settles, as a start for branches of orbits."""
+"""Periodic motions from runs, as starts for branches of orbits."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from fecontact.system.forcing_period import common_period
 
 _SAMPLES = 1000
 _TRANSIENT_PERIODS, _LARGEST = 200, 16
-# Part of its size by which a motion may miss its start after a period.
+# Largest relative difference of a motion from itself a period later.
 _MISFIT = 1e-2
 
 
@@ -86,14 +86,14 @@ def periodic_motion(
                             f"size); start at another value of the parameter, or run it longer.")
     count = found.periods * _SAMPLES + 1
     return PeriodicMotion(fine.time[:count], fine.states[:count], found.periods * excitation,
-                         found.periods)
+                          found.periods)
 
 
 def _run(
     system: ContactSystem, initial: Initial, end: float, outputs: Array, rtol: float,
     begin: float = 0.0,
 ) -> Trajectory:
-    """A run whose outputs are those asked for, without its start unless that is one of them."""
+    """A run with the outputs asked for, the start only if it is one of them."""
     extra = outputs[0] > begin
     times = np.append(begin, outputs) if extra else outputs
     times[-1] = end
@@ -109,7 +109,7 @@ def _run(
 
 
 def _period(run: Trajectory, longest: float) -> float:
-    """Time after which the modal displacement that moves most passes its middle as before [s].
+    """Period [s] from equal passages of the largest modal displacement through its middle.
 
     Slip velocities hardly change during stick, so that states alone do not tell the time well.
     """

@@ -1,14 +1,13 @@
-"""Periodic motions as samples: of runs that repeat, and of the orbits of branches."""
+"""Sampled periodic motions, of runs and of the orbits of branches."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.simulate import simulate
 from fecontact.system.contact_system import ContactSystem
 
@@ -73,7 +72,7 @@ def nodes_on_mesh(u: Array, mesh: Array, states: int) -> tuple[Array, int]:
     InputError
         If the orbit was found by shooting.
     """
-    # Behind the nodes stand the parameter and, without excitation, the period.
+    # The nodes are followed by the period, of autonomous systems, and the parameter.
     intervals = len(mesh) - 1
     degree = (len(u) - 1) // (intervals * states)
     if degree < 2:

@@ -25,11 +25,11 @@ from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 
 Array = NDArray[Any]
 
-# Steps of the differences, in ranges of the states over the orbit: the first two that agree count.
+# Steps of the differences, in ranges of the states over the orbit; the first two that agree serve.
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
 _AGREEMENT = 0.02
-# Error of a coefficient, in parts of it, up to which its sign counts.
-_SURE = 0.25
+# Largest relative error of a coefficient at which its sign decides.
+_DECIDED = 0.25
 
 
 def examined(
@@ -59,13 +59,13 @@ def verdict(coefficient: float, error: float) -> dict[str, Any]:
     Undecided are those whose error is above a quarter of themselves, or unknown (NaN).
     """
     criticality = "undecided"
-    if error <= _SURE * abs(coefficient) and coefficient != 0.0:
+    if error <= _DECIDED * abs(coefficient) and coefficient != 0.0:
         criticality = "supercritical" if coefficient < 0.0 else "subcritical"
     return {"coefficient": coefficient, "coefficient_error": error, "criticality": criticality}
 
 
 def _judged(coefficient: Any) -> dict[str, Any]:
-    """The coefficient from the first two steps that agree, or from those that agree best."""
+    """The coefficient from the first two steps that agree, or else the best pair."""
     values: list[float] = []
     pairs: list[tuple[float, float]] = []
     for step in _STEPS:
@@ -217,7 +217,7 @@ class Expansion:
         """Jacobians at h, -h, 2 h and -2 h along a, shared by second and third derivatives."""
         if self._last is None or self._last[1] != h or self._last[0] is not a:
             self._last = a, h, [self._jacobian(part * h * a)
-                                      for part in (1.0, -1.0, 2.0, -2.0)]
+                                for part in (1.0, -1.0, 2.0, -2.0)]
         return self._last[2]
 
     def _scaled(self, direction: Array, step: float) -> float:

@@ -1,10 +1,9 @@
-"""The continuation problem of an orbit, from what a branch stores of it."""
+"""Continuation problems of orbits, restored from points of branches."""
 
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
@@ -13,7 +12,7 @@ from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
 from fecontact.core.errors import InputError, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 P = TypeVar("P", CollocationProblem, ShootingProblem)
 

@@ -1,8 +1,7 @@
-"""Whether two orbits are the same but for a shift of time.
+"""Comparison of orbits that differ by a shift of time.
 
-A closed branch of orbits comes back to the orbit that it began with on another mesh and in another
-phase. A branch of doubled orbits comes back to single ones: beyond, the same orbits follow with
-their halves exchanged.
+A closed branch returns to its first orbit on another mesh and in another phase. A branch of doubled
+orbits may return to single ones; beyond, it repeats the same orbits with their halves exchanged.
 """
 
 from collections.abc import Callable
@@ -13,17 +12,17 @@ from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import interpolate, node_times
 from fecontact.core.types import Array
 
-# Samples of an orbit in which the shift is looked for roughly.
+# Samples of an orbit for the first estimate of the shift.
 _SAMPLES = 512
-# Part of an orbit by which its halves may differ where they come together, and of its direction
-# that parts them.
-_TOGETHER, _PARTING = 0.02, 0.9
+# Largest relative difference of the halves where they meet, and least part of the tangent that
+# separates them.
+_HALVES_MEET, _HALVES_PART = 0.02, 0.9
 
 HALVING = "period halving"
 
 
 def same_heading(weights: Array, one: Array, other: Array, common: int) -> bool:
-    """Whether period and parameter change alike along two directions; no shift changes these."""
+    """Whether period and parameter, which no shift changes, change alike along two directions."""
     return float(weights[-common:] * one[-common:] @ other[-common:]) > 0.0
 
 
@@ -47,7 +46,7 @@ def in_phase(problem: Discretisation, u: Array, like: Array) -> Array:
 def _shift(
     problem: Discretisation, nodes: Array, like: Array, shifted: Callable[[float], Array]
 ) -> float:
-    """Shift in periods at which orbits correlate best, and meet the phase condition."""
+    """Shift in periods of the best correlation that meets the phase condition."""
     from scipy.optimize import brentq
 
     phases = np.arange(_SAMPLES) / _SAMPLES
@@ -66,7 +65,7 @@ def _shift(
 
 
 def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
-    """Whether an orbit is one run through twice, from which the branch parts the two rounds."""
+    """Whether an orbit is a single one traversed twice, and the branch separates its halves."""
     times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
     nodes, along = problem.nodes(u).copy(), problem.nodes(tangent).copy()
     weights = problem.weights()[: problem.size].reshape(nodes.shape)
@@ -75,5 +74,5 @@ def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
         return float((weights * (vector - interpolate(problem.mesh, vector, times)) ** 2).sum() / 4)
 
     motion = float((weights * (nodes - nodes.mean(axis=0)) ** 2).sum())
-    return (apart(nodes) < _TOGETHER**2 * motion
-            and apart(along) > _PARTING * float((weights * along**2).sum()))
+    return (apart(nodes) < _HALVES_MEET**2 * motion
+            and apart(along) > _HALVES_PART * float((weights * along**2).sum()))

@@ -1,11 +1,10 @@
-"""The range of a displacement, or of another linear quantity, at the points of branches."""
+"""Ranges of displacements and other linear quantities over the orbits of branches."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
@@ -14,7 +13,7 @@ from fecontact.bifurcation.orbits.mesh import extremes, interpolate
 from fecontact.bifurcation.orbits.motions import nodes_on_mesh
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 
 def _nodes(point: BranchPoint, states: int) -> tuple[Array, int]:
@@ -54,8 +53,8 @@ def amplitudes(branch: Branch, row: ArrayLike) -> Array:
     return np.array([amplitude(row)(point) for point in branch.points])
 
 
-# For extremes, which are met to the square of the spacing.
-_FINE = 4000
+# Samples per period; the error of an extreme is of the order of their spacing squared.
+_SAMPLES = 4000
 
 
 def observe(
@@ -104,7 +103,7 @@ def _range(
         nodes, _ = _nodes(point, field.dimension)
         section = interpolate(np.asarray(point.values["mesh"], dtype=float), nodes, phases) @ row
         return *quantity_range(point, row), {"observed_section": section} if excited else {}
-    motion = point.orbit(field, _FINE)
+    motion = point.orbit(field, _SAMPLES)
     moved = motion.states @ row
     section = np.interp(phases, motion.times / motion.times[-1], moved)
     return (float(moved.min()), float(moved.max()),

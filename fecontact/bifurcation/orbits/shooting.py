@@ -24,11 +24,11 @@ from fecontact.integrate.sensitivity import Sensitivity, sensitivity
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 
-# Times at which the states of a segment are kept, for their extremes.
+# Samples of a segment, for the extremes of the states.
 _SAMPLES = 33
-# A guess is not bent by more than this part of its step.
+# Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
-# Phase since the start of a segment that needs no run.
+# Phase since the start of a segment below which its start is used without a run.
 _AT_START = 1e-10
 
 
@@ -119,13 +119,13 @@ class ShootingProblem(Problem):
 
     @cached_property
     def phase_row(self) -> Array:
-        """Direction (d,) of the motion at the reference, of length one in the scaled states."""
+        """Unit direction (d,) of the motion at the reference, in the scaled states."""
         f = self.field.rates(np.zeros(1), self.reference[None], self.values)[0]
         row = f / self.scales[: len(f)] ** 2
         return row / np.linalg.norm(row * self.scales[: len(f)])
 
     def linearise(self, u: Array) -> "ShootingLinearisation":
-        """Residual and linearisation at u; what is not asked for is not computed."""
+        """Residual and linearisation at u, each computed on demand."""
         return ShootingLinearisation(self, u)
 
     def weights(self) -> Array:
@@ -136,11 +136,11 @@ class ShootingProblem(Problem):
 
     @property
     def rounding(self) -> float:
-        """Newton steps that grow again for the errors of the runs."""
+        """Relative size of Newton steps below which the errors of the runs dominate."""
         return max(1e-7, 10.0 * self.rtol)
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Along the tangent, and bent like the step before."""
+        """Predictor along the tangent, with the curvature of the last step."""
         guess = u + step * tangent
         if self.bend is None:
             return guess
@@ -149,7 +149,7 @@ class ShootingProblem(Problem):
         return guess if size > _MOST_BENT * step else guess + aside
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[ShootingProblem, Array, Array]":
-        """The problem for the next step: the phase fixed by u."""
+        """The problem for the next step, with the phase condition at u."""
         bend = None
         if self.before is not None:
             start, direction = self.before
@@ -159,7 +159,7 @@ class ShootingProblem(Problem):
                        before=(u, tangent), bend=bend), u, tangent
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Zero at 'period doubling', 'torus' and 'branch point'; folds are found without."""
+        """Test functions of 'period doubling', 'torus' and 'branch point'."""
         return linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
@@ -177,7 +177,7 @@ class ShootingProblem(Problem):
                 "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Multipliers as close to the unit circle as their error may lie on either side."""
+        """Range of the number of unstable multipliers, given their errors."""
         found: tuple[int, int] = linearisation.floquet.unstable_range
         return found
 
@@ -195,7 +195,7 @@ class ShootingProblem(Problem):
         weights = self.weights()
         if len(u) != len(like) or not same_heading(weights, tangent, heading, self.common):
             return None
-        # No shift in time changes period and parameter.
+        # Period and parameter do not depend on the phase.
         common = slice(-self.common, None)
         if weighted_norm(weights[common], u[common] - like[common]) > within:
             return None
@@ -236,7 +236,7 @@ def shooting_from(
     problem: CollocationProblem, u: Array, segments: int = 4, rtol: float = 1e-9,
     derivative_rtol: float | None = None,
 ) -> tuple[ShootingProblem, Array]:
-    """The same orbit by shooting over so many segments of equal time, with its first guess.
+    """The shooting problem of an orbit, with segments of equal length, and its first guess.
 
     Raises
     ------
@@ -267,7 +267,7 @@ def run_from(system: ContactSystem, times: Array, starts: Array, rtol: float) ->
 
 
 def started_in_phase(problem: ShootingProblem, u: Array, like: Array) -> Array:
-    """An orbit by shooting, started where it is next to another one.
+    """An orbit by shooting, shifted in time to lie next to another one.
 
     Where the phase is free it starts on the plane of the phase condition, else a whole number of
     periods of the forcing later.
@@ -396,7 +396,7 @@ class ShootingLinearisation:
         return problem.periods * (periods[0] - periods[1]) / (2.0 * h)
 
     def _shifted(self, j: int, run: Sensitivity, values: Array) -> Array:
-        """Derivative (d,) of the end of segment j with the period, as both its times move."""
+        """Derivative (d,) of the end of segment j to the period, which moves both its times."""
         problem, rates = self.problem, self.problem.field.rates
         before, after = (rates(self._times[k : k + 1], state[None].copy(), values)[0]
                          for k, state in ((j, run.states[0]), (j + 1, run.states[-1])))

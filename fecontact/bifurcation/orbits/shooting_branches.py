@@ -1,10 +1,9 @@
-"""Branches of orbits by shooting: from a motion, at Hopf points and at period doublings."""
+"""Branches of orbits by shooting, from motions, Hopf points and period doublings."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
@@ -23,17 +22,18 @@ from fecontact.bifurcation.orbits.shooting import (
 )
 from fecontact.bifurcation.orbits.starts import Start, from_samples
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
-# Part of their largest distance below which the two halves of an orbit come together. Closer to
-# single orbits Newton's method finds either, as both solve the equations.
+# Distance of the two halves of an orbit, relative to the largest one, at which a branch of doubled
+# orbits ends. Single orbits solve the equations too: closer to them the corrector may find either,
+# so the end is located on the branch of single orbits.
 _CLOSE = 0.1
-# Mesh on which a motion is sampled before it is cut into segments.
+# Mesh on which a motion is sampled before it is divided into segments.
 _INTERVALS, _DEGREE = 200, 4
 
 
 def _attributes(problem: ShootingProblem) -> dict[str, Any]:
-    """What is kept with a branch."""
+    """Attributes of a branch."""
     names = problem.field
     found = {"state_names": list(names.state_names), "parameter_names": list(names.parameters),
              "parameter_values": problem.values, "scales": problem.scales,
@@ -172,10 +172,10 @@ def _halves(u: Array, common: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Doubled(ShootingProblem):
-    """Orbits of twice a period, with a test for those that come back to single ones.
+    """Doubled orbits, with a test function for their return to single ones.
 
-    ``apart`` (K d / 2,) is by how much the halves of the last orbit differed, ``largest`` the
-    largest length of such a difference so far.
+    ``apart`` (K d / 2,) is the difference of the halves of the last orbit, ``largest`` the largest
+    length of such a difference so far.
     """
 
     apart: Array = field(default_factory=lambda: np.zeros(0))
@@ -204,9 +204,9 @@ class _Doubled(ShootingProblem):
 
 
 def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions) -> Branch:
-    """The branch, with an end that comes back to single orbits located on these.
+    """The branch with its end on single orbits, if it returns to them.
 
-    Where that was passed in one step, what follows are single orbits, and is left out.
+    Points beyond that end, where one step passed it, are single orbits and are dropped.
     """
     common = single.common
     weights = single.weights()[:-common]
@@ -218,7 +218,7 @@ def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions
     points = branch.points[: close[0] + 1]
     branch = replace(branch, status=BranchStatus.CLOSED, message="")
     before, last = points[-2:]
-    # The parameter is even in what parts the halves.
+    # The parameter is an even function of the distance of the halves.
     one, other = sizes[close[0] - 1 : close[0] + 1] ** 2
     there = last.parameter + other * (last.parameter - before.parameter) / (other - one)
     first, second = _halves(last.u, common)
@@ -241,7 +241,7 @@ def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions
 def _doublings_near(
     single: ShootingProblem, u: Array, options: ContinuationOptions, off: float, name: str
 ) -> tuple[BranchPoint, ...]:
-    """Doublings of the single orbits, ``off`` or so in the parameter from that near u."""
+    """Period doublings of the single orbits near u, within about ``off`` in the parameter."""
     step = max(4.0 * off / float(single.scales[-1]), options.step)
     low, high = options.bounds
     beside = replace(options, step=step, largest_step=step, points=4, stop_at=(),
@@ -253,7 +253,7 @@ def _doublings_near(
 
 
 def _doubled(problem: ShootingProblem, u: Array) -> tuple[_Doubled, Array, Array]:
-    """The orbit run through twice, and the direction (of length one) in which it parts."""
+    """The orbit traversed twice, and the unit direction in which its halves separate."""
     starts = problem.starts(u)
     rounds = [run.monodromy for run in ShootingLinearisation(problem, u).runs]
     around = np.eye(starts.shape[1])

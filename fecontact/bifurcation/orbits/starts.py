@@ -1,4 +1,4 @@
-"""Where branches of periodic orbits begin: a Hopf point, a guess, another branch of orbits.
+"""Starts of branches of periodic orbits: at Hopf points, from samples, on other branches.
 
 A start is a problem, its unknowns u and the direction in which the branch leaves.
 """
@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
@@ -16,14 +15,14 @@ from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
 from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
 from fecontact.core.errors import AnalysisError, InputError, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 Start = tuple[CollocationProblem, Array, Array]
 
 _CORRECTIONS = 25
-# First amplitudes of orbits at a Hopf point, tried one after the other. Where the friction law
-# bends strongly, orbits keep the shape of the eigenvector at the smallest ones only; where they lie
-# close to the Hopf point in the parameter, a larger one is told from it.
+# First amplitudes of orbits at a Hopf point, tried in this order. With a strongly curved friction
+# law only the smallest orbits have the shape of the eigenvector; where the parameter hardly changes
+# along the branch, only larger ones are distinct from the equilibrium.
 AMPLITUDES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-2, 1e-7)
 
 
@@ -31,7 +30,7 @@ def from_hopf(
     field: VectorField, values: Array, free: int, state: Array, angular_frequency: float,
     vector: ArrayLike, intervals: int, degree: int, scales: Array, amplitude: float = 1e-3,
 ) -> Start:
-    """Orbits that are born at a Hopf point, x = state + eps Re(vector exp(i w t)).
+    """Start on the orbits born at a Hopf point, x = state + eps Re(vector exp(i w t)).
 
     Parameters
     ----------
@@ -65,7 +64,7 @@ def from_hopf(
     leaving /= np.sqrt(problem.weights() @ leaving**2)
     u = np.concatenate([np.tile(np.asarray(state, dtype=float), len(shape)),
                         [period, values[free]]])
-    # At the Hopf point itself the period and the parameter have no effect on the orbit.
+    # At the Hopf point itself period and parameter do not affect the orbit: the system is singular.
     return problem, u + amplitude * leaving, leaving
 
 
@@ -141,7 +140,7 @@ def _with_period(scales: Array, period: float) -> Array:
 
 
 def _return_time(t: Array, x: Array) -> float:
-    """Time since the motion was last where it ends, going the same way."""
+    """Time since the motion last passed its end point in the same direction."""
     scale = np.ptp(x, axis=0)
     scaled = x / np.where(scale > 0.0, scale, 1.0)
     away = np.linalg.norm(scaled - scaled[-1], axis=1)
@@ -160,7 +159,7 @@ def _return_time(t: Array, x: Array) -> float:
 def corrected(
     problem: CollocationProblem, u: Array, tolerance: float = 1e-10
 ) -> tuple[CollocationProblem, Array]:
-    """The orbit near u, with the parameter held, on a mesh that suits it.
+    """The orbit near u at fixed parameter, on a mesh equidistributed for it.
 
     Raises
     ------
@@ -219,7 +218,7 @@ def _at_rest(problem: CollocationProblem, u: Array, size: float) -> bool:
 
 
 def doubled(problem: CollocationProblem, u: Array) -> Start:
-    """Orbits of twice the period, with twice the intervals, born at the period doubling u.
+    """Start on the doubled orbits at a period doubling u, with twice the intervals.
 
     The direction is the eigenfunction of the multiplier -1, which changes sign after one period.
     """
@@ -247,7 +246,7 @@ def doubled(problem: CollocationProblem, u: Array) -> Start:
 
 
 def on_intervals(start: Start, intervals: int | None) -> Start:
-    """The start on so many intervals; None to leave them."""
+    """The start on another number of intervals; None keeps it."""
     problem, u, tangent = start
     if intervals is None or intervals == problem.intervals:
         return start
@@ -256,7 +255,7 @@ def on_intervals(start: Start, intervals: int | None) -> Start:
 
 
 def crossing(problem: CollocationProblem, u: Array, incoming: Array) -> Start:
-    """The other branch of orbits through the branch point u.
+    """Start on the other branch of orbits through a branch point u.
 
     ``incoming`` is the direction of the first branch nearby: at the point itself the equations
     have two directions, and do not tell which is which.

@@ -32,9 +32,10 @@ def branch(
     (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, frequencies and growth rates of the
     modes in steady sliding. Ctrl-C stops it; what was computed until then is written.
     """
-    from fecontact.cli.console import INTERRUPTED, titled_bar, waiting
+    from fecontact.cli.console import INTERRUPTED, waiting
     from fecontact.cli.run_files import read_study
-    from fecontact.core.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.progress import titled_bar
 
     described = read_study(study, set_)
     wanted = _wanted(described.branch, parameter, bounds, start)

@@ -32,7 +32,7 @@ def render(
     from dataclasses import replace
 
     from fecontact.cli.run_files import movie, stored_run
-    from fecontact.core.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder
 
     changes: dict[str, Any] = {
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
@@ -74,7 +74,7 @@ def plot(
     """Draw a plot of a run, again or of another kind."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import stored_run
-    from fecontact.core.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder
 
     stored = stored_run(file, trust)
     from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw
@@ -103,7 +103,7 @@ def export(
     """Write a run in another format."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import stored_run
-    from fecontact.core.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder
 
     stored = stored_run(file, trust)
     from fecontact.output.files.export import export_run

@@ -21,7 +21,7 @@ def init(
 ) -> None:
     """Write a commented study file to start from."""
     from fecontact.cli.templates import template
-    from fecontact.core.atomic_write import write_text
+    from fecontact.core.files.atomic_write import write_text
 
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
@@ -36,7 +36,7 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     """Make the mesh of a study, and print its size and its groups."""
     from fecontact.cli.run_files import read_study
     from fecontact.cli.tables import mesh_table
-    from fecontact.core.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder
     from fecontact.fem.mesh_files import write_mesh
 
     described = read_study(study, set_)
@@ -62,9 +62,9 @@ def modes(
     = False,
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
-    from fecontact.cli.console import progress_bar, waiting
+    from fecontact.cli.console import waiting
     from fecontact.cli.run_files import convergence_of, read_study
-    from fecontact.core.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder
     from fecontact.reduction.report import BasisReport
 
     described = read_study(study, set_)
@@ -78,8 +78,7 @@ def modes(
         plot_modes(basis, path=picture)
         echo_written(picture)
         if converge:
-            with progress_bar("Refining", 1.0) as progress:
-                result = convergence_of(described, progress)
+            result = convergence_of(described)
             echo(f"\n{result}")
             picture = folder / f"{described.name}-convergence.png"
             plot_convergence(result, path=picture)
@@ -100,14 +99,14 @@ def run(
     Ctrl-C stops the run, and so do SIGTERM and SIGHUP; what was computed until then is written, and
     --resume goes on from there.
     """
-    from fecontact.cli.console import progress_bar, waiting
+    from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_run
     from fecontact.cli.tables import notes, run_table
-    from fecontact.core.atomic_write import output_folder
-    from fecontact.core.locks import locked
+    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.locks import locked
 
     described = read_study(study, set_)
-    t_end = described.t_end
+    _ = described.t_end
     with waiting("Compiling, once after an installation"):
         pass
     with (output_folder(output or described.results) as folder,
@@ -122,8 +121,7 @@ def run(
         elif not checkpoint.exists():
             raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
                              f"exist; run the study without --resume.")
-        with progress_bar("Running", t_end, described.simulation.t_start) as progress:
-            trajectory = described.run(progress, checkpoint)
+        trajectory = described.run(True, checkpoint)
         with waiting("Writing"):
             files = write_run(described, trajectory, folder)
         ended = trajectory.status.name

@@ -52,7 +52,6 @@ def sweep(
                          f"in [sweep.axes].")
     if dask is not None and workers is not None:
         raise InputError("--workers is for processes on this machine; leave it out with --dask.")
-    from fecontact.cli.sweep_progress import sweep_bar
     from fecontact.sweeps.executors import dask_executor
     from fecontact.sweeps.sweep import sweep as run_sweep
 
@@ -61,11 +60,10 @@ def sweep(
     folder = output or described.results / f"{described.name}-sweep"
     with contextlib.ExitStack() as stack:
         executor = None if dask is None else stack.enter_context(dask_executor(dask))
-        progress = stack.enter_context(sweep_bar())
         try:
             table = run_sweep(described, executor=executor, folder=folder, resume=resume,
                               overwrite=overwrite, retry=retry, workers=workers,
-                              progress=progress)
+                              progress=True)
         except KeyboardInterrupt:
             print(f"Finished cases are kept in {folder}; go on with --resume.", file=sys.stderr)
             raise

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from fecontact.core.atomic_write import replaced
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, MeshError
-from fecontact.core.types import Integers
+from fecontact.core.files.atomic_write import replaced
+from fecontact.core.types import ArrayLike, Integers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.abaqus import read_inp
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import MeshError
-from fecontact.core.stored import member, values
+from fecontact.core.files.stored import member, values
 from fecontact.core.types import Integers
 from fecontact.fem.mesh_files.raw import RawMesh
 

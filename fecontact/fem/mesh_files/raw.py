@@ -1,4 +1,4 @@
-"""What a file holds, and the plane first-order mesh made of it."""
+"""Contents of a mesh file as read, and their conversion to a plane first-order mesh."""
 
 from dataclasses import dataclass, field
 

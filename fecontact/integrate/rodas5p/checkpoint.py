@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.atomic_write import replaced
 from fecontact.core.errors import InputError
-from fecontact.core.stored import DamagedError, npz_arrays, reading
+from fecontact.core.files.atomic_write import replaced
+from fecontact.core.files.stored import DamagedError, npz_arrays, reading
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.state import OUTPUTS

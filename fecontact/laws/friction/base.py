@@ -51,8 +51,7 @@ class MemorylessFriction(base.FrictionLaw):
 class SmoothedFriction(MemorylessFriction):
     r"""Friction R = F (mu(\|v\|) s(v) + viscous term), with the sign of v smoothed to s(v).
 
-    Subclasses have the fields ``smoothing_slope``, k_s > 0 [s/m], and ``smoothing``. All
-    smoothings rise with the same slope ``2 k_s / pi`` at rest and tend to 1:
+    All smoothings rise with the same slope ``2 k_s / pi`` at rest and tend to 1:
 
     ===============  ===========================================
     smoothing        s(v), with ``x = 2 k_s v / pi``
@@ -63,8 +62,18 @@ class SmoothedFriction(MemorylessFriction):
                      ``eps = pi / (2 k_s)``
     ===============  ===========================================
 
-    At v = 10 / k_s they have reached 0.937, 1 - 6e-6 and 0.988: the slow rise of the arctan is
-    a creep that the others have less of.
+    At v = 10 / k_s they have reached 0.937, 1 - 6e-6 and 0.988: with the arctan, contacts creep
+    more than with the others.
+
+    Parameters
+    ----------
+    smoothing_slope : float or (n,) sequence
+        k_s, positive [s/m]. Below slip velocities of some 1/k_s the contact creeps instead of
+        sticking.
+    viscous_coefficient : float or (n,) sequence
+        c_v, zero or above [s/m].
+    smoothing : {"arctan", "tanh", "square-root"}
+        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
     """
 
     choices: ClassVar = {"smoothing": get_args(Smoothing)}
@@ -117,6 +126,22 @@ class MemoryFriction(base.FrictionLaw):
         """Whether nodes in contact stick: the size of R is below 0.95 of that of steady sliding."""
         steady = np.abs(self.steady_coefficient(slip_velocity)) * normal_force
         return np.asarray(np.abs(friction_force) < 0.95 * steady)
+
+
+class LimitedFriction(MemoryFriction):
+    """A friction law with memory whose force is mu F in steady sliding.
+
+    Parameters
+    ----------
+    friction_coefficient : float or (n,) sequence
+        mu, zero or above.
+    """
+
+    friction_coefficient: base.PerNode
+
+    def steady_coefficient(self, velocity: Array | float) -> Array:
+        """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
+        return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
 
 
 def require_at_least(law: NodeLaw, larger: str, smaller: str) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NotNegative, OneOrAbove, PerNode, Positive
-from fecontact.laws.friction.base import MemoryFriction, require_at_least
+from fecontact.laws.friction.base import LimitedFriction, MemoryFriction, require_at_least
 from fecontact.laws.signatures import memory_friction_law
 
 # Time constant [s] with which internal variables vanish without normal force.
@@ -99,7 +100,7 @@ def bouc_wen(v, F, z, p, force, rates):
 
 
 @dataclass(frozen=True)
-class DahlFriction(MemoryFriction):
+class DahlFriction(LimitedFriction):
     r"""Dahl's law: a spring whose stiffness falls to zero as friction reaches mu F.
 
     .. math::
@@ -121,11 +122,6 @@ class DahlFriction(MemoryFriction):
     exponent : float or (n,) sequence
         i, one or above: 1 is an exponential approach to mu F.
 
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
     References
     ----------
     P. R. Dahl, A solid friction model, The Aerospace Corporation, TOR-0158(3107-18)-1 (1968).
@@ -134,17 +130,13 @@ class DahlFriction(MemoryFriction):
     kernel: ClassVar = dahl
 
     friction_coefficient: Positive = 0.55
-    presliding_stiffness: Positive = 1e5
+    presliding_stiffness: Annotated[Positive, Unit("1/m")] = 1e5
     exponent: OneOrAbove = 1.0
 
     @property
     def state_scale(self) -> Array:
         """Deflection mu / sigma at which the contact slides [m], the smallest of all nodes."""
         return np.array([np.min(np.divide(self.friction_coefficient, self.presliding_stiffness))])
-
-    def steady_coefficient(self, velocity: Array | float) -> Array:
-        """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
-        return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
 
 
 @dataclass(frozen=True)
@@ -188,11 +180,6 @@ class LuGreFriction(MemoryFriction):
         lambda_1, zero or above: 1 / lambda_1 is the velocity at which bristle damping has fallen
         to 1/e; zero keeps it constant [s/m].
 
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
     References
     ----------
     C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A new model for control of systems
@@ -204,12 +191,12 @@ class LuGreFriction(MemoryFriction):
 
     static_coefficient: PerNode = 0.8
     kinetic_coefficient: Positive = 0.55
-    stribeck_velocity: Positive = 1e-3
+    stribeck_velocity: Annotated[Positive, Unit("m/s")] = 1e-3
     stribeck_exponent: Positive = 2.0
-    bristle_stiffness: Positive = 1e5
-    bristle_damping: NotNegative = 0.0
-    viscous_coefficient: NotNegative = 0.0
-    damping_decay: NotNegative = 0.0
+    bristle_stiffness: Annotated[Positive, Unit("1/m")] = 1e5
+    bristle_damping: Annotated[NotNegative, Unit("s/m")] = 0.0
+    viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
+    damping_decay: Annotated[NotNegative, Unit("s/m")] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -235,7 +222,7 @@ class LuGreFriction(MemoryFriction):
 
 
 @dataclass(frozen=True)
-class BoucWenFriction(MemoryFriction):
+class BoucWenFriction(LimitedFriction):
     r"""Bouc-Wen hysteresis between -mu F and mu F.
 
     .. math::
@@ -249,8 +236,6 @@ class BoucWenFriction(MemoryFriction):
 
     Parameters
     ----------
-    friction_coefficient : float or (n,) sequence
-        mu, zero or above.
     yield_displacement : float or (n,) sequence
         u_s, positive: deflection at which the initial stiffness would reach mu F [m].
     beta : float or (n,) sequence
@@ -258,11 +243,6 @@ class BoucWenFriction(MemoryFriction):
         Below it loops could give energy off.
     exponent : float or (n,) sequence
         n, one or above: sharpness of the bend into sliding.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -274,7 +254,7 @@ class BoucWenFriction(MemoryFriction):
     kernel: ClassVar = bouc_wen
 
     friction_coefficient: NotNegative = 0.55
-    yield_displacement: Positive = 5e-6
+    yield_displacement: Annotated[Positive, Unit("m")] = 5e-6
     beta: Annotated[PerNode, Bound("0.5 or above", lambda x: x >= 0.5)] = 0.5
     exponent: OneOrAbove = 1.0
 
@@ -287,7 +267,3 @@ class BoucWenFriction(MemoryFriction):
     def velocity_scale(self) -> float:
         """Slip velocity [m/s] that passes the smallest yield displacement in 0.1 s."""
         return 10.0 * float(np.min(self.yield_displacement))
-
-    def steady_coefficient(self, velocity: Array | float) -> Array:
-        """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
-        return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)

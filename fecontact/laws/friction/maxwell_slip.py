@@ -1,14 +1,15 @@
 """Friction laws of springs and sliders: Jenkins' element and Iwan's parallel arrangement."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.base import NotNegative, Positive
-from fecontact.laws.friction.base import MemoryFriction
+from fecontact.laws.friction.base import LimitedFriction
 from fecontact.laws.signatures import memory_friction_law
 
 
@@ -41,15 +42,23 @@ def _maxwell_slip(v, F, z, p, force, rates):
 
 
 @dataclass(frozen=True)
-class _MaxwellSlip(MemoryFriction):
-    """``memory`` springs and sliders in parallel, between the body and the ground."""
+class _MaxwellSlip(LimitedFriction):
+    """``memory`` springs and sliders in parallel, between the body and the ground.
+
+    Parameters
+    ----------
+    stiffness : float or (n,) sequence
+        k, positive: stiffness of the whole face before it slides, or of each node [N/m].
+    relaxation_time : float or (n,) sequence
+        tau, positive: short against the shortest period of the motion [s].
+    """
 
     kernel: ClassVar = _maxwell_slip
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: Positive = 1e7
+    stiffness: Annotated[Positive, Unit("N/m")] = 1e7
     friction_coefficient: NotNegative = 0.55
-    relaxation_time: Positive = 1e-7
+    relaxation_time: Annotated[Positive, Unit("s")] = 1e-7
 
     @property
     def state_scale(self) -> Array:
@@ -61,10 +70,6 @@ class _MaxwellSlip(MemoryFriction):
         nodes = np.size(self.stiffness)
         part = (2.0 * np.arange(self.memory) + 1.0) / self.memory
         return part * float(np.min(mu / (nodes * np.asarray(self.stiffness))))
-
-    def steady_coefficient(self, velocity: Array | float) -> Array:
-        """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
-        return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
 
 
 @dataclass(frozen=True)
@@ -82,20 +87,6 @@ class JenkinsFriction(_MaxwellSlip):
     not. A cycle of amplitude X > mu F / k takes the energy ``4 mu F (X - mu F / k)``; tau changes
     that by a part of about ``(w tau)^2`` at the angular frequency w: 1e-4 at 16 kHz by default.
     Much shorter ones let stiff solvers step over the end of sliding.
-
-    Parameters
-    ----------
-    stiffness : float or (n,) sequence
-        k, positive: stiffness of the whole face before it slides, or of each node [N/m].
-    friction_coefficient : float or (n,) sequence
-        mu, zero or above.
-    relaxation_time : float or (n,) sequence
-        tau, positive: short against the shortest period of the motion [s].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -122,19 +113,8 @@ class IwanFriction(_MaxwellSlip):
 
     Parameters
     ----------
-    stiffness : float or (n,) sequence
-        k, positive: stiffness of the whole face before it slides, or of each node [N/m].
-    friction_coefficient : float or (n,) sequence
-        mu, zero or above.
-    relaxation_time : float or (n,) sequence
-        tau, positive: short against the shortest period of the motion [s].
     elements : int
         N, one or above: internal variables of each node.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.units import Unit
 from fecontact.laws.base import NotNegative, PerNode, Positive
 from fecontact.laws.friction.base import (
     MemorylessFriction,
@@ -108,7 +109,21 @@ def product(v, F, p):
 
 
 @dataclass(frozen=True)
-class ExponentialFriction(SmoothedFriction):
+class _FallingFriction(SmoothedFriction):
+    """Friction whose coefficient leads from one value at rest to another at high velocities.
+
+    Parameters
+    ----------
+    static_coefficient, kinetic_coefficient : float or (n,) sequence
+        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
+    """
+
+    static_coefficient: NotNegative = 0.8
+    kinetic_coefficient: NotNegative = 0.55
+
+
+@dataclass(frozen=True)
+class ExponentialFriction(_FallingFriction):
     r"""Dry friction that falls exponentially with slip velocity (4.1-21..23).
 
     .. math::
@@ -121,22 +136,8 @@ class ExponentialFriction(SmoothedFriction):
 
     Parameters
     ----------
-    static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
     decay : float or (n,) sequence
         lambda, zero or above [s/m].
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m]. Below slip velocities of some 1/k_s the contact creeps instead of
-        sticking.
-    viscous_coefficient : float or (n,) sequence
-        c_v, zero or above [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -145,16 +146,14 @@ class ExponentialFriction(SmoothedFriction):
 
     kernel: ClassVar = exponential
 
-    static_coefficient: NotNegative = 0.8
-    kinetic_coefficient: NotNegative = 0.55
-    decay: NotNegative = 1000.0
-    smoothing_slope: Positive = 1e6
-    viscous_coefficient: NotNegative = 0.0
+    decay: Annotated[NotNegative, Unit("s/m")] = 1000.0
+    smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
+    viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
 
 
 @dataclass(frozen=True)
-class GaussianFriction(SmoothedFriction):
+class GaussianFriction(_FallingFriction):
     r"""Dry friction that falls with slip velocity like a Gaussian bell (Stribeck curve).
 
     .. math::
@@ -167,21 +166,8 @@ class GaussianFriction(SmoothedFriction):
 
     Parameters
     ----------
-    static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
     stribeck_velocity : float or (n,) sequence
         v_s, positive [m/s].
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m].
-    viscous_coefficient : float or (n,) sequence
-        c_v, zero or above [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -191,16 +177,14 @@ class GaussianFriction(SmoothedFriction):
 
     kernel: ClassVar = gaussian
 
-    static_coefficient: NotNegative = 0.8
-    kinetic_coefficient: NotNegative = 0.55
-    stribeck_velocity: Positive = 1e-3
-    smoothing_slope: Positive = 1e6
-    viscous_coefficient: NotNegative = 0.0
+    stribeck_velocity: Annotated[Positive, Unit("m/s")] = 1e-3
+    smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
+    viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
 
 
 @dataclass(frozen=True)
-class HyperbolicFriction(SmoothedFriction):
+class HyperbolicFriction(_FallingFriction):
     r"""Dry friction that falls with slip velocity like a hyperbola.
 
     .. math::
@@ -213,21 +197,8 @@ class HyperbolicFriction(SmoothedFriction):
 
     Parameters
     ----------
-    static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
     stribeck_velocity : float or (n,) sequence
         v_s, positive: half of the fall is behind it [m/s].
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m].
-    viscous_coefficient : float or (n,) sequence
-        c_v, zero or above [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -237,11 +208,9 @@ class HyperbolicFriction(SmoothedFriction):
 
     kernel: ClassVar = hyperbolic
 
-    static_coefficient: NotNegative = 0.8
-    kinetic_coefficient: NotNegative = 0.55
-    stribeck_velocity: Positive = 1e-3
-    smoothing_slope: Positive = 1e6
-    viscous_coefficient: NotNegative = 0.0
+    stribeck_velocity: Annotated[Positive, Unit("m/s")] = 1e-3
+    smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
+    viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
 
 
@@ -255,24 +224,13 @@ class ConstantFriction(SmoothedFriction):
     ----------
     friction_coefficient : float or (n,) sequence
         mu, zero or above.
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m].
-    viscous_coefficient : float or (n,) sequence
-        c_v, zero or above [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = constant
 
     friction_coefficient: NotNegative = 0.55
-    smoothing_slope: Positive = 1e6
-    viscous_coefficient: NotNegative = 0.0
+    smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
+    viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
 
 
@@ -296,11 +254,6 @@ class ProductFriction(MemorylessFriction):
     smoothing_slope : float or (n,) sequence
         b_2, positive [s/m].
 
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
     References
     ----------
     W. Sextro, Dynamical Contact Problems with Friction, section 4.4.
@@ -310,8 +263,8 @@ class ProductFriction(MemorylessFriction):
 
     factor: NotNegative = 0.14
     excess: NotNegative = 1.14
-    decay: NotNegative = 2.0
-    smoothing_slope: Positive = 100.0
+    decay: Annotated[NotNegative, Unit("s/m")] = 2.0
+    smoothing_slope: Annotated[Positive, Unit("s/m")] = 100.0
 
     @property
     def velocity_scale(self) -> float:
@@ -320,7 +273,7 @@ class ProductFriction(MemorylessFriction):
 
 
 @dataclass(frozen=True)
-class GalvanettoFriction(SmoothedFriction):
+class GalvanettoFriction(_FallingFriction):
     r"""Dry friction that falls like a hyperbola and rises again with the square of velocity.
 
     .. math::
@@ -339,15 +292,6 @@ class GalvanettoFriction(SmoothedFriction):
         gamma, zero or above [s/m].
     growth : float or (n,) sequence
         eta, zero or above [s^2/m^2].
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -357,11 +301,9 @@ class GalvanettoFriction(SmoothedFriction):
 
     kernel: ClassVar = galvanetto
 
-    static_coefficient: NotNegative = 0.8
-    kinetic_coefficient: NotNegative = 0.55
-    decay: NotNegative = 1000.0
-    growth: NotNegative = 0.0
-    smoothing_slope: Positive = 1e6
+    decay: Annotated[NotNegative, Unit("s/m")] = 1000.0
+    growth: Annotated[NotNegative, Unit("s^2/m^2")] = 0.0
+    smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     smoothing: Smoothing = "arctan"
 
 
@@ -386,15 +328,6 @@ class CubicFriction(SmoothedFriction):
         mu_m, zero or above.
     minimum_velocity : float or (n,) sequence
         v_m, positive [m/s].
-    smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m].
-    smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -406,8 +339,8 @@ class CubicFriction(SmoothedFriction):
 
     static_coefficient: PerNode = 0.8
     minimum_coefficient: NotNegative = 0.55
-    minimum_velocity: Positive = 1e-2
-    smoothing_slope: Positive = 1e6
+    minimum_velocity: Annotated[Positive, Unit("m/s")] = 1e-2
+    smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     smoothing: Smoothing = "arctan"
 
     def __post_init__(self) -> None:

@@ -3,13 +3,14 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.data_columns import numbers
 from fecontact.laws.ground.profile import Profile
 from fecontact.laws.signatures import ground_profile
@@ -60,9 +61,9 @@ class FourierSeries(Profile):
 
     kernel: ClassVar = fourier
 
-    wavelength: float
-    amplitudes: tuple[float, ...]
-    phases: tuple[float, ...] = ()
+    wavelength: Annotated[float, Unit("m")]
+    amplitudes: Annotated[tuple[float, ...], Unit("m")]
+    phases: Annotated[tuple[float, ...], Unit("rad")] = ()
 
     def __post_init__(self) -> None:
         require_positive("FourierSeries", wavelength=self.wavelength)

@@ -3,13 +3,15 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
+from fecontact.core.units import Unit
 from fecontact.laws.ground.motion import (
     GroundMotion,
     HarmonicSpeed,
@@ -53,10 +55,10 @@ class Ground:
         friction negative.
     """
 
-    speed: float = 0.0
-    amplitude: float = 0.0
-    wavelength: float = 2.5e-3
-    profile: Profile | None = None
+    speed: Annotated[float, Unit("m/s")] = 0.0
+    amplitude: Annotated[float, Unit("m")] = 0.0
+    wavelength: Annotated[float, Unit("m")] = 2.5e-3
+    profile: Annotated[Profile | None, Unit("m")] = None
     motion: GroundMotion | None = None
     friction_variation: Profile | None = None
 
@@ -118,7 +120,8 @@ class Ground:
 
     def height(self, abscissa: ArrayLike, time: float = 0.0) -> Array:
         """Height [m] at abscissae of the inertial frame [m] at a time [s]."""
-        return self._shape.height(np.asarray(abscissa, dtype=float) - self.travel(time))
+        require_finite("Ground", time=time)
+        return self._shape.height(as_floats(abscissa, "Ground: abscissa") - self.travel(time))
 
     def travel(self, time: float) -> float:
         """Travel [m] since t = 0 at a time [s]."""

@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import require_finite, require_positive
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.signals.base import between
 from fecontact.laws.signatures import signal
 
@@ -95,9 +96,9 @@ class HarmonicSpeed(GroundMotion):
 
     kernel: ClassVar = _harmonic_speed
 
-    amplitude: float
-    angular_frequency: float
-    phase: float = 0.0
+    amplitude: Annotated[float, Unit("m/s")]
+    angular_frequency: Annotated[float, Unit("rad/s")]
+    phase: Annotated[float, Unit("rad")] = 0.0
 
     def __post_init__(self) -> None:
         require_finite("HarmonicSpeed", amplitude=self.amplitude, phase=self.phase)
@@ -159,9 +160,9 @@ class SpeedRamp(GroundMotion):
 
     kernel: ClassVar = _ramp
 
-    end_speed: float
-    start: float
-    duration: float
+    end_speed: Annotated[float, Unit("m/s")]
+    start: Annotated[float, Unit("s")]
+    duration: Annotated[float, Unit("s")]
 
     def __post_init__(self) -> None:
         require_finite("SpeedRamp", end_speed=self.end_speed, start=self.start)

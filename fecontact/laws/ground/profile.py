@@ -1,16 +1,17 @@
-"""What a profile is: the base class of all profiles of the ground."""
+"""Base class of ground profiles."""
 
 import math
 from dataclasses import dataclass, fields
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numba import types
-from numpy.typing import ArrayLike
 
+from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw, i8, kernel, matrix, vector
 from fecontact.core.errors import require_finite, require_not_negative, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
+from fecontact.core.units import Unit
 from fecontact.laws.signatures import ground_at, ground_profile
 
 
@@ -57,7 +58,7 @@ class Profile:
 
     def shape(self, xi: ArrayLike) -> Array:
         """Heights, slopes and curvatures (..., 3) at abscissae (...,) [m]."""
-        places = np.asarray(xi, dtype=float)
+        places = as_floats(xi, "The abscissae of a profile")
         out = np.empty((places.size, 3))
         _shape(self.kernel.address, places.ravel(), self.parameters(), out)
         return out.reshape(*places.shape, 3)
@@ -127,9 +128,9 @@ class Sine(Profile):
 
     kernel: ClassVar = _sine
 
-    amplitude: float
-    wavelength: float
-    phase: float = 0.0
+    amplitude: Annotated[float, Unit("m")]
+    wavelength: Annotated[float, Unit("m")]
+    phase: Annotated[float, Unit("rad")] = 0.0
 
     def __post_init__(self) -> None:
         require_not_negative("Sine", amplitude=self.amplitude)

@@ -4,12 +4,13 @@ import math
 from dataclasses import dataclass, fields
 from functools import cached_property
 from numbers import Integral
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from fecontact.core.errors import InputError, require_not_negative, require_positive
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.ground.fourier_series import FourierSeries, fourier
 from fecontact.laws.ground.profile import Profile
 
@@ -51,11 +52,11 @@ class RandomRoughness(Profile):
 
     kernel: ClassVar = fourier
 
-    rms_height: float
+    rms_height: Annotated[float, Unit("m")]
     hurst_exponent: float
-    roll_off_wavelength: float
-    cut_off_wavelength: float
-    length: float
+    roll_off_wavelength: Annotated[float, Unit("m")]
+    cut_off_wavelength: Annotated[float, Unit("m")]
+    length: Annotated[float, Unit("m")]
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -1,11 +1,12 @@
 """Linear contact, stops on both sides, and a prescribed normal force."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, Positive
 from fecontact.laws.signatures import normal_law
 
@@ -35,27 +36,20 @@ class LinearContact(NormalLaw):
         c of the whole face, or of each node, positive [N/m].
     damping : float or (n,) sequence
         d of the whole face, or of each node, zero or above [N s/m].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = _linear
     extensive: ClassVar = frozenset({"stiffness", "damping"})
 
-    stiffness: Positive
-    damping: NotNegative = 0.0
+    stiffness: Annotated[Positive, Unit("N/m")]
+    damping: Annotated[NotNegative, Unit("N s/m")] = 0.0
 
     @property
     def penetration_scale(self) -> float:
         """Penetration under 1 N on the whole face, or on each node [m], the smallest of all."""
         return 1.0 / float(np.max(self.stiffness))
 
-    def stored_energy(
-        self, penetration: Array, share: Array
-    ) -> Array:
+    def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         return np.asarray(0.5 * self.table(share)[:, 0] * np.maximum(penetration, 0.0) ** 2)
 
@@ -100,20 +94,15 @@ class TwoSidedStop(NormalLaw):
         n, one or above.
     damping_factor : float or (n,) sequence
         chi, zero or above [s/m].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = _two_sided
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: Positive
-    clearance: NotNegative
+    stiffness: Annotated[Positive, Unit("N/m^n")]
+    clearance: Annotated[NotNegative, Unit("m")]
     exponent: OneOrAbove = 1.0
-    damping_factor: NotNegative = 0.0
+    damping_factor: Annotated[NotNegative, Unit("s/m")] = 0.0
 
     @property
     def penetration_scale(self) -> float:
@@ -125,9 +114,7 @@ class TwoSidedStop(NormalLaw):
         """Zero and minus the clearance (2, n) [m]."""
         return np.array([np.zeros(nodes), np.broadcast_to(-np.asarray(self.clearance), nodes)])
 
-    def stored_energy(
-        self, penetration: Array, share: Array
-    ) -> Array:
+    def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in both stops [J]: the integral of F(u, 0) from 0 to u."""
         stiffness, clearance, exponent, _ = self.table(share).T
         depth = np.maximum(penetration, np.maximum(-penetration - clearance, 0.0))
@@ -150,25 +137,18 @@ class PrescribedForce(NormalLaw):
     ----------
     force : float or (n,) sequence
         F_0 of the whole face, or of each node, zero or above [N].
-
-    Raises
-    ------
-    InputError
-        For a negative force.
     """
 
     kernel: ClassVar = _prescribed
     extensive: ClassVar = frozenset({"force"})
 
-    force: NotNegative
+    force: Annotated[NotNegative, Unit("N")]
 
     @property
     def penetration_scale(self) -> float:
         """A micrometre, the size of roughness: the law itself has no scale [m]."""
         return 1e-6
 
-    def stored_energy(
-        self, penetration: Array, share: Array
-    ) -> Array:
+    def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) of the force [J]: F_0 u, zero at u = 0."""
         return np.asarray(self.table(share)[:, 0] * penetration)

@@ -4,12 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast
+from typing import Annotated, Any, ClassVar, Self, cast
 
 import numpy as np
 
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.base import PerNode
 from fecontact.laws.data_columns import read_columns
 from fecontact.laws.normal.rough_surface import RoughSurface, bed_of_asperities
@@ -66,8 +67,6 @@ class MeasuredSurface(RoughSurface):
 
     Parameters
     ----------
-    stiffness, roughness_height, damping : float or (n,) sequence
-        c [N/m], R_Z [m], beta c [N s/m], as for :class:`RoughSurface`.
     bearing : sequence
         h from the highest peak, 0, to the deepest valley, 1, never falling; the same at all nodes.
         By default uniform heights.
@@ -89,7 +88,7 @@ class MeasuredSurface(RoughSurface):
     shared_fields: ClassVar = frozenset({"bearing", "depths", "file"})
 
     # From the file where there is one.
-    roughness_height: PerNode | None = None  # type: ignore[assignment]
+    roughness_height: Annotated[PerNode | None, Unit("m")] = None  # type: ignore[assignment]
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
     file: str | None = None
@@ -241,9 +240,7 @@ class MeasuredSurface(RoughSurface):
     def _complete(self) -> float:
         return float(self._curve().antiderivative()(1.0))
 
-    def _energy(
-        self, s: Array, table: Array
-    ) -> Array:
+    def _energy(self, s: Array, table: Array) -> Array:
         return np.asarray(self._curve().antiderivative(2)(s))
 
 

@@ -1,13 +1,16 @@
 """Normal laws that are a power of the penetration, with damping in proportion to the force."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, PerNode, Positive, UpToOne
 from fecontact.laws.signatures import normal_law
+
+DampingModel = Literal["hunt-crossley", "lankarani-nikravesh", "flores"]
 
 
 @normal_law
@@ -32,7 +35,17 @@ def _power(u, v, p):
 
 @dataclass(frozen=True)
 class _Power(NormalLaw):
-    """Laws whose row of parameters is F_0, l, n, chi of F_0 (u / l)^n max(0, 1 + chi v)."""
+    """Laws whose row of parameters is F_0, l, n, chi of F_0 (u / l)^n max(0, 1 + chi v).
+
+    Parameters
+    ----------
+    stiffness : float or (n,) sequence
+        K of the whole face, or of each node, positive [N/m^n].
+    exponent : float or (n,) sequence
+        n, one or above.
+    damping_factor : float or (n,) sequence
+        chi, zero or above [s/m].
+    """
 
     kernel: ClassVar = _power
 
@@ -43,9 +56,7 @@ class _Power(NormalLaw):
         table = self.table(np.ones(max(sizes)))
         return float(np.min(table[:, 1] * table[:, 0] ** (-1.0 / table[:, 2])))
 
-    def stored_energy(
-        self, penetration: Array, share: Array
-    ) -> Array:
+    def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         scale, length, exponent, _ = self.table(share).T
         s = np.maximum(penetration / length, 0.0)
@@ -62,20 +73,6 @@ class PowerContact(_Power):
     n = 3/2 is a sphere on a plane, n = 1 a linear spring. The damping grows with the penetration,
     so that the force starts from zero and is lost at once with the contact.
 
-    Parameters
-    ----------
-    stiffness : float or (n,) sequence
-        K of the whole face, or of each node, positive [N/m^n].
-    exponent : float or (n,) sequence
-        n, one or above.
-    damping_factor : float or (n,) sequence
-        chi, zero or above [s/m].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
     References
     ----------
     K. H. Hunt, F. R. E. Crossley, Coefficient of restitution interpreted as damping in
@@ -84,9 +81,9 @@ class PowerContact(_Power):
 
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: Positive
+    stiffness: Annotated[Positive, Unit("N/m^n")]
     exponent: OneOrAbove = 1.5
-    damping_factor: NotNegative = 0.0
+    damping_factor: Annotated[NotNegative, Unit("s/m")] = 0.0
 
     def table(self, share: Array) -> Array:
         """Parameters (n, 4): K, 1, n, chi."""
@@ -110,20 +107,12 @@ class RestitutionContact(_Power):
 
     Parameters
     ----------
-    stiffness : float or (n,) sequence
-        K of the whole face, or of each node, positive [N/m^n].
     restitution : float or (n,) sequence
         e, above zero and at most 1; with Lankarani-Nikravesh also zero.
     reference_velocity : float or (n,) sequence
         v_r, positive [m/s].
-    exponent : float or (n,) sequence
-        n, one or above.
-    damping_model : 'hunt-crossley', 'lankarani-nikravesh' or 'flores'
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
+    damping_model : {"hunt-crossley", "lankarani-nikravesh", "flores"}
+        How chi follows from e.
 
     References
     ----------
@@ -134,13 +123,13 @@ class RestitutionContact(_Power):
     """
 
     extensive: ClassVar = frozenset({"stiffness"})
-    choices: ClassVar = {"damping_model": ("hunt-crossley", "lankarani-nikravesh", "flores")}
+    choices: ClassVar = {"damping_model": get_args(DampingModel)}
 
-    stiffness: Positive
+    stiffness: Annotated[Positive, Unit("N/m^n")]
     restitution: PerNode
-    reference_velocity: Positive
+    reference_velocity: Annotated[Positive, Unit("m/s")]
     exponent: OneOrAbove = 1.5
-    damping_model: str = "hunt-crossley"
+    damping_model: DampingModel = "hunt-crossley"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -202,13 +191,6 @@ class PowerLawContact(_Power):
         C, positive [m/Pa^m]; 1 um/MPa^0.5 is 1e-9 m/Pa^0.5.
     exponent : float or (n,) sequence
         m, above zero and at most 1; about 0.5 for metals.
-    damping_factor : float or (n,) sequence
-        chi, zero or above [s/m].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
 
     References
     ----------
@@ -218,10 +200,10 @@ class PowerLawContact(_Power):
 
     extensive: ClassVar = frozenset({"nominal_area"})
 
-    nominal_area: Positive
-    coefficient: Positive
+    nominal_area: Annotated[Positive, Unit("m^2")]
+    coefficient: Annotated[Positive, Unit("m/Pa^m")]
     exponent: UpToOne = 0.5
-    damping_factor: NotNegative = 0.0
+    damping_factor: Annotated[NotNegative, Unit("s/m")] = 0.0
 
     @property
     def penetration_scale(self) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive
 from fecontact.laws.signatures import normal_law
 
@@ -131,17 +132,13 @@ class RoughSurface(NormalLaw):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        c: stiffness of the whole face when all asperities are in contact, or of each node [N/m].
+        c, positive: stiffness of the whole face when all asperities are in contact, or of each
+        node [N/m].
     roughness_height : float or (n,) sequence
-        R_Z: peak-to-valley height of the surface [m].
+        R_Z, positive: peak-to-valley height of the surface [m].
     damping : float or (n,) sequence
-        beta c: damping of the whole face when all asperities are in contact, or of each
-        node [N s/m]; none by default.
-
-    Raises
-    ------
-    InputError
-        For a stiffness or roughness height that is not positive, or a negative damping.
+        beta c, zero or above: damping of the whole face when all asperities are in contact, or of
+        each node [N s/m].
 
     References
     ----------
@@ -152,18 +149,16 @@ class RoughSurface(NormalLaw):
     kernel: ClassVar = uniform
     extensive: ClassVar = frozenset({"stiffness", "damping"})
 
-    stiffness: Positive
-    roughness_height: Positive
-    damping: NotNegative = 0.0
+    stiffness: Annotated[Positive, Unit("N/m")]
+    roughness_height: Annotated[Positive, Unit("m")]
+    damping: Annotated[NotNegative, Unit("N s/m")] = 0.0
 
     @property
     def penetration_scale(self) -> float:
         """Roughness height R_Z [m], the smallest of all nodes."""
         return float(np.min(self.roughness_height))
 
-    def stored_energy(
-        self, penetration: Array, share: Array
-    ) -> Array:
+    def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the asperities [J]: the integral of F(u, 0) from 0 to u."""
         table = self.table(share)
         stiffness, height = table[:, 0], table[:, 1]
@@ -178,9 +173,7 @@ class RoughSurface(NormalLaw):
         """f(1): one minus the mean of the density."""
         return 0.5
 
-    def _energy(
-        self, s: Array, table: Array
-    ) -> Array:
+    def _energy(self, s: Array, table: Array) -> Array:
         """Integral of f from 0 to s, for s within 0 ... 1."""
         return s**3 / 6.0
 
@@ -191,25 +184,13 @@ class ParabolicSurface(RoughSurface):
 
     .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
 
-    with f = s^3 - s^4/2, h = 3 s^2 - 2 s^3 for 0 <= s <= 1 and f = s - 1/2, h = 1 above; signs,
-    units and parameters are those of :class:`RoughSurface`.
-
-    Parameters
-    ----------
-    stiffness, roughness_height, damping : float or (n,) sequence
-        c [N/m], R_Z [m], beta c [N s/m].
-
-    Raises
-    ------
-    InputError
-        For a stiffness or roughness height that is not positive, or a negative damping.
+    with f = s^3 - s^4/2, h = 3 s^2 - 2 s^3 for 0 <= s <= 1 and f = s - 1/2, h = 1 above; signs
+    and units are those of :class:`RoughSurface`.
     """
 
     kernel: ClassVar = parabolic
 
-    def _energy(
-        self, s: Array, table: Array
-    ) -> Array:
+    def _energy(self, s: Array, table: Array) -> Array:
         return s**4 * (0.25 - 0.1 * s)
 
 
@@ -220,24 +201,12 @@ class CosineSurface(RoughSurface):
     .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
 
     with f = s^2/2 - (1 - cos(2 pi s)) / (4 pi^2), h = s - sin(2 pi s) / (2 pi) for 0 <= s <= 1
-    and f = s - 1/2, h = 1 above; signs, units and parameters are those of :class:`RoughSurface`.
-
-    Parameters
-    ----------
-    stiffness, roughness_height, damping : float or (n,) sequence
-        c [N/m], R_Z [m], beta c [N s/m].
-
-    Raises
-    ------
-    InputError
-        For a stiffness or roughness height that is not positive, or a negative damping.
+    and f = s - 1/2, h = 1 above; signs and units are those of :class:`RoughSurface`.
     """
 
     kernel: ClassVar = cosine
 
-    def _energy(
-        self, s: Array, table: Array
-    ) -> Array:
+    def _energy(self, s: Array, table: Array) -> Array:
         x = _TAU * s
         series = x**5 / 120.0 * (1.0 - x**2 / 42.0 * (1.0 - x**2 / 72.0 * (1.0 - x**2 / 110.0)))
         return np.where(x < 0.2, series, x**3 / 6.0 - x + np.sin(x)) / _TAU**3
@@ -255,16 +224,9 @@ class GaussianSurface(RoughSurface):
 
     Parameters
     ----------
-    stiffness, roughness_height, damping : float or (n,) sequence
-        c [N/m], R_Z [m], beta c [N s/m].
     deviation : float or (n,) sequence
         sigma: standard deviation of the heights before they are cut off, divided by R_Z; 0.02 to
         1 (where the density is nearly uniform).
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = gaussian
@@ -281,9 +243,7 @@ class GaussianSurface(RoughSurface):
         first_moment = _DENSITY * np.exp(-0.5 * b**2) - b * ndtr(-b)
         return np.column_stack([table, ndtr(-b), first_moment, 1.0 / erf(b * _ROOT_HALF)])
 
-    def _energy(
-        self, s: Array, table: Array
-    ) -> Array:
+    def _energy(self, s: Array, table: Array) -> Array:
         from scipy.special import ndtr
 
         deviation, highest, first_moment, norm = table[:, 3:7].T

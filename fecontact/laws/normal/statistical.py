@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive
 from fecontact.laws.signatures import normal_law
 
@@ -46,11 +47,6 @@ class ExponentialContact(NormalLaw):
         chi, zero or above [s/m]: damping in proportion to the real area of contact, and with it
         to the force.
 
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
     References
     ----------
     B. N. J. Persson, Relation between interfacial separation and load, Phys. Rev. Lett. 99 (2007)
@@ -60,9 +56,9 @@ class ExponentialContact(NormalLaw):
     kernel: ClassVar = _exponential
     extensive: ClassVar = frozenset({"force"})
 
-    force: Positive
-    decay_length: Positive
-    damping_factor: NotNegative = 0.0
+    force: Annotated[Positive, Unit("N")]
+    decay_length: Annotated[Positive, Unit("m")]
+    damping_factor: Annotated[NotNegative, Unit("s/m")] = 0.0
 
     @property
     def penetration_scale(self) -> float:
@@ -73,9 +69,7 @@ class ExponentialContact(NormalLaw):
         """Where the force is exp(-10) of that at u = 0 (1, n) [m]."""
         return np.full((1, nodes), -10.0 * np.asarray(self.decay_length))
 
-    def stored_energy(
-        self, penetration: Array, share: Array
-    ) -> Array:
+    def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         force, length, _ = self.table(share).T
         s = np.maximum(penetration / length, _FARTHEST)
@@ -170,11 +164,6 @@ class GreenwoodWilliamson(NormalLaw):
     damping_factor : float or (n,) sequence
         chi, zero or above [s/m].
 
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-
     References
     ----------
     J. A. Greenwood, J. B. P. Williamson, Contact of nominally flat surfaces, Proc. R. Soc. A 295
@@ -185,11 +174,11 @@ class GreenwoodWilliamson(NormalLaw):
     extensive: ClassVar = frozenset({"asperities"})
 
     asperities: Positive
-    asperity_radius: Positive
-    composite_modulus: Positive
-    height_deviation: Positive
+    asperity_radius: Annotated[Positive, Unit("m")]
+    composite_modulus: Annotated[Positive, Unit("Pa")]
+    height_deviation: Annotated[Positive, Unit("m")]
     separation: PerNode = 3.0
-    damping_factor: NotNegative = 0.0
+    damping_factor: Annotated[NotNegative, Unit("s/m")] = 0.0
 
     @property
     def penetration_scale(self) -> float:

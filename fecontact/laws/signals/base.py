@@ -1,15 +1,15 @@
-"""What a signal is: the base class of all signals."""
+"""Base class of signals."""
 
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
 from numba import types
-from numpy.typing import ArrayLike
 
+from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw, i8, kernel, matrix, vector
 from fecontact.core.errors import InputError, choices, nearest
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.laws.signatures import signal_at
 
 
@@ -63,7 +63,7 @@ class Signal:
 
     def history(self, times: ArrayLike) -> Array:
         """Values and rates (N, 2) at N times [s]."""
-        t = np.atleast_1d(np.asarray(times, dtype=float))
+        t = np.atleast_1d(as_floats(times, "The times of a signal"))
         out = np.empty((len(t), 2))
         _history(self.kernel.address, t, self.parameters(), out)
         return out

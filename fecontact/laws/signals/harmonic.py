@@ -1,14 +1,14 @@
-"""Signals: what is given in time, such as the motion of the drive or a load."""
+"""Constant and harmonic signals, for motions of the drive and loads."""
 
 import math
 from dataclasses import dataclass, fields
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
+from fecontact.core.units import Unit
 from fecontact.laws.data_columns import numbers
 from fecontact.laws.signals.base import Signal, between, require_one_of
 from fecontact.laws.signals.transient import Pulse, Step, Tabulated
@@ -81,8 +81,8 @@ class Harmonic(Signal):
     kernel: ClassVar = _harmonic
 
     amplitude: float
-    angular_frequency: float
-    phase: float = 0.0
+    angular_frequency: Annotated[float, Unit("rad/s")]
+    phase: Annotated[float, Unit("rad")] = 0.0
 
     def __post_init__(self) -> None:
         require_finite("Harmonic", amplitude=self.amplitude, phase=self.phase)
@@ -140,8 +140,8 @@ class Harmonics(Signal):
     kernel: ClassVar = _harmonics
 
     amplitudes: tuple[float, ...]
-    angular_frequencies: tuple[float, ...]
-    phases: tuple[float, ...] = ()
+    angular_frequencies: Annotated[tuple[float, ...], Unit("rad/s")]
+    phases: Annotated[tuple[float, ...], Unit("rad")] = ()
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -231,9 +231,9 @@ class SweptSine(Signal):
     kernel: ClassVar = _sweep
 
     amplitude: float
-    start_frequency_hz: float
-    end_frequency_hz: float
-    duration: float
+    start_frequency_hz: Annotated[float, Unit("Hz")]
+    end_frequency_hz: Annotated[float, Unit("Hz")]
+    duration: Annotated[float, Unit("s")]
     kind: Literal["linear", "logarithmic"] = "linear"
 
     def __post_init__(self) -> None:

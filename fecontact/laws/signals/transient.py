@@ -3,12 +3,13 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
 from fecontact.core.errors import InputError, require_finite, require_positive
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
 from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
 from fecontact.laws.piecewise_polynomial import (
     curve_range,
@@ -51,7 +52,7 @@ class Step(Signal):
 
     kernel: ClassVar = _step
 
-    time: float
+    time: Annotated[float, Unit("s")]
     value: float
 
     def __post_init__(self) -> None:
@@ -119,9 +120,9 @@ class Pulse(Signal):
 
     kind: Literal["half-sine", "rectangle", "triangle", "haversine"]
     amplitude: float
-    duration: float
-    start: float = 0.0
-    rise: float | None = None
+    duration: Annotated[float, Unit("s")]
+    start: Annotated[float, Unit("s")] = 0.0
+    rise: Annotated[float | None, Unit("s")] = None
 
     def __post_init__(self) -> None:
         require_one_of("Pulse", "kind", self.kind, _PULSES)
@@ -197,7 +198,7 @@ class Tabulated(Signal):
 
     kernel: ClassVar = _tabulated
 
-    times: tuple[float, ...] = ()
+    times: Annotated[tuple[float, ...], Unit("s")] = ()
     values: tuple[float, ...] = ()
     file: str | None = None
     interpolation: Literal["linear", "cubic"] = "linear"

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.points import details_of, special_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.stored import (
+from fecontact.core.files.stored import (
     DamagedError,
     array,
     member,
@@ -96,7 +96,7 @@ def _store(group: Any, branch: Branch) -> None:
     for name in branch.points[0].values if branch.points else ():
         _write(group, f"values/{name}", [point.values[name] for point in branch.points])
     for index, point in enumerate(branch.points):
-        for name, value in point.details.items():
+        for name, value in details_of(point).items():
             group.create_dataset(f"details/{index}/{name}", data=value)
     for name, value in branch.attributes.items():
         group.create_dataset(f"attributes/{name}", data=value)
@@ -114,8 +114,8 @@ def _stored(group: Any, path: str | Path) -> Branch:
         details = {int(index): {name: _value(item) for name, item in part.items()}
                    for index, part in _members(group, "details").items()}
         points = tuple(
-            BranchPoint(u[k], tangent[k], {name: row[k] for name, row in stored.items()},
-                        kinds[k] or None, details.get(k, {})) for k in range(count))
+            special_point(u[k], tangent[k], {name: row[k] for name, row in stored.items()},
+                          kinds[k] or None, details.get(k, {})) for k in range(count))
         attributes = {name: _value(item)
                       for name, item in _members(group, "attributes").items()}
         return Branch(text(group, "parameter"), points, BranchStatus[text(group, "status")],

@@ -1,4 +1,4 @@
-"""A case in one HDF5 file: the run, all that it was computed from, and frames for ParaView."""
+"""Case files (HDF5): a run, everything it was computed from, and frames for ParaView."""
 
 import json
 import tomllib
@@ -13,7 +13,7 @@ import tomli_w
 
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.stored import DamagedError, array, from_json, member, reading, text, texts
+from fecontact.core.files.stored import DamagedError, array, from_json, member, reading, text, texts
 from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.registry import UntrustedError, law_files, movable, trusting, with_folder

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.atomic_write import replaced
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.files.atomic_write import replaced
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.dataset import columns, coordinates, to_xarray, variables
 

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.atomic_write import replaced
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.interrupts import held_back_interrupt
-from fecontact.core.stored import (
+from fecontact.core.files.atomic_write import replaced
+from fecontact.core.files.stored import (
     DamagedError,
     array,
     indices,
@@ -22,6 +21,7 @@ from fecontact.core.stored import (
     sound_sparse,
     values,
 )
+from fecontact.core.interrupts import held_back_interrupt
 from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
@@ -91,7 +91,7 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
     ------
     InputError
         If there is no such file, it is not HDF5, or it has no such group; and in the place of
-        whatever else the block raises, see :func:`fecontact.core.stored.reading`.
+        whatever else the block raises, see :func:`fecontact.core.files.stored.reading`.
     """
     import h5py
 
@@ -161,7 +161,7 @@ def stored_basis(group: Any) -> ModalBasis:
     Raises
     ------
     DamagedError, KeyError, InputError
-        If it holds something else; see :func:`fecontact.core.stored.reading`.
+        If it holds something else; see :func:`fecontact.core.files.stored.reading`.
     """
     w = array(group, "angular_frequencies", (None,))
     m = len(w)
@@ -195,8 +195,8 @@ def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
     restriction = sp.csr_array((array(stored, "data", (len(columns),)), columns, rows),
                                shape=shape)
     return ModeShapes(nodes, cells, indices(group, "outline", (None, 2), N),
-                 array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
-                 sound_sparse(restriction))
+                      array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
+                      sound_sparse(restriction))
 
 
 def _read_quality(group: Any, modes: int, points: int) -> ReductionQuality:

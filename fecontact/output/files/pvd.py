@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fecontact.core.atomic_write import output_folder, replaced, replaced_folder
 from fecontact.core.errors import InputError
+from fecontact.core.files.atomic_write import output_folder, replaced, replaced_folder
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.case import Case, read_case
 from fecontact.output.files.frames import (

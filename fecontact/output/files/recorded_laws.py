@@ -1,4 +1,4 @@
-"""A contact system whose laws are known only where they were recorded.
+"""Contact systems whose laws are replaced by their recorded values.
 
 Laws of a user's own file are code. A run read from somewhere else is not to run it; what its file
 holds of the laws is enough to draw and export the run.

@@ -1,4 +1,4 @@
-"""Plots of what a run is analysed for: spectra, sections, wear, frequency responses."""
+"""Plots of analyses: spectra, Poincare sections, friction work, frequency responses."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_COLUMNS = 1000  # points of a line
-_DECADES = 5.0  # shown below the highest value of a logarithmic axis
+_COLUMNS = 1000  # most points of a line
+_DECADES = 5.0  # range of a logarithmic axis below its highest value
 _AXES = ("x", "y")
 
 
@@ -45,7 +45,7 @@ def plot_spectrum(
     highest_hz: float | None = None,
     path: str | Path | None = None,
 ) -> "Figure":
-    """Plot the spectrum of a quantity of a run at evenly spaced output times, its peaks named.
+    """Plot the spectrum of a quantity of a run at evenly spaced output times, with its peaks.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def plot_spectrum(
         panel.set_xlim(0.0, end)
         named: list[float] = []
         for peak in found.peaks(40):
-            # Numbers need room beside those of higher peaks.
+            # Leave out labels that overlap those of higher peaks.
             apart = all(abs(peak.frequency_hz - other) > 0.06 * end for other in named)
             if peak.frequency_hz < end and apart and len(named) < 6:
                 named.append(peak.frequency_hz)
@@ -208,7 +208,7 @@ def plot_poincare(
 
 
 def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
-    """Plot where on the face friction works: energy per length [J/m] and slip [m] of each node.
+    """Plot friction work per length [J/m] and slip distance [m] along the contact face.
 
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
     constant coefficient is the friction work over that coefficient.
@@ -330,14 +330,14 @@ def _place(place: tuple[str | int, str]) -> str:
 
 
 def _end_of_content(frequency: Array, values: Array) -> float:
-    """Frequency up to which there is more than a part of 0.002 of the highest value."""
+    """Highest frequency with more than 0.002 of the highest value."""
     heard = np.flatnonzero(values > 2e-3 * values.max(initial=0.0))
     end = 1.1 * frequency[heard[-1]] if len(heard) else frequency[-1]
     return float(min(max(end, 10.0 * frequency[1]), frequency[-1]))
 
 
 def _envelope(frequency: Array, values: Array, end: float) -> tuple[Array, Array]:
-    """A long spectrum by the highest value of every few up to ``end``."""
+    """A long spectrum up to ``end``, thinned to the maxima of its bins."""
     shown = int(np.searchsorted(frequency, end, side="right"))
     few = shown // _COLUMNS
     if few < 2:

@@ -1,12 +1,12 @@
-"""Basins of attraction as a map."""
+"""Maps of basins of attraction."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import require_kind
+from fecontact.core.types import ArrayLike
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import distinct_colours
 
@@ -22,7 +22,7 @@ def plot_basins(
     found: "Basins", *, x_label: str | None = None, y_label: str | None = None,
     rows: ArrayLike | None = None, path: str | Path | None = None,
 ) -> "Figure":
-    """Plot to which motion each start leads, with the share of each.
+    """Plot the basins of attraction, each with its share of the plane.
 
     Parameters
     ----------

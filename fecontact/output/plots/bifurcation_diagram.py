@@ -67,7 +67,7 @@ def plot_branches(
         :meth:`fecontact.bifurcation.attractors.poincare_scan.PoincareScan.observed`.
     insets : sequence of Inset
         Phase planes of chosen points, drawn above the diagram; see
-        :func:`fecontact.output.plots.diagram_insets.phase_inset`.
+        :func:`fecontact.output.plots.diagram_insets.phase_inset`. A line joins each to its point.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -92,7 +92,7 @@ def plot_branches(
         if len(branches) > 1:
             names = [*names, *(f"branch {k + 1}" for k in range(len(names), len(branches)))]
         groups = [*names[: len(branches)], *range(len(names), len(branches))]
-        # One more, as one of them is that of runs.
+        # One colour more than needed, as those of the runs are left out.
         apart = [colour for colour in distinct_colours(len(set(groups)) + 1)
                  if colour not in DOTS.values()]
         colours = dict(zip(dict.fromkeys(groups), apart, strict=False))
@@ -115,7 +115,7 @@ def plot_branches(
         axis.autoscale_view()
         axis.ticklabel_format(axis="y", scilimits=(-3, 5))
         _mark(axis, known)
-        draw_insets(figure, axis, insets)
+        draw_insets(figure, axis, insets, lambda at: (_value(at, x), _value(at, y)))
         _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
     return figure
 
@@ -139,8 +139,22 @@ def _values(branch: "Branch", quantity: Quantity, rows: bool = False) -> Array:
     return found.astype(float)
 
 
+def _value(point: "BranchPoint", quantity: Quantity) -> float:
+    """A quantity of one point; of a row of them the first."""
+    if callable(quantity):
+        return float(quantity(point))
+    if quantity == "parameter":
+        return point.parameter
+    if isinstance(quantity, int):
+        return float(point.values["state"][quantity])
+    if quantity not in point.values:
+        raise InputError(f"{point.place}, of an inset, stores no value {quantity!r}; make the "
+                         f"inset from a point of a branch that is drawn.")
+    return float(np.ravel(point.values[quantity])[0])
+
+
 def _stable_pieces(branch: "Branch") -> NDArray[np.bool_]:
-    """Whether each piece (N - 1,) between neighbours is stable; decided by regular points."""
+    """Whether each piece (N - 1,) between neighbours is stable, judged by its regular points."""
     stable = [None if point.kind is not None else bool(point.values.get("stable", True))
               for point in branch.points]
     pieces: list[bool] = []
@@ -151,13 +165,13 @@ def _stable_pieces(branch: "Branch") -> NDArray[np.bool_]:
 
 
 def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last point of each row of pieces of the same kind."""
+    """First and last point of each run of equal pieces."""
     edges = [0, *(np.flatnonzero(np.diff(stable)) + 1).tolist(), len(stable)]
     return list(pairwise(edges))
 
 
 def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
-    """Markers, and letters on the side where there is room; without where there is none."""
+    """Markers, with letters on a side where they overlap nothing, if there is one."""
     special: list[tuple[str, str, float, float]] = []
     for kind, places in known.items():
         letters, marker = _SPECIAL.get(kind, ("", "."))

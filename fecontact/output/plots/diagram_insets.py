@@ -1,81 +1,84 @@
-"""What stands beneath and above bifurcation diagrams: runs by brute force, phase planes."""
+"""Dots of runs beneath bifurcation diagrams, and phase planes above them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
+from fecontact.output.plots.style import DASHES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
-    from fecontact.bifurcation.continuation.branch import Branch
     from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
 
 
 _INK = "#303030"
-# Colours of runs, which no branch has.
+# Colours of runs; branches have others.
 DOTS = {"up": "#b4b0a8", "down": "#e69f00"}
 
 
 @dataclass(frozen=True, eq=False)
 class Inset:
-    """A phase plane that belongs to a place of a diagram.
+    """A phase plane that belongs to a point of a diagram; see :func:`phase_inset`.
 
     Attributes
     ----------
-    parameter, height : float
-        The place.
+    point : BranchPoint
+        The orbit, drawn dashed where its stored 'stable' is False.
     displacement, velocity : (k,) arrays
-        The closed curve, in m and m/s.
+        The closed curve, in m and m/s (rad and rad/s of a rotation).
     title : str
         Above it.
-    stable : bool
-        Whether it is drawn solid.
     """
 
-    parameter: float
-    height: float
+    point: "BranchPoint"
     displacement: Array
     velocity: Array
     title: str
-    stable: bool
 
 
 def phase_inset(
-    field: "ContactField", branch: "Branch", point: "BranchPoint", height: float,
-    observe: tuple[str | int, str] = ("B", "x"), title: str | None = None,
+    field: "ContactField", point: "BranchPoint", observe: tuple[str | int, str] = ("B", "x"),
+    title: str | None = None,
 ) -> Inset:
-    """The phase plane of an orbit of a branch, for the diagram in which it has this height.
+    """The phase plane (u, du/dt) of an orbit, to be drawn above a bifurcation diagram.
 
     Parameters
     ----------
-    field, branch, point
-        A point of a branch of orbits, and its field.
-    height : float
-        y of the point in the diagram.
+    field : ContactField
+        That of the branch.
+    point : BranchPoint
+        A point of a branch of orbits, by collocation or shooting. The inset is joined to its place
+        in the diagram of :func:`fecontact.plot.plot_branches`.
     observe : (point, axis)
-        Displacement and velocity that are drawn; axis 'x', 'y' or 'rotation'.
+        Displacement u that is drawn: 'B', 'C', a named point or the number of a contact node; 'x',
+        'y' or 'rotation'.
     title : str, optional
-        The parameter's value by default.
+        By default parameter and value.
 
     Raises
     ------
     InputError
-        If the point is no orbit.
+        If the point is no orbit or on no branch, or there is no such displacement.
     """
+    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.bifurcation.fields.contact_field import ContactField
+
+    require_kind("phase_inset", ContactField, field=field)
+    require_kind("phase_inset", BranchPoint, point=point)
     states = point.orbit(field).states
     row = field.displacement_row(*observe)
     modes = field.system().basis.modes
     rate = np.concatenate([np.zeros(modes), row[:modes], np.zeros(len(row) - 2 * modes)])
-    return Inset(point.parameter, height, states @ row, states @ rate,
-                 title or f"{branch.parameter_name} = {point.parameter:.4g}",
-                 bool(point.values["stable"]))
+    return Inset(point, states @ row, states @ rate,
+                 title or f"{point.branch.parameter_name} = {point.parameter:.4g}")
 
 
 def main_axis(figure: "Figure", insets: Sequence[Inset]) -> "Axes":
@@ -86,8 +89,11 @@ def main_axis(figure: "Figure", insets: Sequence[Inset]) -> "Axes":
     return figure.add_subplot(grid[1, :])
 
 
-def draw_insets(figure: "Figure", axis: "Axes", insets: Sequence[Inset]) -> None:
-    """Phase planes above the diagram, each with a line to its place."""
+def draw_insets(
+    figure: "Figure", axis: "Axes", insets: Sequence[Inset],
+    place: Callable[["BranchPoint"], tuple[float, float]],
+) -> None:
+    """Phase planes above the diagram, each with a line to the place of its point."""
     from matplotlib.patches import ConnectionPatch
 
     if not insets:
@@ -95,7 +101,7 @@ def draw_insets(figure: "Figure", axis: "Axes", insets: Sequence[Inset]) -> None
     from fecontact.core.units import suitable_unit
 
     # From left to right as in the diagram, so that the lines do not cross.
-    ordered = sorted(insets, key=lambda inset: inset.parameter)
+    ordered = sorted(insets, key=lambda inset: place(inset.point)[0])
     length, length_name = suitable_unit(
         float(max(np.abs(inset.displacement).max() for inset in ordered)), "m")
     speed, speed_name = suitable_unit(
@@ -103,18 +109,19 @@ def draw_insets(figure: "Figure", axis: "Axes", insets: Sequence[Inset]) -> None
     grid = axis.get_gridspec()
     assert grid is not None
     for number, inset in enumerate(ordered):
+        x, y = place(inset.point)
         small = figure.add_subplot(grid[0, number])
         small.plot(inset.displacement / length, inset.velocity / speed, color=_INK, linewidth=1.0,
-                   linestyle="-" if inset.stable else (0, (4, 2.5)))
+                   linestyle="-" if inset.point.values["stable"] else DASHES)
         small.set_title(inset.title, fontsize=9.0)
         small.tick_params(labelsize=7.5)
         small.set_xlabel(f"displacement [{length_name}]" if number == 0 else "", fontsize=8.0,
                          loc="left")
         small.set_ylabel(f"velocity [{speed_name}]" if number == 0 else "", fontsize=8.0)
         small.margins(0.08)
-        axis.plot(inset.parameter, inset.height, "o", markersize=4.0, color=_INK, zorder=6)
+        axis.plot(x, y, "o", markersize=4.0, color=_INK, zorder=6)
         figure.add_artist(ConnectionPatch(
-            (0.5, 0.0), (inset.parameter, inset.height), small.transAxes, axis.transData,
+            (0.5, 0.0), (x, y), small.transAxes, axis.transData,
             color="#8a8a8a", linewidth=0.7, zorder=5))
 
 

@@ -1,4 +1,4 @@
-"""Figures in the package's style, shown by notebooks and written to files."""
+"""Figures in the package's style, for notebooks and files."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,9 +11,9 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from fecontact.core.atomic_write import replaced
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError
+from fecontact.core.files.atomic_write import replaced
 from fecontact.output.plots.style import STYLE
 
 _SUFFIXES = (".png", ".pdf", ".svg")
@@ -21,7 +21,7 @@ _PIXELS_PER_INCH = 96  # of a notebook's page
 
 
 class StyledFigure(Figure):
-    """A matplotlib Figure that is drawn in the package's style whenever it is drawn.
+    """A matplotlib Figure that always draws in the package's style.
 
     Ticks, fonts of PDF files and other parts read the settings of matplotlib when a figure is
     drawn, not when it is made.
@@ -38,7 +38,7 @@ class StyledFigure(Figure):
             super().savefig(fname, **options)
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
-        """The picture that a notebook shows, and its size on the page."""
+        """The picture for a notebook, and its size on the page."""
         drawn = BytesIO()
         self.savefig(drawn, format="png")
         width, height = (round(_PIXELS_PER_INCH * inches) for inches in self.get_size_inches())
@@ -49,7 +49,7 @@ class StyledFigure(Figure):
 def new_figure(
     width: float, height: float, path: str | Path | None = None
 ) -> Iterator[StyledFigure]:
-    """An empty figure [inches] to draw into, written to a file when the block ends well.
+    """An empty figure [inches] to draw into, written to a file unless the block fails.
 
     No plotting session knows of it: nothing has to be closed. The file is written whole or not at
     all.
@@ -77,7 +77,7 @@ def new_figure(
 
 
 def _target(path: str | Path) -> Path:
-    """The file to be written, told to be impossible before anything is drawn."""
+    """The path to write, checked before anything is drawn."""
     path = as_path(path, "a plot")
     if path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{path} must end in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}.")

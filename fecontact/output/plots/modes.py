@@ -1,4 +1,4 @@
-"""Figures of the modes of a body: their shapes, and how they converge."""
+"""Plots of the modes of a body: shapes and convergence."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_VISIBLE = 0.07  # largest displacement drawn, as a part of the body's extent
+_DRAWN_DISPLACEMENT = 0.07  # largest one, relative to the body's extent
 _WIDTH = 10.0  # inches
 
 
@@ -50,7 +50,7 @@ def plot_modes(
         raise InputError(f"count = {count!r} must be a whole number of at least one mode.")
     field, shown = basis.mode_shapes, min(count, basis.modes)
     size = np.ptp(field.nodes, axis=0)
-    reach = _VISIBLE * float(np.linalg.norm(size))
+    reach = _DRAWN_DISPLACEMENT * float(np.linalg.norm(size))
     aspect = (size[0] + 2.0 * reach) / (size[1] + 2.0 * reach)
     columns = min(shown, 6, int(np.ceil(np.sqrt(1.8 * shown / aspect))))
     rows = -(-shown // columns)
@@ -69,7 +69,7 @@ def plot_modes(
 
 
 def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None) -> "Figure":
-    """Plot how frequencies and contact compliance change with the mesh and the modes.
+    """Plot the convergence of frequencies and contact compliance with mesh and modes.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _MAP_COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
 _AXES = ("x", "y")
 
-_LINE_BINS = 2000  # each drawn by its lowest and highest value
+_LINE_BINS = 2000  # a long line is drawn by minimum and maximum of each
 _MAP_COLUMNS = 1500
 
 
@@ -92,7 +92,7 @@ def plot_history(
 
 
 def _without_round_off(values: list[Array]) -> list[Array]:
-    """Histories (N, k) with components at rest, of a billionth of the largest, put to zero."""
+    """Histories (N, k) with components below a billionth of the largest set to zero."""
     largest = max(float(np.abs(value[:, :2]).max()) for value in values)
     return [np.where(np.abs(value).max(axis=0) > 1e-9 * largest, value, 0.0) for value in values]
 
@@ -137,7 +137,7 @@ def plot_phase(
         plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
         ground = trajectory.system.ground
         speed = ground.speed if ground.motion is None else 0.0
-        # A ground that is much faster would leave a line of the curve.
+        # The speed of a much faster ground would flatten the curve.
         if row == 0 and 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
             plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
                           label="ground")
@@ -192,7 +192,7 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
         spans = _spans(trajectory.time)[:, None]
         counts = np.stack([np.add.reduceat((state == k) * spans, starts, axis=0)
                            for k in range(len(states))])
-        # A column of several times shows contact if there was any, as the pressure above it does.
+        # A column of several times shows contact if any of them has it, as the pressure above does.
         counts[0] *= counts[1:].sum(axis=0) == 0
         image = lower.pcolormesh(edges / time_unit, places, _rows(counts.argmax(axis=0), nodes),
                                  cmap=ListedColormap([_MAP_COLOURS[name] for name in states]),
@@ -211,7 +211,7 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
 
 
 def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
-    """Plot stored energies, work put in and energy lost [J] over time.
+    """Plot stored energy, external work and dissipated energy [J] over time.
 
     Terms that stay zero are left out.
 
@@ -260,7 +260,7 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
 
 
 def _usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
-    """B, if anything moves there, and the contact node in the middle."""
+    """Point B, unless it is fixed, and the middle contact node."""
     basis = trajectory.system.basis
     middle = basis.contact_nodes // 2
     return ("B", middle) if basis.T[0].any() else (middle,)
@@ -277,14 +277,14 @@ def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:
 
 
 def _labelled(axis: "Axes", name: str, unit: str, *values: Array) -> float:
-    """Label the y axis with a unit that suits the values, and return its factor."""
+    """Label the y axis with a suitable unit, and return its factor."""
     largest = max((float(np.abs(value).max()) for value in values), default=0.0)
     factor, symbol = suitable_unit(largest, unit)
     axis.set_ylabel(f"{name} [{symbol}]")
     low = min((float(value.min()) for value in values), default=0.0)
     high = max((float(value.max()) for value in values), default=0.0)
     if 0.0 <= high - low < 1e-9 * largest:
-        # Round-off about a constant would fill the axis.
+        # Do not magnify round-off about a constant.
         axis.set_ylim((low - 0.05 * largest) / factor, (high + 0.05 * largest) / factor)
     return factor
 
@@ -305,7 +305,7 @@ def thinned(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _places(extremes: Array, y: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Where in each column of points its extreme is."""
+    """Index of the extreme in each column of points."""
     counts = np.diff(np.append(starts, len(y)))
     met = np.flatnonzero(y == np.repeat(extremes, counts))
     columns = np.searchsorted(starts, met, side="right")
@@ -313,7 +313,7 @@ def _places(extremes: Array, y: Array, starts: NDArray[np.intp]) -> NDArray[np.i
 
 
 def _spans(time: Array) -> Array:
-    """Time (N,) for which each of the times stands."""
+    """Duration (N,) that each of the times represents."""
     if len(time) == 1:
         return np.ones(1)
     edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
@@ -343,7 +343,7 @@ def _place_edges(trajectory: Trajectory) -> tuple[Array, NDArray[np.intp], str]:
     middle = 0.5 * (x[:-1] + x[1:])
     high[:-1] = np.where(overlap, middle, high[:-1])
     low[1:] = np.where(overlap, middle, low[1:])
-    # Nodes one above the other have no band each.
+    # Nodes one above the other share a band.
     if n == 1 or (overlap & (np.diff(x) <= tiny)).any():
         return np.arange(n + 1, dtype=np.float64) - 0.5, np.arange(n), "contact node"
     apart = np.flatnonzero(low[1:] > high[:-1] + tiny) + 1

@@ -1,4 +1,4 @@
-"""Eigenvalues over a parameter, and stability maps, as pictures."""
+"""Plots of eigenvalues over a parameter, and of stability maps."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,8 +25,8 @@ def plot_eigenvalues(
 ) -> "Figure":
     """Plot frequencies [Hz] and growth rates [1/s] of all modes over the parameter of a branch.
 
-    As in the analysis of brake squeal: two frequencies that meet and a growth rate that becomes
-    positive are flutter by mode coupling.
+    As in the analysis of brake squeal: where two frequencies merge and a growth rate becomes
+    positive, modes couple to flutter.
 
     Parameters
     ----------
@@ -60,8 +60,8 @@ def plot_eigenvalues(
         for point in branch.of_kind("Hopf"):
             for axis in (upper, lower):
                 axis.axvline(point.parameter, color="#6a6a6a", linestyle=DASHES, linewidth=0.9)
-            upper.annotate(f"{point.details['frequency_hz']:.4g} Hz",
-                           (point.parameter, point.details["frequency_hz"]), xytext=(6, 6),
+            upper.annotate(f"{point.frequency_hz:.4g} Hz",
+                           (point.parameter, point.frequency_hz), xytext=(6, 6),
                            textcoords="offset points", fontsize=9.0)
         upper.set_ylabel("frequency [Hz]")
         lower.set_ylabel("growth rate [1/s]")
@@ -76,15 +76,15 @@ def plot_stability_map(
     found: "StabilityMap", *, borders: "Sequence[Branch]" = (), x_label: str | None = None,
     y_label: str | None = None, path: str | Path | None = None,
 ) -> "Figure":
-    """Plot where an equilibrium is unstable, with the frequency of the mode that grows fastest.
+    """Plot where an equilibrium is unstable, coloured by the frequency of its fastest growing mode.
 
     Parameters
     ----------
     found : StabilityMap
         The first parameter goes along x.
     borders : sequence of Branch
-        Curves of Hopf points or folds in the same parameters, drawn instead of the border that is
-        interpolated from the map.
+        Curves of :func:`fecontact.bifurcation.codim2_curve` over the same parameters, drawn
+        instead of the border interpolated from the map.
     x_label, y_label : str, optional
         Labels of the parameters, with their units.
     path : str or Path, optional
@@ -129,8 +129,9 @@ def plot_stability_map(
         axis.grid(False)
     return figure
 
+
 def _followed(eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Eigenvalues (N, d) in an order that follows each from point to point."""
+    """Eigenvalues (N, d), sorted so that each column follows one mode from point to point."""
     from scipy.optimize import linear_sum_assignment
 
     result = eigenvalues.copy()

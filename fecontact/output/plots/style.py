@@ -11,19 +11,19 @@ from fecontact.integrate.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Colours that people with colour-blindness tell apart (Okabe and Ito).
+# Colour-blind safe palette of Okabe and Ito.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#6a6a6a")
-# Further ones, for the many branches of a diagram; no two of all are nearer to each other.
+# Further colours for diagrams with many branches, as distinct as those above.
 _MORE_COLOURS = ("#882200", "#99dd88", "#7766ff", "#000044", "#0000ff")
 DASHES: Any = (0, (4, 2.5))
-# Of energies and powers, by the place where they are stored, come in or are lost.
+# Colours of energies and powers, by where they are stored, supplied or dissipated.
 ENERGY_COLOURS = {
     "kinetic": "#0072b2", "elastic": "#56b4e9", "modal_damping": "#56b4e9",
     "drive_spring": "#d55e00", "drive_work": "#d55e00", "dashpots": "#d55e00",
     "contact": "#009e73", "ground_work": "#009e73", "contact_damping": "#009e73",
     "belt_work": "#e69f00", "friction": "#e69f00", "load_work": "#cc79a7",
 }
-# Colours that people with colour-blindness tell apart; 'open' takes that of the background.
+# Colour-blind safe; 'open' takes the colour of the background.
 STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
 
 STYLE: Any = {
@@ -38,13 +38,13 @@ STYLE: Any = {
 
 
 def distinct_colours(count: int) -> list[str]:
-    """So many colours, no two alike; up to twelve are told apart by colour-blind people too."""
+    """A number of distinct colours; up to twelve are colour-blind safe."""
     if count <= len(COLOURS) + len(_MORE_COLOURS):
         return [*COLOURS, *_MORE_COLOURS][:count]
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    # Neighbours, which follow one another, are as far apart in lightness as they can be.
+    # Order them so that neighbours differ most in lightness.
     shades = [to_hex(colour) for colour in colormaps["cividis"](np.linspace(0.0, 0.95, count))]
     half = (count + 1) // 2
     mixed = [""] * count
@@ -53,7 +53,7 @@ def distinct_colours(count: int) -> list[str]:
 
 
 def add_note(figure: "Figure", drawn: Resolved) -> None:
-    """Say below a figure where its curves are coarser than the motion."""
+    """Note below a figure that its curves are coarser than the motion."""
     if not drawn.note:
         return
     width, height = figure.get_size_inches()

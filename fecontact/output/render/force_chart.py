@@ -1,4 +1,4 @@
-"""The total contact forces over time, with a cursor: a strip above the scene of flat bodies."""
+"""Chart of the total contact forces over time, with a cursor, above the scene of flat bodies."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""What a moving picture shows, in numbers: places, colours, forces and ground at each frame."""
+"""Data of the frames of a movie: positions, colours, forces and ground."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,7 +31,7 @@ _VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A run, prepared for drawing: the same scale and colour range hold for all its frames.
+    """A run prepared for drawing, with one scale and colour range for all frames.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Motion:
         return float(heights.min() - self.scale * self._gap)
 
     def body(self, frame: int) -> tuple[Array, Array]:
-        """Drawn places (N, 2) of the nodes [m] and their colours (N,) in SI units."""
+        """Drawn positions (N, 2) of the nodes [m] and their colour values (N,) in SI units."""
         q = self._q(frame)
         motion = displacement(self.mode_shapes, q)[0]
         colours = np.linalg.norm(motion, axis=1) if self.colour == "displacement" else \
@@ -132,7 +132,7 @@ class Motion:
         return self.mode_shapes.nodes + self._scaled(motion[None], q)[0], colours
 
     def contact_places(self, frame: int) -> Array:
-        """Drawn places (n, 2) of the contact nodes [m]."""
+        """Drawn positions (n, 2) of the contact nodes [m]."""
         basis = self.trajectory.system.basis
         q = self._q(frame)
         motion = basis.contact_T[:, :2] @ q[0]

@@ -1,4 +1,4 @@
-"""Moving pictures of a run: MP4, numbered PNG files, or a single still."""
+"""Movies of a run as MP4 or numbered PNG files, and stills."""
 
 import glob
 import os
@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.atomic_write import beside, put, replaced, unwritable
 from fecontact.core.checks import as_path, require_frame_rate
 from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.files.atomic_write import beside, put, replaced, unwritable
 from fecontact.core.interrupts import held_back_interrupt
+from fecontact.core.progress import counting_bar, shown
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.frames import frame_indices, require_field
 from fecontact.output.render.frames_data import Colour, Motion
@@ -28,10 +29,10 @@ Progress = Callable[[int, int], None]
 
 _SMALLEST = (320, 180)
 _MOVING, _STILL = 2, 4  # pixels rendered for each of a movie and of a still, in both directions
-# In the head of a picture, by which it is known as one of this package's.
+# Header text that marks a picture as one of this package.
 _SOFTWARE = ("Software", "fecontact")
 _OURS = "\0".join(_SOFTWARE).encode()
-_STILL_FRAMES = 200  # whose range of colours and motion a still shares with a movie
+_STILL_FRAMES = 200  # frames that set the range of colours and motion of a still
 
 
 def render(
@@ -46,7 +47,7 @@ def render(
     title: str | None = None,
     t_start: float | None = None,
     t_end: float | None = None,
-    progress: Progress | None = None,
+    progress: bool | Progress | None = None,
 ) -> Path:
     """Draw a run as a movie or as numbered pictures, whole or not at all.
 
@@ -80,8 +81,9 @@ def render(
         Shown at the top.
     t_start, t_end : float, optional
         Part of the run to draw [s].
-    progress : callable, optional
-        Called as ``progress(done, total)`` after each frame.
+    progress : bool or callable, optional
+        True for a progress bar on a terminal or in a notebook; a function is called as
+        ``progress(done, total)`` after each frame.
 
     Returns
     -------
@@ -111,12 +113,13 @@ def render(
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
     require_rendering(size, _MOVING)
     with (held_back_interrupt() as check,
+          shown(progress, lambda: counting_bar("Drawing")) as tell,
           _movie_file(path, size, fps) if movie else _numbered_files(path) as take):
         for done, image in enumerate(_images(motion, size, title, slowness), start=1):
             check()
             take(image)
-            if progress is not None:
-                progress(done, len(indices))
+            if tell is not None:
+                tell(done, len(indices))
     if movie or path.suffix.lower() != ".png" or path.is_dir():
         return path
     return path.with_name(f"{path.stem}_0000.png")
@@ -186,7 +189,7 @@ def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: 
 
 @contextmanager
 def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], Any]]:
-    """A function that adds a frame to a movie; the file appears when the block ends well."""
+    """A function that adds a frame to a movie; the file is written unless the block fails."""
     import imageio_ffmpeg
 
     _require_folder(path)
@@ -197,7 +200,7 @@ def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
                                   f"imageio-ffmpeg, or write .png pictures.") from None
     with replaced(path) as part:
         writer = imageio_ffmpeg.write_frames(
-            # Names with colons or a leading hyphen would be protocols and options of ffmpeg.
+            # ffmpeg takes names with colons for protocols, and leading hyphens for options.
             os.path.abspath(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
             pix_fmt_out="yuv420p", ffmpeg_log_level="error",
             output_params=["-movflags", "+faststart"])
@@ -243,7 +246,7 @@ def _is_ours(picture: Path) -> bool:
 
 
 def _require_readable(ffmpeg: str, movie: Path) -> None:
-    """Raise OSError for a movie cut short: the encoder's exit status is not passed on."""
+    """Raise OSError for a truncated movie: the encoder's exit status is not passed on."""
     done = subprocess.run([ffmpeg, "-v", "error", "-i", os.path.abspath(movie), "-frames:v", "1",
                            "-f", "null", "-"], capture_output=True, check=False,
                           stdin=subprocess.DEVNULL)

@@ -1,4 +1,4 @@
-"""Whether this computer can render pictures without a screen."""
+"""Off-screen rendering: a check that it works, and the kind of window to use."""
 
 import os
 import subprocess
@@ -12,10 +12,10 @@ from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.core.memory import available_memory, shown_memory
 
 _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
-_BYTES = 60  # for each pixel that is rendered: window, depth, copies, their mean
+_BYTES = 60  # per rendered pixel: window, depth, copies, their mean
 
-# VTK ends the process with a segmentation fault where graphics libraries are missing, so the
-# attempt runs in a process of its own. It uses the modules that pyvista uses, without pyvista.
+# VTK crashes with a segmentation fault where graphics libraries are missing, so the attempt runs in
+# a process of its own. It uses the VTK modules of pyvista, without pyvista.
 _ATTEMPT = """
 import vtkmodules.vtkRenderingOpenGL2
 import vtkmodules.vtkRenderingFreeType
@@ -36,7 +36,7 @@ print("window", window.GetClassName(), vtkTextureObject.GetMaximumTextureSize(wi
 """
 
 
-def can_render() -> str | None:
+def rendering_problem() -> str | None:
     """Try to render a small picture off screen, once per process.
 
     Returns
@@ -68,7 +68,7 @@ def require_rendering(size: tuple[int, int], fineness: int) -> None:
     free = available_memory()
     fits = free / (_BYTES * fineness**2)
     if max(size) > side or width * height > fits:
-        # Of the same shape, even in both directions.
+        # Keep the shape, with even numbers of pixels.
         shrink = min(side / max(size), (fits / (width * height)) ** 0.5)
         least = [2 * int(0.5 * shrink * length) for length in size]
         raise InputError(f"size = [{width}, {height}] is more than can be drawn on this computer, "
@@ -78,7 +78,7 @@ def require_rendering(size: tuple[int, int], fineness: int) -> None:
 
 @contextmanager
 def known_window() -> Iterator[None]:
-    """Let VTK open the kind of window that was found to work, without trying others first."""
+    """Make VTK use the kind of window that works, without trying others first."""
     window = _attempt()[1]
     if window is None or _WINDOW in os.environ:
         yield

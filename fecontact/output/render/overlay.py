@@ -1,4 +1,4 @@
-"""The still part of a picture: title, time, scales and legends above and below the scene."""
+"""Overlay of a picture: title, time, scales and legends above and below the scene."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +26,7 @@ _FONT = 10.5  # points at 960 x 540
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """Strips above and below the scene, in the size of the whole picture.
+    """Strips above and below the scene, as large as the whole picture.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Overlay:
 
     @cached_property
     def chart_height(self) -> int:
-        """Height of the chart of forces in pixels: of room that a flat body leaves, zero for none.
+        """Height of the force chart in pixels, from the room that a flat body leaves; or zero.
 
         The scene keeps a third more than it needs, and at least half.
         """
@@ -71,7 +71,7 @@ class Overlay:
 
     @property
     def scene_height(self) -> int:
-        """What is left for the scene, in pixels."""
+        """Size of the scene in pixels."""
         return self.height - self.header_height - self.footer_height - self.chart_height
 
     def around(self, scene: Image, frame: int) -> Image:

@@ -1,4 +1,4 @@
-"""The moving part of a picture, drawn by VTK: body, ground, contact nodes and forces."""
+"""Scene of a picture, drawn by VTK: body, ground, contact nodes and forces."""
 
 from typing import Any
 
@@ -16,20 +16,20 @@ FORCE_COLOUR = "#b2182b"
 DARK = "#303030"
 _GROUND, _SURFACE, _MARKS, _OUTLINE = "#e9e7e3", "#4d4d4d", "#9b978f", "#8c8c8c"
 
-# Distance in front of the paper, as a part of the view's height.
+# Height of each layer towards the viewer, relative to the view's height.
 _LAYERS = {"ground": 0.0, "marks": 0.01, "surface": 0.02, "body": 0.03, "reference": 0.04,
            "outline": 0.05, "force": 0.06, "rim": 0.07, "node": 0.08}
 
 _MARGIN = 0.05  # of the view, beside and above the body
 _DEPTH = 0.20  # of the view's height, for the ground
-_ARROW = 0.15  # of the view's height (in portrait of half its width), the longest
+_ARROW = 0.15  # longest arrow, of the view's height (in portrait of half its width)
 _CORNERS = 20
 _COLUMNS, _MOST_COLUMNS = 2, 8  # of the ground per pixel
-_POINTS = 16  # on a wave of the ground, so that short waves stay smooth
+_POINTS = 16  # per wave of the ground, to draw short waves smoothly
 
 
 class Scene:
-    """Draws frames of a motion; use it as a context manager.
+    """Renderer of the frames of a motion; a context manager.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class Scene:
             line_width=line)
 
     def _place_marks(self) -> None:
-        """Slanted marks fixed to the ground, far enough apart that one can follow them."""
+        """Slanted marks that move with the ground, spaced so that the eye can follow them."""
         view = self._x[1] - self._x[0]
         step = np.abs(np.diff(self._motion.travel)).max(initial=0.0)
         spacing = view / np.clip(view / max(4.0 * step, 1e-300), 4, 36)

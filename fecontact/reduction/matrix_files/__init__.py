@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
-from fecontact.core.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
+from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
 from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
 
 _BANNER = b"%%MatrixMarket"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError, choices, nearest
-from fecontact.core.stored import LARGEST
+from fecontact.core.files.stored import LARGEST
 from fecontact.core.types import Array, Integers
 
 Ints = Integers

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, MissingLibraryError
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.from_modes import basis_from_modes
 
 if TYPE_CHECKING:

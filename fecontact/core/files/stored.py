@@ -1,4 +1,4 @@
-"""Reading what a file holds, after a look at whether it is what it should be.
+"""Checked reading of arrays and attributes from HDF5 files.
 
 Files come from other computers, older versions and disks that ran full. Shapes, types and sizes
 are looked at before anything is allocated or handed to compiled code, which trusts them.

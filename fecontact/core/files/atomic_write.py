@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError
 
 _LOCK, _CONTENT, _EARLIER = "lock", "content", "earlier"
@@ -40,7 +41,7 @@ def replaced(path: str | Path) -> Iterator[Path]:
     InputError
         If it cannot be written, or there is something of that name that is not a file.
     """
-    path = Path(path)
+    path = as_path(path, "a file to write")
     with _readable_errors(path):
         _require_file(path)
         with beside(path) as folder:

@@ -1,4 +1,4 @@
-"""Locks of files that are being written, which the system opens when their process ends."""
+"""Locks on files that are being written; the system releases them when their process ends."""
 
 import os
 from collections.abc import Iterator

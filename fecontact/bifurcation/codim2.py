@@ -1,0 +1,220 @@
+"""Curves of special points over two parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.points import (
+    BranchPoint,
+    FoldPoint,
+    HopfPoint,
+    NeimarkSackerPoint,
+    PeriodDoublingPoint,
+)
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    Problem,
+    options_of,
+)
+from fecontact.bifurcation.equilibria.codim2 import equilibrium_curve
+from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
+from fecontact.core.types import Array
+
+# Smallest component of a tangent of length one that tells the sign of a parameter's change.
+_RESTS = 1e-6
+# Part of a range within which a start on its end may lie beside it.
+_ON_BOUND = 1e-9
+
+
+def codim2_curve(
+    field: VectorField, point: BranchPoint, parameter: str, *,
+    options: ContinuationOptions | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None, scales: ArrayLike | None = None,
+    direction: float = 1.0, both: bool = True,
+) -> Branch:
+    """Follow a special point over two parameters, such as the border of flutter or stick-slip.
+
+    The kind of the point tells which curve it is: folds and Hopf points of equilibria (minimally
+    augmented systems), or folds, period doublings and Neimark-Sacker points of orbits by
+    collocation (the orbit with its test function at zero).
+
+    Parameters
+    ----------
+    field : VectorField
+        The system, with both parameters. For equilibria its rates must not depend on time.
+    point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
+        A special point of a branch over the first parameter.
+    parameter : str
+        The second parameter.
+    options : ContinuationOptions, optional
+        How the curve is followed; ``bounds`` there are those of the first parameter.
+    bounds : mapping, optional
+        Range of each parameter by name, ``{"B": (0.0, 30.0)}``; the curve ends there. They also
+        set the widths of the diagram; without they are those of the branch, or the values at the
+        point.
+    scales : (d,) sequence, optional
+        Sizes of the states that count as one in the length of a step; by default they grow with
+        the states of equilibria, and are those of the branch for orbits.
+    direction : float
+        Sign of the first change of the first parameter; of the second one where the first rests.
+    both : bool
+        Go to both sides; the points then go from one end of the curve to the other.
+
+    Returns
+    -------
+    Branch
+        With ``parameter_names`` (first, second); each point stores both by name. Besides, and as
+        special points, there are
+
+        - folds of equilibria: 'state', 'unstable_besides', the number of eigenvalues with positive
+          real part besides the one that is zero; 'cusp', 'Bogdanov-Takens', 'zero-Hopf',
+        - Hopf points: 'state', 'frequency_hz', 'first_lyapunov', 'unstable_besides' the critical
+          pair; 'Bautin' (generalised Hopf), 'double Hopf', 'zero-Hopf', and 'Bogdanov-Takens',
+          where the curve ends,
+        - orbits: what :func:`fecontact.bifurcation.orbit_branch` stores; 'cusp' on curves of folds,
+          'generalised period doubling', where doublings turn from super- to subcritical, on curves
+          of tori 'resonance 1:1' to 'resonance 1:4', where the multipliers pass 1, -1, or the
+          angle 120 or 90 degrees; and 'turning point'.
+
+    Raises
+    ------
+    InputError
+        If the point starts no curve, was found by shooting, or lies outside the bounds, or a
+        parameter is unknown.
+    AnalysisError
+        If the curve has no direction at the point.
+    """
+    require_field(field)
+    require_kind("codim2_curve", BranchPoint, point=point)
+    require_kind("codim2_curve", str, parameter=parameter)
+    require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
+    require_finite("codim2_curve", direction=direction)
+    if not isinstance(point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
+        raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
+                         f"'period doubling' or 'Neimark-Sacker'.")
+    names = (point.branch.parameter_name, parameter)
+    field.index(parameter)
+    if names[0] == parameter:
+        raise InputError(f"codim2_curve: parameter = {parameter!r} is that of the branch; name "
+                         f"another one.")
+    ranges = _ranges(names, bounds)
+    chosen = options_of(options, ranges.get(names[0]))
+    widths = {name: high - low for name, (low, high) in ranges.items() if np.isfinite(high - low)}
+    begin = orbit_curve if point.is_orbit else equilibrium_curve
+    problem, u, attributes = begin(field, point, parameter, widths, scales)
+    attributes |= {"parameters": list(names), "kind": str(point.kind),
+                   "state_names": list(field.state_names)}
+    return _followed(problem, u, names, chosen, ranges.get(parameter, (-np.inf, np.inf)), direction,
+                     both, attributes)
+
+
+def _ranges(
+    names: tuple[str, str], bounds: Mapping[str, tuple[float, float]] | None
+) -> dict[str, tuple[float, float]]:
+    """The bounds as given, checked."""
+    found = {}
+    for name, given in (bounds or {}).items():
+        if name not in names:
+            raise InputError(f"bounds are given for {name!r}, which is none of the parameters of "
+                             f"the curve: {names[0]!r}, {names[1]!r}.")
+        try:
+            low, high = (float(value) for value in given)
+            fine = low < high
+        except (TypeError, ValueError):
+            fine = False
+        if not fine:
+            raise InputError(f"bounds[{name!r}] = {given!r} must be two values of the parameter, "
+                             f"the smaller one first.")
+        found[name] = low, high
+    return found
+
+
+@dataclass(frozen=True)
+class _Border:
+    """A bound of the second parameter, as an event at which the curve ends."""
+
+    name: str
+    parameter: str
+    bound: float
+    rounding: float
+
+    def __call__(self, stored: Mapping[str, Any]) -> float:
+        distance = float(stored[self.parameter]) - self.bound
+        return 0.0 if abs(distance) <= self.rounding else distance
+
+
+def _followed(
+    problem: Problem, u: Array, names: tuple[str, str], options: ContinuationOptions,
+    second: tuple[float, float], direction: float, both: bool, attributes: dict[str, Any],
+) -> Branch:
+    """The curve through u = [..., second parameter, first parameter], within both ranges."""
+    value, size = float(u[-2]), float(np.ptp(second)) if np.isfinite(second).all() else 1.0
+    near = _ON_BOUND * size
+    if not second[0] - near <= value <= second[1] + near:
+        raise InputError(f"The start lies at {names[1]} = {value:.6g}, outside its bounds, "
+                         f"{second[0]:g} to {second[1]:g}.")
+    tangent = _tangent(problem, u, direction)
+    borders, turned, leaves = [], False, False
+    for side, bound in zip((-1.0, 1.0), second, strict=True):
+        if not np.isfinite(bound):
+            continue
+        on_it = abs(value - bound) <= near
+        borders.append(_Border(f"{names[1]} = {bound:g}", names[1], bound, near if on_it else 0.0))
+        if on_it and side * tangent[-2] > 0.0:
+            turned, leaves = both, not both
+            tangent = -tangent if turned else tangent
+        both = both and not on_it
+    stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
+    ends = ["Bogdanov-Takens"] if attributes["kind"] == "Hopf" else []
+    chosen = replace(options, points=1 if leaves else options.points,
+                     stop_at=(*stops, *(border.name for border in borders), *ends),
+                     events={**options.events, **{border.name: border for border in borders}})
+    branch = continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
+                             attributes=attributes)
+    if leaves:
+        return replace(branch, status=BranchStatus.BOUND)
+    branch = _without_borders(branch, {border.name for border in borders})
+    return branch.reversed() if turned else branch
+
+
+def _without_borders(branch: Branch, borders: set[str]) -> Branch:
+    """The curve whose ends on bounds of the second parameter are regular points."""
+    reached = branch.points[-1].kind in borders
+    points = tuple(replace(point, kind=None) if point.kind in borders else point
+                   for point in branch.points)
+    return replace(branch, points=points, status=BranchStatus.BOUND if reached else branch.status)
+
+
+def _tangent(problem: Problem, u: Array, direction: float) -> Array:
+    """Tangent (N + 1,) of length one of a curve; its direction as in :func:`codim2_curve`.
+
+    One parameter may rest where the curve starts; the other one then parametrises it.
+    """
+    linearised, weights = problem.linearise(u), problem.weights()
+    found: list[Array] = []
+    for place in (-1, -2):
+        row, rhs = np.zeros(len(u)), np.zeros(len(u))
+        row[place] = rhs[-1] = 1.0
+        try:
+            tangent = linearised.solve(row, rhs)
+        except FecontactError:
+            continue
+        size = float(np.sqrt(weights @ tangent**2))
+        if np.isfinite(size) and size > 0.0:
+            found.append(tangent / size)
+    if not found:
+        raise AnalysisError("The curve has no direction at its start: both parameters turn there. "
+                            "Start from another point of it.")
+    rates = [np.abs(tangent[-2:]) * np.sqrt(weights[-2:]) for tangent in found]
+    tangent = found[int(np.argmax([rate.max() for rate in rates]))]
+    first = abs(tangent[-1]) * np.sqrt(weights[-1]) > _RESTS
+    return tangent * np.copysign(1.0, direction * tangent[-1 if first else -2])

@@ -1,0 +1,184 @@
+"""One step along a branch: the piece between two regular points, and zeros on it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.newton import Solution, corrected, finished
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
+from fecontact.core.errors import FecontactError
+from fecontact.core.types import Array
+
+# Relative size of the last Newton step at special points.
+_EXACT = 1e-10
+# Precision from which test functions are smooth enough for the search to end without a bracket, and
+# the factor by which the last value must have fallen.
+_SMOOTH, _FALLS = 1e-6, 0.1
+# Neighbours from whose tangents Newton's method starts if it fails from the cubic.
+_NEIGHBOURS = 3
+# Brent's method takes at most so many steps.
+_STEPS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """The piece of a branch between two regular points.
+
+    Attributes
+    ----------
+    problem, options : Problem, ContinuationOptions
+        Of the branch.
+    here, there : Solution
+        Both ends.
+    row : (N + 1,) array
+        The branch is parametrised by ``row @ (u - here.u)``, which grows from here to there.
+    """
+
+    problem: Problem
+    here: Solution
+    there: Solution
+    options: ContinuationOptions
+    row: Array
+
+    @property
+    def length(self) -> float:
+        """Length of the step along the row."""
+        return self.along(self.there.u)
+
+    def along(self, u: Array) -> float:
+        """Length along the row from here to u."""
+        return float(self.row @ (u - self.here.u))
+
+    def cubic(self, along: float) -> Array:
+        """Hermite cubic through both ends and their tangents, at a length along the row."""
+        length = self.length
+        x = along / length
+        first = self.here.tangent / float(self.row @ self.here.tangent)
+        last = self.there.tangent / float(self.row @ self.there.tangent)
+        return np.asarray(
+            self.here.u + length * x * (1.0 - x) ** 2 * first
+            + x * x * (3.0 - 2.0 * x) * (self.there.u - self.here.u)
+            + length * x * x * (x - 1.0) * last)
+
+    def parameter_rate(self) -> float:
+        """Largest change of the parameter per length along the row."""
+        return max(abs(float(end.tangent[-1]) / float(self.row @ end.tangent))
+                   for end in (self.here, self.there))
+
+    def solution(self, along: float) -> Solution | None:
+        """The solution at a length along the row; None if Newton's method fails."""
+        try:
+            found = corrected(self.problem, self.cubic(along), self.row, self.options.tolerance,
+                              2 * self.options.iterations)
+            return None if found is None else finished(self.problem, *found, self.row,
+                                                       self.options)
+        except FecontactError:
+            return None
+
+    def zero(
+        self, test: Callable[[Solution], float], precision: float, *, remeshed: bool = False
+    ) -> tuple[Solution, float] | None:
+        """The solution at which a test function is zero; None at a pole or a jump.
+
+        Parameters
+        ----------
+        test : callable
+            Of opposite signs at both ends, or zero there.
+        precision : float
+            Part of the step to which the zero is located.
+        remeshed : bool
+            The test function jumps a little at the start of the step, where the mesh is renewed; a
+            jump there counts as a zero.
+
+        Returns
+        -------
+        (Solution, float)
+            With the length of the bracket that is left, zero where the search converged.
+        """
+        from scipy.optimize import brentq
+
+        before, after = test(self.here), test(self.there)
+        if after == 0.0:
+            return self.there, 0.0
+        length, search = self.length, _Search(self, test, precision)
+        try:
+            converged = brentq(search, 0.0, length, xtol=precision * length, rtol=1e-14,
+                               maxiter=_STEPS, full_output=True, disp=False)[1].converged
+        except _LostError:
+            converged = False
+        known = search.known
+        if not known:
+            return None
+        first = min(known, key=lambda each: each[0])
+        if remeshed and first[1] * after > 0.0 and first[0] <= 3.0 * precision * length:
+            return first[2], first[0]
+        along, size, at = min(known, key=lambda each: abs(each[1]))
+        # At a zero the values become small, as far as the precision allows; not so at a pole or a
+        # jump.
+        if abs(size) > max(1e-3, 50.0 * precision) * max(abs(before), abs(after)):
+            return None
+        if converged or size == 0.0:
+            return at, 0.0
+        ends = [(0.0, before, self.here), (length, after, self.there), *known]
+        return at, min(abs(place - along) for place, other, _ in ends if other * size < 0.0)
+
+
+class _LostError(Exception):
+    """Newton's method fails from every guess."""
+
+
+class _Search:
+    """A test function over the length along a step, and the solutions at which it was taken."""
+
+    def __init__(
+        self, step: Step, test: Callable[[Solution], float], precision: float
+    ) -> None:
+        self.step, self.test, self.precision = step, test, precision
+        self.known: list[tuple[float, float, Solution]] = []
+
+    def __call__(self, along: float) -> float:
+        if along <= 0.0:
+            return self.test(self.step.here)
+        if along >= self.step.length:
+            return self.test(self.step.there)
+        at = self._solution(along)
+        value = self.test(at)
+        self.known.append((along, value, at))
+        # Report a zero at once where the secant shows that the remaining error is small enough.
+        return 0.0 if self._settled() else value
+
+    def _solution(self, along: float) -> Solution:
+        """The solution at a length, linearised there and not at the last Newton step."""
+        step, options = self.step, self.step.options
+        exact = max(_EXACT, 1e-2 * self.precision)
+        for guess, beside in self._guesses(along):
+            try:
+                found = corrected(step.problem, guess, step.row, exact, 2 * options.iterations,
+                                  exact=True, known=beside.linearisation)
+                if found is not None:
+                    return finished(step.problem, *found, step.row, options)
+            except FecontactError:
+                continue
+        raise _LostError
+
+    def _guesses(self, along: float) -> Iterator[tuple[Array, Solution]]:
+        """Starts of Newton's method, each with a known solution nearby.
+
+        First the cubic, then the tangents of the nearest solutions.
+        """
+        step = self.step
+        yield step.cubic(along), self.known[-1][2] if self.known else step.there
+        solutions = sorted([step.here, step.there, *(at for *_, at in self.known)],
+                           key=lambda at: abs(step.along(at.u) - along))
+        for at in solutions[:_NEIGHBOURS]:
+            ahead = along - step.along(at.u)
+            yield at.u + ahead / float(step.row @ at.tangent) * at.tangent, at
+
+    def _settled(self) -> bool:
+        """Whether the last two values fall quickly towards a zero of their secant nearby."""
+        if self.precision >= _SMOOTH or len(self.known) < 2:
+            return False
+        (x, a, _), (y, b, _) = self.known[-2:]
+        near = 0.5 * self.precision * self.step.length
+        return abs(b) <= _FALLS * abs(a) and abs(b * (y - x)) <= near * abs(b - a)

@@ -1,0 +1,50 @@
+"""Labels of parameters, with the units that the annotations of their classes name."""
+
+import re
+from typing import get_type_hints
+
+import pytest
+
+from fecontact import Study
+from fecontact.core.docstrings import documented
+from fecontact.system.parameter_labels import _classes, _units_of, parameter_label
+
+
+@pytest.mark.parametrize(("name", "label"), [
+    ("ground.speed", "ground speed [m/s]"),
+    ("ground.profile.amplitude", "ground profile amplitude [m]"),
+    ("drive.angular_frequency", "drive angular frequency [rad/s]"),
+    ("contact.SOLE.friction.smoothing_slope", "SOLE friction smoothing slope [s/m]"),
+    ("normal.roughness_height", "normal roughness height [m]"),
+    ("load.normal", "load normal [N]"),
+    ("gap", "gap [m]"),
+    # The laws do not agree: N/m of rough surfaces, N/m^n of powers.
+    ("normal.stiffness", "normal stiffness"),
+    ("friction.friction_coefficient", "friction coefficient"),
+    ("B", "B"),
+])
+def test_labels(name, label):
+    assert parameter_label(name) == label
+
+
+def _documented_units():
+    for cls in {cls for hint in get_type_hints(Study).values() for _, cls in _classes(hint, "")}:
+        units = _units_of(cls)
+        for names, meaning in documented(cls):
+            named = re.findall(r"\[([^\]]+)\]", meaning)
+            for name in names:
+                yield cls.__name__, name, named, units[name]
+
+
+def test_docstrings_and_annotations_name_the_same_units():
+    """For people one, for labels the other."""
+    compared = 0
+    for owner, name, named, unit in _documented_units():
+        if unit or (len(named) == 1 and named[0] in KNOWN):
+            # Tables and laws within a parameter say their own units.
+            assert unit in named, (owner, name)
+            compared += 1
+    assert compared > 100
+
+
+KNOWN = {"m", "m/s", "s", "1/s", "1/m", "s/m", "N", "N/m", "N s/m", "Pa", "Hz", "rad", "rad/s"}
