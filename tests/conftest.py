@@ -1,4 +1,4 @@
-"""ContinuationOptions for all tests."""
+"""Settings for all tests."""
 
 import os
 from pathlib import Path
@@ -15,8 +15,8 @@ SLOW = {"test_documentation", "test_examples", "test_benchmarks"}
 LONG = {
     "test_bad_arguments", "test_damaged_caches", "test_memory_laws", "test_laws_by_name",
     "test_plots", "test_sweep_statistics", "test_assembled",
-    "test_sharp_turns", "test_closed_and_flat_branches", "test_shooting", "test_orbit_curves",
-    "test_changes_of_stability", "test_curves", "test_elimination", "test_diagrams",
+    "test_hairpin", "test_closed_and_flat_branches", "test_shooting", "test_orbit_curves",
+    "test_changes_of_stability", "test_curves", "test_condensation", "test_diagrams",
     "test_bernstein",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
     "test_set_valued_beam", "test_friction_oscillator",
@@ -24,7 +24,7 @@ LONG = {
     "test_sweep_summaries",
     "test_movie", "test_analysis_plots", "test_trust", "test_damaged_files", "test_whole_files",
     "test_cli", "test_cli_stop", "test_ending_signals", "test_locks", "test_bad_input",
-    "test_brute_force", "test_branch_study", "test_branch_command", "test_impact_orbits",
+    "test_poincare_scan", "test_branch_study", "test_branch_command", "test_impact_orbits",
     "test_orbits_by_shooting", "test_shooting_of_beam", "test_squeal", "test_two_mass_example",
     "test_convergence", "test_mode_convergence",
 }

@@ -286,7 +286,7 @@ def test_every_plot_returns_its_figure_and_takes_a_path_by_name():
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_a_figure_saved_later_is_the_one_in_the_file(tmp_path, monkeypatch, suffix):
-    """ContinuationOptions of the user between drawing and saving do not change its style."""
+    """Settings of the user between drawing and saving do not change its style."""
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     first, second = tmp_path / f"first.{suffix}", tmp_path / f"second.{suffix}"
     with rc_context({"svg.hashsalt": "one"}):
