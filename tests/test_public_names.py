@@ -50,14 +50,14 @@ def public_things():
 
 
 def test_help_of_a_public_function_fits_a_screen():
-    """No signature above 12 lines of 80 characters; with it and its docstring below 75 lines."""
+    """No signature above 14 lines of 80 characters; with it and its docstring below 75 lines."""
     functions = {name: thing for name, thing in public_things().items()
                  if inspect.isroutine(thing)}
     assert len(functions) > 80
     for name, function in functions.items():
         shown = pydoc.plain(pydoc.render_doc(function)).splitlines()
         signature = textwrap.wrap(str(inspect.signature(function)), 80)
-        assert len(signature) <= 12, name
+        assert len(signature) <= 14, name
         assert len(shown) + len(signature) <= 75, name
 
 

@@ -286,16 +286,19 @@ def _arguments(function: Callable[..., Any]) -> str:
     return ", ".join(inspect.signature(function).parameters)
 
 
-def _raising(function: Callable[..., Any]) -> str | None:
+def _raising(function: Callable[..., Any], seen: set[Any] | None = None) -> str | None:
     """Where a function raises: "" for itself, " in NAME" for one that it calls, None for nowhere.
 
-    Behind an address exceptions are printed and lost, and the function returns zeros.
+    Behind an address exceptions are printed and lost, and the function returns zeros. ``seen``
+    are functions that need no second look; an attribute may have the name of one of them.
     """
+    seen = set() if seen is None else seen
+    seen.add(function)
     if any(step.opname == "RAISE_VARARGS" for step in dis.get_instructions(function)):
         return ""
     for name, value in inspect.getclosurevars(function).globals.items():
         called = getattr(value, "py_func", None)
-        if called is not None and _raising(called) is not None:
+        if called is not None and called not in seen and _raising(called, seen) is not None:
             return f" in {name}"
     return None
 

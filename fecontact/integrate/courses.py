@@ -15,7 +15,10 @@ ends by no more than the differences of its coefficients from that line, and a n
 the sum over the modes. Of few nodes on flat ground the coefficients themselves cost less.
 """
 
+from typing import Any, NamedTuple
+
 from fecontact.core.compiled import helper
+from fecontact.core.types import Array
 from fecontact.integrate import bernstein
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import tableau
@@ -33,6 +36,33 @@ _FINEST = 2.0**-6
 _FEW = 4
 # Changes of sign of one quantity in a step that are told apart.
 MOST = 8
+
+
+class Course(NamedTuple):
+    """The slip velocity (SLIP) or the gap (GAP) of a node in the course of a step.
+
+    Attributes
+    ----------
+    what, node : int
+        SLIP or GAP; number of the node.
+    shift : float
+        What is added.
+    step, system : Step, SystemArrays
+        The step, and what moves.
+    bounds, courses : arrays
+        Those of the ground; those of :func:`set_courses`.
+    row : (5,) array
+        Room to work in.
+    """
+
+    what: int
+    node: int
+    shift: float
+    step: Any
+    system: Any
+    bounds: Array
+    courses: Array
+    row: Array
 
 
 @helper
@@ -268,69 +298,87 @@ def doubtful(speed, h, bounds, levels, slip_scale, room):
 
 
 @helper
-def ground_part(what, part, j, t, h, latest, s, bounds, courses, row):
-    """What the ground adds at a part of the step: its height under node j, or its speed."""
-    now = min(t + part * h, latest)
-    if what == SLIP:
+def ground_part(part, course):
+    """What the ground adds at a part of the step: its height under the node, or its speed."""
+    s, step, row = course.system, course.step, course.row
+    now = min(step.t + part * step.h, step.latest)
+    if course.what == SLIP:
         return signal_at(s.ground_motion)(now, s.ground_motion_parameters)[1]
-    if bounds[STEEPEST] == 0.0:
-        return bounds[HIGHEST]
+    if course.bounds[STEEPEST] == 0.0:
+        return course.bounds[HIGHEST]
     travel = signal_at(s.ground_motion)(now, s.ground_motion_parameters)[0]
-    column = 2 * s.gap.shape[0] + j
+    column = 2 * s.gap.shape[0] + course.node
     for k in range(COEFFICIENTS):
-        row[k] = courses[k, column]
+        row[k] = course.courses[k, column]
     for k in range(COEFFICIENTS - 1, 0, -1):
         for i in range(k):
             row[i] += part * (row[i + 1] - row[i])
-    return ground_at(s.profile)(s.abscissa[j] + row[0] - travel, s.profile_parameters)[0]
+    return ground_at(s.profile)(s.abscissa[course.node] + row[0] - travel,
+                                s.profile_parameters)[0]
 
 
 @helper
-def at(what, part, j, t, h, latest, s, bounds, courses, shift, b, row):
-    """Slip velocity, or gap, of node j at a part of the step, plus ``shift``.
-
-    ``b`` (5,) are the coefficients of the node's own motion.
-    """
-    return bernstein.value(b, part, row) + shift - ground_part(
-        what, part, j, t, h, latest, s, bounds, courses, row)
+def at(part, b, course):
+    """Value of a course at a part of the step; b (5,) are the coefficients of the node's own."""
+    return bernstein.value(b, part, course.row) + course.shift - ground_part(part, course)
 
 
 @helper
-def changes(what, j, t, h, latest, s, bounds, courses, shift, b, room, row, places):
-    """Fill ``places`` with the parts of the step at which a quantity of node j changes its sign.
-
-    Slip velocity or gap, plus ``shift``; returns how many there are. Sets ``b`` (5,) to the
-    coefficients of the node's own motion; ``room`` (bernstein.DEPTH, 6) and ``row`` (5,) are room.
-    """
-    n = s.gap.shape[0]
-    own = j if what == SLIP else n + j
+def _set_own(course, b):
+    """Fill b (5,) with the coefficients of the node's own motion."""
+    own = course.node
+    if course.what == GAP:
+        own += course.system.gap.shape[0]
     for k in range(COEFFICIENTS):
-        b[k] = courses[k, own]
-    bound = bounds[QUICKEST] * h
-    if what == GAP:
-        # The node's own motion over the ground, and that of the ground.
-        bound = 0.0
-        if bounds[STEEPEST] != 0.0:
-            for k in range(4):
-                bound = max(bound, 4.0 * abs(courses[k + 1, 2 * n + j] - courses[k, 2 * n + j]))
-            bound = bounds[STEEPEST] * (bound + bounds[FASTEST] * h)
-    if bound == 0.0:
-        constant = shift - ground_part(what, 0.0, j, t, h, latest, s, bounds, courses, row)
-        for k in range(COEFFICIENTS):
-            b[k] += constant
-        found = bernstein.sign_changes(b, room, row, places)
-        for k in range(COEFFICIENTS):
-            b[k] -= constant
-        return found
+        b[k] = course.courses[k, own]
+
+
+@helper
+def _ground_bound(course):
+    """Largest rate of change of what the ground adds, over the step."""
+    bounds, h = course.bounds, course.step.h
+    if course.what == SLIP:
+        return bounds[QUICKEST] * h
+    if bounds[STEEPEST] == 0.0:
+        return 0.0
+    # The node's own motion over the ground, and that of the ground.
+    bound, column = 0.0, 2 * course.system.gap.shape[0] + course.node
+    for k in range(COEFFICIENTS - 1):
+        bound = max(bound, 4.0 * abs(course.courses[k + 1, column] - course.courses[k, column]))
+    return bounds[STEEPEST] * (bound + bounds[FASTEST] * h)
+
+
+@helper
+def changes(b, course, halves, places):
+    """Fill ``places`` with the parts of the step at which a course changes its sign.
+
+    Returns how many there are. Sets b (5,) to the coefficients of the node's own motion;
+    ``halves`` (bernstein.DEPTH, 6) is room.
+    """
+    _set_own(course, b)
+    bound = _ground_bound(course)
+    if bound > 0.0:
+        return _changes_on_moving_ground(b, bound, course, halves, places)
+    constant = course.shift - ground_part(0.0, course)
+    for k in range(COEFFICIENTS):
+        b[k] += constant
+    found = bernstein.sign_changes(b, halves, course.row, places)
+    for k in range(COEFFICIENTS):
+        b[k] -= constant
+    return found
+
+
+@helper
+def _changes_on_moving_ground(b, bound, course, room, places):
+    shift = course.shift
     bend = 0.0
-    for k in range(3):
+    for k in range(COEFFICIENTS - 2):
         bend = max(bend, 12.0 * abs(b[k] - 2.0 * b[k + 1] + b[k + 2]))
     # Parts that are left, the earliest on top: begin, width, own motion and ground at both ends.
     found, waiting = 0, 1
     room[0, 0], room[0, 1] = 0.0, 1.0
-    room[0, 2], room[0, 3] = b[0] + shift, b[4] + shift
-    room[0, 4] = ground_part(what, 0.0, j, t, h, latest, s, bounds, courses, row)
-    room[0, 5] = ground_part(what, 1.0, j, t, h, latest, s, bounds, courses, row)
+    room[0, 2], room[0, 3] = b[0] + shift, b[COEFFICIENTS - 1] + shift
+    room[0, 4], room[0, 5] = ground_part(0.0, course), ground_part(1.0, course)
     sign = room[0, 2] - room[0, 4]
     while waiting > 0:
         top = room[waiting - 1]
@@ -341,12 +389,12 @@ def changes(what, j, t, h, latest, s, bounds, courses, shift, b, room, row, plac
         decided = min(p, q) - reach > middle or max(p, q) + reach < middle
         if not decided and width > _FINEST:
             half = begin + 0.5 * width
-            u = bernstein.value(b, half, row) + shift
-            v = ground_part(what, half, j, t, h, latest, s, bounds, courses, row)
+            u = bernstein.value(b, half, course.row) + shift
+            v = ground_part(half, course)
             top[0], top[1], top[2], top[3], top[4], top[5] = half, 0.5 * width, u, q, v, g
             below = room[waiting]
             below[0], below[1], below[2], below[3], below[4], below[5] = (begin, 0.5 * width, p, u,
-                                                                         f, v)
+                                                                          f, v)
             waiting += 1
             continue
         waiting -= 1

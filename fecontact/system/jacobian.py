@@ -4,11 +4,12 @@ import numpy as np
 from numba import types
 
 from fecontact.core.compiled import block, borrowed, f8, helper, kernel, matrix, vector
-from fecontact.laws.signatures import signal_at
 from fecontact.system.kernels import (
     SYSTEM,
+    GroundMotion,
     body_rates,
     given_at,
+    ground_motion,
     memory_of,
     node_gradients,
     node_motion,
@@ -22,6 +23,34 @@ from fecontact.system.parameter_derivatives import (
 )
 
 
+@helper
+def _body_jacobian(s, out):
+    """Set the parts of the Jacobian that do not depend on the state."""
+    m = s.Tx.shape[1]
+    for i in range(m):
+        out[i, m + i] = 1.0
+        for k in range(m):
+            out[m + i, k] = -s.stiffness[i, k]
+            out[m + i, m + k] = -s.damping[i, k]
+
+
+@helper
+def _memory_jacobian(j, s, force, rates, partial, out):
+    """Set the rows and columns of the Jacobian that belong to the internal variables of node j."""
+    m = s.Tx.shape[1]
+    first = 2 * m + j * len(rates)
+    for k in range(s.memory[j]):
+        row = first + k
+        for i in range(m):
+            tx, ty = s.Tx[j, i], s.Ty[j, i]
+            out[row, i] = rates[k, 2] * (partial[2, 0] * tx + partial[2, 1] * ty)
+            out[row, m + i] = rates[k, 1] * tx + rates[k, 2] * (partial[2, 2] * tx
+                                                                + partial[2, 3] * ty)
+            out[m + i, row] = -force[3 + k] * tx
+        for other in range(s.memory[j]):
+            out[row, first + other] = rates[k, 3 + other]
+
+
 @kernel(types.i8(f8, vector, SYSTEM, block, matrix, matrix))
 def contact_gradients(t, y, s, gradients, active, out):
     """Rows of the Jacobian's contact part, for the nodes whose normal force is not zero.
@@ -33,26 +62,15 @@ def contact_gradients(t, y, s, gradients, active, out):
     """
     y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    moved = ground_motion(t, s)
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
     partial = np.empty((3, 4))
     count = 0
     for j in range(n):
-        x, height, x_rate, height_rate = node_motion(j, y, s)
-        F, _ = node_gradients(j, x, height, x_rate, height_rate, memory_of(j, y, s), travel, speed,
-                              s, force, rates, partial)
-        first = 2 * m + j * states
-        for k in range(s.memory[j]):
-            row = first + k
-            for i in range(m):
-                tx, ty = s.Tx[j, i], s.Ty[j, i]
-                out[row, i] = rates[k, 2] * (partial[2, 0] * tx + partial[2, 1] * ty)
-                out[row, m + i] = rates[k, 1] * tx + rates[k, 2] * (partial[2, 2] * tx
-                                                                    + partial[2, 3] * ty)
-                out[m + i, row] = -force[3 + k] * tx
-            for other in range(s.memory[j]):
-                out[row, first + other] = rates[k, 3 + other]
+        F, _, _ = node_gradients(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
+                                 rates, partial)
+        _memory_jacobian(j, s, force, rates, partial, out)
         if F == 0.0:
             continue
         for i in range(m):
@@ -75,11 +93,7 @@ def jacobian(t, y, s, out):
     gradients, active = np.empty((4, n, m)), np.empty((n, 2 * m))
     out[:] = 0.0
     count = contact_gradients(t, y, s, gradients, active, out)
-    for i in range(m):
-        out[i, m + i] = 1.0
-        for k in range(m):
-            out[m + i, k] = -s.stiffness[i, k]
-            out[m + i, m + k] = -s.damping[i, k]
+    _body_jacobian(s, out)
     if count:
         Tx = np.ascontiguousarray(active[:count, :m].T)
         Ty = np.ascontiguousarray(active[:count, m:].T)
@@ -92,11 +106,11 @@ def jacobian(t, y, s, out):
 def _fill_rates(t, x, s, load, force, rates, f):
     t, x, s, f = borrowed(t), borrowed(x), borrowed(s), borrowed(f)
     load, force, rates = borrowed(load), borrowed(force), borrowed(rates)
-    travel, speed = 0.0, 0.0
+    moved = GroundMotion(0.0, 0.0)
     for c in range(len(t)):
         if c == 0 or t[c] != t[c - 1]:
-            travel, speed = given_at(t[c], s, load)
-        rates_under(load, travel, speed, x[c], s, force, rates, f[c])
+            moved = given_at(t[c], s, load)
+        rates_under(load, moved, x[c], s, force, rates, f[c])
 
 
 @kernel(types.void(vector, matrix, SYSTEM, matrix))
@@ -109,7 +123,28 @@ def batch_rates(t, x, s, f):
 
 
 @helper
-def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):
+def _add_contact(j, F, R, s, partial, gradient, rate, out):
+    """Add the forces of node j to y' and their derivatives to the Jacobian.
+
+    ``gradient`` (2, 2 m) is filled with those of -R and F to the state.
+    """
+    m = s.Tx.shape[1]
+    for k in range(m):
+        tx, ty = s.Tx[j, k], s.Ty[j, k]
+        for part in range(2):
+            gradient[0, part * m + k] = (-partial[1, 2 * part] * tx
+                                         - partial[1, 2 * part + 1] * ty)
+            gradient[1, part * m + k] = (partial[0, 2 * part] * tx
+                                         + partial[0, 2 * part + 1] * ty)
+    for i in range(m):
+        tx, ty = s.Tx[j, i], s.Ty[j, i]
+        rate[m + i] += ty * F - tx * R
+        for k in range(2 * m):
+            out[m + i, k] += tx * gradient[0, k] + ty * gradient[1, k]
+
+
+@helper
+def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
     # What is made in this call is borrowed too: counting references costs as much as the laws.
     t, x, s, f, J = borrowed(t), borrowed(x), borrowed(s), borrowed(f), borrowed(J)
     r, P, laws = borrowed(r), borrowed(P), borrowed(laws)
@@ -118,22 +153,18 @@ def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):
     n, m = s.Tx.shape
     states = len(rates)
     differs = len(P) > 0
-    travel, speed, travel_p, speed_p = 0.0, 0.0, 0.0, 0.0
+    moved, moved_p = GroundMotion(0.0, 0.0), (0.0, 0.0)
     body_moves = differs and (moves(r.stiffness) or moves(r.damping))
     basis_moves = differs and (moves(r.Tx) or moves(r.Ty))
     for c in range(len(t)):
         y, out, A = x[c], f[c], J[c]
         if c == 0 or t[c] != t[c - 1]:
-            travel, speed = given_at(t[c], s, load)
+            moved = given_at(t[c], s, load)
             if differs:
-                travel_p, speed_p = given_rates(t[c], s, r, h, laws, load_p)
+                moved_p = given_rates(t[c], s, r, laws, load_p)
         A[:, :] = 0.0
         body_rates(load, y, s, out)
-        for i in range(m):
-            A[i, m + i] = 1.0
-            for k in range(m):
-                A[m + i, k] = -s.stiffness[i, k]
-                A[m + i, m + k] = -s.damping[i, k]
+        _body_jacobian(s, A)
         if differs:
             P[c, :] = 0.0
             if body_moves:
@@ -142,33 +173,23 @@ def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):
             else:
                 P[c, m : 2 * m] = load_p
         for j in range(n):
-            along, height, along_rate, height_rate = node_motion(j, y, s)
             z = memory_of(j, y, s)
-            F, R = node_gradients(j, along, height, along_rate, height_rate, z,
-                                  travel, speed, s, force, rates, partial)
+            F, R, contact = node_gradients(j, node_motion(j, y, s), moved, z, s, force, rates,
+                                           partial)
             first = 2 * m + j * states
             for k in range(s.memory[j]):
-                row = first + k
-                out[row] = rates[k, 0]
-                for i in range(m):
-                    tx, ty = s.Tx[j, i], s.Ty[j, i]
-                    A[row, i] = rates[k, 2] * (partial[2, 0] * tx + partial[2, 1] * ty)
-                    A[row, m + i] = rates[k, 1] * tx + rates[k, 2] * (partial[2, 2] * tx
-                                                                      + partial[2, 3] * ty)
-                    A[m + i, row] = -force[3 + k] * tx
-                for other in range(s.memory[j]):
-                    A[row, first + other] = rates[k, 3 + other]
+                out[first + k] = rates[k, 0]
+            _memory_jacobian(j, s, force, rates, partial, A)
             if differs:
                 if basis_moves:
                     shifts[0], shifts[1], shifts[2], shifts[3] = node_motion(j, y, r)
                 else:
                     shifts[:] = 0.0
-                shifts[0] += r.abscissa[j] - travel_p
+                shifts[0] += r.abscissa[j] - moved_p[0]
                 shifts[1] += r.gap[j]
-                shifts[2] -= speed_p
+                shifts[2] -= moved_p[1]
                 F_p, R_p, slip_p, pressing_p = node_rates(
-                    j, s.abscissa[j] + along - travel, along_rate - speed, height, height_rate, z,
-                    F, shifts, s, r, h, laws, force, partial, room, room_rates, memory)
+                    j, contact, z, F, shifts, s, laws, force, partial, (room, room_rates, memory))
                 for i in range(m):
                     P[c, m + i] += s.Ty[j, i] * F_p - s.Tx[j, i] * R_p
                 if basis_moves and F != 0.0:
@@ -176,20 +197,8 @@ def _fill_derivatives(t, x, s, r, h, laws, vectors, matrices, f, J, P):
                         P[c, m + i] += r.Ty[j, i] * F - r.Tx[j, i] * R
                 for k in range(s.memory[j]):
                     P[c, first + k] = rates[k, 1] * slip_p + rates[k, 2] * pressing_p + memory[k]
-            if F == 0.0:
-                continue
-            for k in range(m):
-                tx, ty = s.Tx[j, k], s.Ty[j, k]
-                for part in range(2):
-                    gradient[0, part * m + k] = (-partial[1, 2 * part] * tx
-                                                 - partial[1, 2 * part + 1] * ty)
-                    gradient[1, part * m + k] = (partial[0, 2 * part] * tx
-                                                 + partial[0, 2 * part + 1] * ty)
-            for i in range(m):
-                tx, ty = s.Tx[j, i], s.Ty[j, i]
-                out[m + i] += ty * F - tx * R
-                for k in range(2 * m):
-                    A[m + i, k] += tx * gradient[0, k] + ty * gradient[1, k]
+            if F != 0.0:
+                _add_contact(j, F, R, s, partial, gradient, out, A)
 
 
 @kernel(types.void(vector, matrix, SYSTEM, SYSTEM, f8, matrix, block, matrix))
@@ -202,7 +211,7 @@ def batch_derivatives(t, x, s, r, h, f, J, P):
     m = s.Tx.shape[1]
     states = s.memory.max()
     step = h if len(P) > 0 else 0.0
-    _fill_derivatives(t, x, s, r, step, laws_beside(s, r, step),
+    _fill_derivatives(t, x, s, r, laws_beside(s, r, step),
                       (np.empty(m), np.empty(m), np.empty(3 + states), np.empty(3 + states),
                        np.empty(states), np.empty(4)),
                       (np.empty((states, 3 + states)), np.empty((states, 3 + states)),

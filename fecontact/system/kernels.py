@@ -68,13 +68,48 @@ SYSTEM = types.NamedTuple(
      integers, integers, integers, integers, integers, i8, i8, i8], SystemArrays)
 
 # Columns of the per-node results of `contact_state`.
-NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE = range(6)
 STATE_COLUMNS = 6
+NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE = range(
+    STATE_COLUMNS)
+
+
+class GroundMotion(NamedTuple):
+    """How far the ground has travelled, and its speed."""
+
+    travel: float
+    speed: float
+
+
+class NodeMotion(NamedTuple):
+    """Displacements of a node along and away from the ground, and their rates."""
+
+    along: float
+    height: float
+    along_rate: float
+    height_rate: float
+
+
+class NodeContact(NamedTuple):
+    """A node against the ground: xi, u, u', slip velocity, and y_R' and y_R'' of the profile."""
+
+    place: float
+    penetration: float
+    rate: float
+    slip: float
+    slope: float
+    curvature: float
+
+
+@helper
+def ground_motion(t, s):
+    """Motion of the ground at time t."""
+    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    return GroundMotion(travel, speed)
 
 
 @helper
 def node_motion(j, y, s):
-    """Displacement along and away from the ground of node j, and their rates."""
+    """Motion of node j in the state y."""
     m = s.Tx.shape[1]
     x, height, x_rate, height_rate = 0.0, 0.0, 0.0, 0.0
     for i in range(m):
@@ -82,7 +117,17 @@ def node_motion(j, y, s):
         height += s.Ty[j, i] * y[i]
         x_rate += s.Tx[j, i] * y[m + i]
         height_rate += s.Ty[j, i] * y[m + i]
-    return x, height, x_rate, height_rate
+    return NodeMotion(x, height, x_rate, height_rate)
+
+
+@helper
+def node_contact(j, motion, moved, s):
+    """Where node j is above the ground, which has ``moved``."""
+    place = s.abscissa[j] + motion.along - moved.travel
+    ground, slope, curvature = ground_at(s.profile)(place, s.profile_parameters)
+    slip = motion.along_rate - moved.speed
+    return NodeContact(place, ground - motion.height - s.gap[j],
+                       slope * slip - motion.height_rate, slip, slope, curvature)
 
 
 @helper
@@ -94,42 +139,42 @@ def memory_of(j, y, s):
 
 
 @helper
-def node_forces(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates):
-    """F, R, u, v, slip velocity and rate y_R' of the ground at node j.
-
-    ``force`` (3 + s,) and ``rates`` (s, 3 + s) are filled by laws with memory; see the contract.
-    """
-    xi = s.abscissa[j] + x - travel
-    ground, slope, _ = ground_at(s.profile)(xi, s.profile_parameters)
-    slip = x_rate - speed
-    u = ground - height - s.gap[j]
-    v = slope * slip - height_rate
-    F = normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+def pressing_force(place, F, s):
+    """The force that friction sees under a normal force: |F| times the ground's variation."""
     pressing = abs(F)
     if s.friction_scale != 0 and F != 0.0:
-        pressing *= ground_at(s.friction_scale)(xi, s.friction_scale_parameters)[0]
-    R = 0.0
-    if s.memory[j] > 0:
-        memory_at(s.friction[j])(slip, pressing, z, s.friction_parameters[j], force, rates)
-        R = force[0]
-    elif F != 0.0:
-        R = friction_at(s.friction[j])(slip, pressing, s.friction_parameters[j])[0]
-    return F, R, u, v, slip, slope * slip
+        pressing *= ground_at(s.friction_scale)(place, s.friction_scale_parameters)[0]
+    return pressing
 
 
 @helper
-def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates, out):
-    """F and R of node j; fills out (3, 4) with derivatives to x, y, x', y' of F, R and pressing.
+def node_forces(j, motion, moved, z, s, force, rates):
+    """F and R of node j, and its :class:`NodeContact`.
 
-    The pressing force is the one the friction law sees; ``force`` and ``rates`` as above, but
-    ``force`` begins with R and its derivatives to slip velocity and pressing for all laws.
+    ``force`` (3 + s,) and ``rates`` (s, 3 + s) are filled by laws with memory; see the contract.
     """
-    xi = s.abscissa[j] + x - travel
-    ground, slope, curvature = ground_at(s.profile)(xi, s.profile_parameters)
-    slip = x_rate - speed
-    F, F_u, F_v = normal_at(s.normal[j])(ground - height - s.gap[j], slope * slip - height_rate,
+    contact = node_contact(j, motion, moved, s)
+    F = normal_at(s.normal[j])(contact.penetration, contact.rate, s.normal_parameters[j])[0]
+    pressing = pressing_force(contact.place, F, s)
+    R = 0.0
+    if s.memory[j] > 0:
+        memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
+        R = force[0]
+    elif F != 0.0:
+        R = friction_at(s.friction[j])(contact.slip, pressing, s.friction_parameters[j])[0]
+    return F, R, contact
+
+
+@helper
+def normal_gradients(j, contact, s, out):
+    """F of node j and the force that friction sees under it.
+
+    Fills out[0] and out[2] with their derivatives to x, y, x', y' of the node.
+    """
+    slope = contact.slope
+    F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
                                          s.normal_parameters[j])
-    out[0, 0] = F_u * slope + F_v * curvature * slip
+    out[0, 0] = F_u * slope + F_v * contact.curvature * contact.slip
     out[0, 1] = -F_u
     out[0, 2] = F_v * slope
     out[0, 3] = -F_v
@@ -138,22 +183,35 @@ def node_gradients(j, x, height, x_rate, height_rate, z, travel, speed, s, force
     for k in range(4):
         out[2, k] = sign * out[0, k]
     if s.friction_scale != 0 and F != 0.0:
-        scale, scale_x, _ = ground_at(s.friction_scale)(xi, s.friction_scale_parameters)
+        scale, scale_x, _ = ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)
         for k in range(4):
             out[2, k] *= scale
         out[2, 0] += scale_x * pressing
         pressing *= scale
+    return F, pressing
+
+
+@helper
+def node_gradients(j, motion, moved, z, s, force, rates, out):
+    """As :func:`node_forces`, with derivatives.
+
+    Fills out (3, 4) with those of F, R and the force that friction sees to x, y, x', y'.
+    ``force`` and ``rates`` as above, but ``force`` begins with R and its derivatives to slip
+    velocity and pressing force for all laws.
+    """
+    contact = node_contact(j, motion, moved, s)
+    F, pressing = normal_gradients(j, contact, s, out)
     R, R_v, R_F = 0.0, 0.0, 0.0
     if s.memory[j] > 0:
-        memory_at(s.friction[j])(slip, pressing, z, s.friction_parameters[j], force, rates)
+        memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
         R, R_v, R_F = force[0], force[1], force[2]
     elif F != 0.0:
-        R, R_v, R_F = friction_at(s.friction[j])(slip, pressing, s.friction_parameters[j])
+        R, R_v, R_F = friction_at(s.friction[j])(contact.slip, pressing, s.friction_parameters[j])
     force[0], force[1], force[2] = R, R_v, R_F
     for k in range(4):
         out[1, k] = R_F * out[2, k]
     out[1, 2] += R_v
-    return F, R
+    return F, R, contact
 
 
 @kernel(types.void(f8, vector, SYSTEM, matrix))
@@ -161,21 +219,22 @@ def contact_state(t, y, s, out):
     """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node."""
     y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    moved = ground_motion(t, s)
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
     for j in range(n):
-        x, height, x_rate, height_rate = node_motion(j, y, s)
-        out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = node_forces(
-            j, x, height, x_rate, height_rate, memory_of(j, y, s), travel, speed, s, force, rates)
+        F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
+                                    rates)
+        out[j, NORMAL_FORCE], out[j, FRICTION_FORCE] = F, R
+        out[j, PENETRATION], out[j, PENETRATION_RATE] = contact.penetration, contact.rate
+        out[j, SLIP_VELOCITY] = contact.slip
+        out[j, GROUND_RATE] = contact.slope * contact.slip
 
 
 @helper
-def given_at(t, s, load):
-    """Fill load (m,) with modal forces given in time; returns the ground's travel and speed."""
+def set_load(t, drive_x, drive_y, s, load):
+    """Fill load (m,) with the modal forces of the loads at time t and of the drive's motion."""
     m = len(load)
-    drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
-    drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]
     for i in range(m):
         load[i] = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
                    + drive_y * s.drive_shapes[1, i])
@@ -183,8 +242,26 @@ def given_at(t, s, load):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         for i in range(m):
             load[i] += value * s.load_shapes[k, i]
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    return travel, speed
+
+
+@helper
+def given_at(t, s, load):
+    """Fill load (m,) with modal forces given in time; returns the motion of the ground."""
+    drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
+    drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]
+    set_load(t, drive_x, drive_y, s, load)
+    return ground_motion(t, s)
+
+
+@helper
+def body_acceleration(load, y, s, out):
+    """Fill out (m,) with q'' without contact, under modal forces ``load``, which may be out."""
+    m = len(load)
+    for i in range(m):
+        total = load[i]
+        for k in range(m):
+            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
+        out[i] = total
 
 
 @helper
@@ -193,24 +270,19 @@ def body_rates(load, y, s, out):
     m = len(load)
     for i in range(m):
         out[i] = y[m + i]
-        total = load[i]
-        for k in range(m):
-            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
-        out[m + i] = total
+    body_acceleration(load, y, s, out[m : 2 * m])
     for i in range(2 * m, len(out)):
         out[i] = 0.0
 
 
 @helper
-def rates_under(load, travel, speed, y, s, force, rates, out):
+def rates_under(load, moved, y, s, force, rates, out):
     """Fill out (2 m + n s,) with y'; ``force`` (3 + s,) and ``rates`` (s, 3 + s) are room."""
     n, m = s.Tx.shape
     states = len(rates)
     body_rates(load, y, s, out)
     for j in range(n):
-        x, height, x_rate, height_rate = node_motion(j, y, s)
-        F, R, _, _, _, _ = node_forces(j, x, height, x_rate, height_rate, memory_of(j, y, s),
-                                       travel, speed, s, force, rates)
+        F, R, _ = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
         if F != 0.0:
             for i in range(m):
                 out[m + i] += s.Ty[j, i] * F - s.Tx[j, i] * R
@@ -224,9 +296,8 @@ def right_hand_side(t, y, s, out):
     y, s = borrowed(y), borrowed(s)
     states = s.memory.max()
     load = np.empty(s.Tx.shape[1])
-    travel, speed = given_at(t, s, load)
-    rates_under(load, travel, speed, y, s, np.empty(3 + states), np.empty((states, 3 + states)),
-                out)
+    moved = given_at(t, s, load)
+    rates_under(load, moved, y, s, np.empty(3 + states), np.empty((states, 3 + states)), out)
 
 
 @kernel(types.void(vector, matrix, SYSTEM, block))
@@ -247,29 +318,31 @@ def normal_values(addresses, u, v, p, force, slope):
 # lost in the modes, in the dashpots at B, in the contact's damping, by friction.
 POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "contact_damping",
           "friction")
+POWER_COUNT = len(POWERS)
+DRIVE, GROUND, BELT, LOAD, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING, FRICTION = range(POWER_COUNT)
 
 
 @helper
 def body_powers(t, y, s, out):
     """Fill out (8,) with the powers outside the contact, the others with zero."""
     m = s.Tx.shape[1]
-    out[:8] = 0.0
+    out[:POWER_COUNT] = 0.0
     for axis in range(2):
         value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
         pull = s.drive_stiffness[axis] * value
         for i in range(m):
             pull -= s.drive_shapes[axis, i] * y[i]
-        out[0] += pull * rate
+        out[DRIVE] += pull * rate
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         for i in range(m):
-            out[3] += value * s.load_shapes[k, i] * y[m + i]
+            out[LOAD] += value * s.load_shapes[k, i] * y[m + i]
     for i in range(m):
-        out[3] += s.constant_load[i] * y[m + i]
+        out[LOAD] += s.constant_load[i] * y[m + i]
         for k in range(m):
             product = y[m + i] * y[m + k]
-            out[4] += s.modal_damping[i, k] * product
-            out[5] += (s.damping[i, k] - s.modal_damping[i, k]) * product
+            out[MODAL_DAMPING] += s.modal_damping[i, k] * product
+            out[DASHPOTS] += (s.damping[i, k] - s.modal_damping[i, k]) * product
 
 
 @helper
@@ -290,15 +363,15 @@ def drive_jump(before, after, y, s):
 def powers(t, y, s, out, friction):
     """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
     n = len(s.Tx)
-    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
-    state = np.empty((n, 6))
+    speed = ground_motion(t, s).speed
+    state = np.empty((n, STATE_COLUMNS))
     contact_state(t, y, s, state)
     body_powers(t, y, s, out)
     for j in range(n):
-        force, tangential, v, slip = state[j, 0], state[j, 1], state[j, 3], state[j, 4]
-        elastic = normal_at(s.normal[j])(state[j, 2], 0.0, s.normal_parameters[j])[0]
-        out[1] += force * state[j, 5]
-        out[2] -= tangential * speed
-        out[6] += (force - elastic) * v
-        friction[j] = tangential * slip
-        out[7] += friction[j]
+        F, R = state[j, NORMAL_FORCE], state[j, FRICTION_FORCE]
+        elastic = normal_at(s.normal[j])(state[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
+        out[GROUND] += F * state[j, GROUND_RATE]
+        out[BELT] -= R * speed
+        out[CONTACT_DAMPING] += (F - elastic) * state[j, PENETRATION_RATE]
+        friction[j] = R * state[j, SLIP_VELOCITY]
+        out[FRICTION] += friction[j]

@@ -5,14 +5,33 @@ whose own parameters move is differenced, at the state and the forces as they ar
 given as arrays s, and the rates of all of them with the parameter as arrays r of the same form.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 
 # Differences of fourth order: places in steps, and weights in twelfths of a step.
 _PLACES = np.array([1.0, -1.0, 2.0, -2.0])
 _WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0])
+
+
+class LawsBeside(NamedTuple):
+    """Parameters of all laws at the places of the differences, and the step between these.
+
+    Arrays (4, k, p) for k laws of p parameters, (0, k, p) where no parameter moves.
+    """
+
+    normal: Array
+    friction: Array
+    profile: Array
+    friction_scale: Array
+    ground_motion: Array
+    drive: Array
+    load: Array
+    step: float
 
 
 @helper
@@ -40,19 +59,17 @@ def moves(rates):
 
 @helper
 def laws_beside(s, r, h):
-    """Parameters of all laws at the places of the differences, each (4, k, p) or (0, k, p).
-
-    Those of normal laws, friction, profile, friction along the ground, its motion, drive, loads.
-    """
-    return (_beside(s.normal_parameters, r.normal_parameters, h),
-            _beside(s.friction_parameters, r.friction_parameters, h),
-            _beside(s.profile_parameters.reshape(1, -1), r.profile_parameters.reshape(1, -1), h),
-            _beside(s.friction_scale_parameters.reshape(1, -1),
-                    r.friction_scale_parameters.reshape(1, -1), h),
-            _beside(s.ground_motion_parameters.reshape(1, -1),
-                    r.ground_motion_parameters.reshape(1, -1), h),
-            _beside(s.drive_parameters, r.drive_parameters, h),
-            _beside(s.load_parameters, r.load_parameters, h))
+    """Parameters of all laws beside those of the system, for differences of step h."""
+    return LawsBeside(
+        _beside(s.normal_parameters, r.normal_parameters, h),
+        _beside(s.friction_parameters, r.friction_parameters, h),
+        _beside(s.profile_parameters.reshape(1, -1), r.profile_parameters.reshape(1, -1), h),
+        _beside(s.friction_scale_parameters.reshape(1, -1),
+                r.friction_scale_parameters.reshape(1, -1), h),
+        _beside(s.ground_motion_parameters.reshape(1, -1),
+                r.ground_motion_parameters.reshape(1, -1), h),
+        _beside(s.drive_parameters, r.drive_parameters, h),
+        _beside(s.load_parameters, r.load_parameters, h), h)
 
 
 @helper
@@ -67,22 +84,22 @@ def _signal_rates(address, t, beside, row, h):
 
 
 @helper
-def given_rates(t, s, r, h, laws, load):
+def given_rates(t, s, r, laws, load):
     """Fill load (m,) with derivatives of the modal forces; returns those of travel and speed."""
-    m = len(load)
+    m, h = len(load), laws.step
     for i in range(m):
         load[i] = r.constant_load[i]
     for k in range(2):
         value = signal_at(s.drive[k])(t, s.drive_parameters[k])[0]
-        rate = _signal_rates(s.drive[k], t, laws[5], k, h)[0]
+        rate = _signal_rates(s.drive[k], t, laws.drive, k, h)[0]
         for i in range(m):
             load[i] += value * r.drive_shapes[k, i] + rate * s.drive_shapes[k, i]
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
-        rate = _signal_rates(s.load[k], t, laws[6], k, h)[0]
+        rate = _signal_rates(s.load[k], t, laws.load, k, h)[0]
         for i in range(m):
             load[i] += value * r.load_shapes[k, i] + rate * s.load_shapes[k, i]
-    return _signal_rates(s.ground_motion, t, laws[4], 0, h)
+    return _signal_rates(s.ground_motion, t, laws.ground_motion, 0, h)
 
 
 @helper
@@ -97,31 +114,32 @@ def _ground_rates(address, xi, beside, h):
 
 
 @helper
-def node_rates(j, xi, slip, height, height_rate, z, F, shifts, s, r, h, laws, force, partial,
-               room, room_rates, memory):
+def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
     """Derivatives of F, R, slip velocity and pressing force at node j.
 
     ``shifts`` holds those of xi, height, slip velocity and rate of the height by themselves;
-    ``force`` and ``partial`` are results of :func:`fecontact.system.kernels.node_gradients`.
-    Fills ``memory`` (s,) with what the friction law's own parameters add to the rates of its
-    internal variables; ``room`` (3 + s,) and ``room_rates`` (s, 3 + s) are overwritten.
+    ``contact``, ``force`` and ``partial`` are results of
+    :func:`fecontact.system.kernels.node_gradients`. Of ``room``, (3 + s,), (s, 3 + s) and (s,),
+    the last is filled with what the friction law's own parameters add to the rates of its
+    internal variables; the others are overwritten.
     """
-    ground, slope = _ground_rates(s.profile, xi, laws[2], h)
+    room_force, room_rates, memory = room
+    place, slip, h = contact.place, contact.slip, laws.step
+    ground, slope = _ground_rates(s.profile, place, laws.profile, h)
     F_p = -partial[0, 1] * ground - partial[0, 3] * slope * slip
     for k in range(4):
         F_p += partial[0, k] * shifts[k]
-    if len(laws[0]) > 0:
-        ground, slope, _ = ground_at(s.profile)(xi, s.profile_parameters)
-        u, v = ground - height - s.gap[j], slope * slip - height_rate
-        for k in range(4):
-            F_p += _WEIGHTS[k] / (12.0 * h) * normal_at(s.normal[j])(u, v, laws[0][k, j])[0]
+    for k in range(len(laws.normal)):
+        F_p += _WEIGHTS[k] / (12.0 * h) * normal_at(s.normal[j])(
+            contact.penetration, contact.rate, laws.normal[k, j])[0]
     size, pressing_p = abs(F), F_p if F >= 0.0 else -F_p
     pressing = size
     if s.friction_scale != 0:
-        scale, scale_x, _ = ground_at(s.friction_scale)(xi, s.friction_scale_parameters)
+        scale, scale_x, _ = ground_at(s.friction_scale)(place, s.friction_scale_parameters)
         pressing = scale * size
         pressing_p = scale * pressing_p + size * (
-            scale_x * shifts[0] + _ground_rates(s.friction_scale, xi, laws[3], h)[0])
+            scale_x * shifts[0]
+            + _ground_rates(s.friction_scale, place, laws.friction_scale, h)[0])
     R_F = force[2]
     if s.memory[j] == 0 and F == 0.0 and F_p != 0.0:
         # Friction is not asked for without a normal force, but is about to begin.
@@ -129,13 +147,14 @@ def node_rates(j, xi, slip, height, height_rate, z, F, shifts, s, r, h, laws, fo
     R_p = force[1] * shifts[2] + R_F * pressing_p
     for i in range(s.memory[j]):
         memory[i] = 0.0
-    for k in range(len(laws[1])):
+    for k in range(len(laws.friction)):
         weight = _WEIGHTS[k] / (12.0 * h)
         if s.memory[j] > 0:
-            memory_at(s.friction[j])(slip, pressing, z, laws[1][k, j], room, room_rates)
-            R_p += weight * room[0]
+            memory_at(s.friction[j])(slip, pressing, z, laws.friction[k, j], room_force,
+                                     room_rates)
+            R_p += weight * room_force[0]
             for i in range(s.memory[j]):
                 memory[i] += weight * room_rates[i, 0]
         elif F != 0.0:
-            R_p += weight * friction_at(s.friction[j])(slip, pressing, laws[1][k, j])[0]
+            R_p += weight * friction_at(s.friction[j])(slip, pressing, laws.friction[k, j])[0]
     return F_p, R_p, shifts[2], pressing_p

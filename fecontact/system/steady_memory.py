@@ -5,8 +5,14 @@ from numba import types
 
 from fecontact.core.compiled import f8, kernel, vector
 from fecontact.core.types import Array
-from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import SYSTEM, SystemArrays, memory_of, node_forces, node_motion
+from fecontact.system.kernels import (
+    SYSTEM,
+    SystemArrays,
+    ground_motion,
+    memory_of,
+    node_forces,
+    node_motion,
+)
 
 
 @kernel(types.void(f8, vector, SYSTEM))
@@ -15,16 +21,16 @@ def _settle(t, y, s):
     n = len(s.Tx)
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    moved = ground_motion(t, s)
     for j in range(n):
         count = s.memory[j]
         if count == 0:
             continue
-        x, height, x_rate, height_rate = node_motion(j, y, s)
+        motion = node_motion(j, y, s)
         z = memory_of(j, y, s)
         step = 1e-9
         while step < 1e12:
-            node_forces(j, x, height, x_rate, height_rate, z, travel, speed, s, force, rates)
+            node_forces(j, motion, moved, z, s, force, rates)
             matrix = np.empty((count, count))
             for k in range(count):
                 for other in range(count):

@@ -8,9 +8,9 @@ from unittest import mock
 
 import numba
 import pytest
+from fecontact.core.simd import WIDTH
 
 from fecontact.core import compiled, simd
-from fecontact.core.simd import WIDTH
 
 MODULE = '''
 from fecontact.core.compiled import compile_law, f8, kernel

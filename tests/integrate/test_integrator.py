@@ -77,7 +77,8 @@ def test_order_on_a_smooth_problem():
     for steps in (80, 160, 320):
         run = control.start(system, state, times, rtol=1e9, work=False)
         longest = times[-1] / steps
-        run = replace(run, control=run.control._replace(longest=longest, slip_part=1e9))
+        limited = run.problem.control._replace(longest=longest, slip_part=1e9)
+        run = replace(run, problem=run.problem._replace(control=limited))
         run.progress.numbers[run_arrays.STEP] = longest
         assert run.advance(10 * steps) == step_loop.FINISHED
         assert run.statistics["steps"] == steps

@@ -9,16 +9,11 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.linalg.condensation import FACTORS
-from fecontact.bifurcation.linalg.lu import (
-    back_lanes,
-    factorise,
-    forward,
-    forward_lanes,
-    reduce_row,
-    reduce_row_lanes,
-)
+from fecontact.bifurcation.linalg.lane_lu import back_lanes, forward_lanes, reduce_row_lanes
+from fecontact.bifurcation.linalg.simd import WIDTH, gather, read, spread, write
 from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
-from fecontact.core.simd import WIDTH, gather, read, spread, write
+from fecontact.core.dense_lu import backward, factorise, forward, reduce_row
+from fecontact.core.dense_lu import solve as solve_dense
 
 
 @helper
@@ -186,12 +181,7 @@ def expand(factors, reduced, start, end, common, out):
     for c in range(e):
         whole[3 * d + c] = common[c]
     for lane in range(segments - 1, 0, -1):
-        a, r = factors.top[lane - 1], of_top[lane - 1]
-        for k in range(d - 1, -1, -1):
-            total = r[k]
-            for c in range(k + 1, 3 * d + e):
-                total -= a[k, c] * whole[c]
-            whole[k] = total * a[k, k]
+        backward(factors.top[lane - 1], d, of_top[lane - 1], whole)
         for c in range(d):
             ends[0, c, lane] = ends[groups, c, lane - 1] = whole[2 * d + c] = whole[c]
     link, known = np.empty((3 * d + e, WIDTH)), np.empty((width, WIDTH))
@@ -245,12 +235,7 @@ def solve(factors, rhs, weights, small, closing, out):
         for c in range(d, columns):
             a[i, c] = small[i, d + c]
     factorise(a, rows, pivots)
-    forward(a, rows, pivots, side)
-    for k in range(rows - 1, -1, -1):
-        total = side[k]
-        for c in range(k + 1, rows):
-            total -= a[k, c] * side[c]
-        side[k] = total * a[k, k]
+    solve_dense(a, pivots, side)
     for c in range(d):
         end[c] = closing * side[c]
     for c in range(d, columns):

@@ -6,35 +6,8 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.linalg.condensation import FACTORS
-from fecontact.core.compiled import block, borrowed, helper, kernel
-
-
-@helper
-def _solve(a, b, size):
-    """Replace b by a^-1 b, with row interchanges; a is used up."""
-    for k in range(size):
-        row = k
-        for i in range(k + 1, size):
-            if abs(a[i, k]) > abs(a[row, k]):
-                row = i
-        if row != k:
-            for c in range(size):
-                a[k, c], a[row, c] = a[row, c], a[k, c]
-                b[k, c], b[row, c] = b[row, c], b[k, c]
-        inverse = 1.0 / a[k, k]
-        for i in range(k + 1, size):
-            factor = a[i, k] * inverse
-            for c in range(k + 1, size):
-                a[i, c] -= factor * a[k, c]
-            for c in range(size):
-                b[i, c] -= factor * b[k, c]
-    for k in range(size - 1, -1, -1):
-        inverse = 1.0 / a[k, k]
-        for c in range(size):
-            total = b[k, c]
-            for i in range(k + 1, size):
-                total -= a[k, i] * b[i, c]
-            b[k, c] = total * inverse
+from fecontact.core.compiled import block, borrowed, kernel
+from fecontact.core.dense_lu import factorise, solve_rows
 
 
 @kernel(types.void(FACTORS, block))
@@ -43,13 +16,14 @@ def transitions(factors, out):
     factors, out = borrowed(factors), borrowed(out)
     local = factors.local
     N, d, _ = out.shape
-    a = np.empty((d, d))
+    a, pivots = np.empty((d, d)), np.empty(d, dtype=np.int64)
     for j in range(N):
         for i in range(d):
             for c in range(d):
                 a[i, c] = local[j, i, d + c]
                 out[j, i, c] = -local[j, i, c]
-        _solve(a, out[j], d)
+        factorise(a, d, pivots)
+        solve_rows(a, pivots, out[j])
 
 
 @kernel(types.i8(block))
@@ -62,6 +36,7 @@ def condense_products(M):
     M = borrowed(M)
     N, d, _ = M.shape
     a, inverse, total = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+    pivots = np.empty(d, dtype=np.int64)
     count, bound = 0, 1.0
     for j in range(N):
         square = 0.0
@@ -70,7 +45,8 @@ def condense_products(M):
                 a[i, c] = M[j, i, c]
                 inverse[i, c] = 1.0 if i == c else 0.0
                 square += M[j, i, c] ** 2
-        _solve(a, inverse, d)
+        factorise(a, d, pivots)
+        solve_rows(a, pivots, inverse)
         reverse = 0.0
         for i in range(d):
             for c in range(d):

@@ -24,11 +24,13 @@ PARTS = 3 + len(DENSE)
 
 
 @helper
-def step(t, latest, h, Y, p, status, closed, w, slopes, new):
-    """Put the state after h into ``new``; slopes[0] is Y' at t, slopes[12] becomes that at t + h.
+def take(step, p, progress, w, room):
+    """Put the state at the end of a step into ``room.new``.
 
-    ``slopes`` is (SLOPES, size). What is given in time counts as it is at ``latest`` or before.
+    slopes[0] of ``room.slopes`` (SLOPES, size) is Y' at its begin, slopes[STAGES] becomes that at
+    its end.
     """
+    Y, slopes, new = progress.state, room.slopes, room.new
     size = len(Y)
     for stage in range(1, STAGES + 1):
         for i in range(size):
@@ -39,14 +41,16 @@ def step(t, latest, h, Y, p, status, closed, w, slopes, new):
             else:
                 for k in range(stage):
                     total += B[k] * slopes[k, i]
-            new[i] = Y[i] + h * total
+            new[i] = Y[i] + step.h * total
         node = C[stage] if stage < STAGES else 1.0
-        derivative(min(t + node * h, latest), new, p, status, closed, w, slopes[stage])
+        derivative(min(step.t + node * step.h, step.latest), new, p, progress.status,
+                   progress.closed, w, slopes[stage])
 
 
 @helper
-def error(h, Y, new, slopes, rtol, floor):
+def error(h, Y, limits, room):
     """Error of a step in units of what is allowed, ``rtol (floor + |Y|)``, the largest of all."""
+    new, slopes, rtol, floor = room.new, room.slopes, limits.rtol, limits.floor
     fifth, third = 0.0, 0.0
     for i in range(len(Y)):
         five, three = 0.0, 0.0
@@ -64,8 +68,10 @@ def error(h, Y, new, slopes, rtol, floor):
 
 
 @helper
-def prepare_dense(t, h, Y, new, p, status, closed, w, slopes, room, parts):
-    """Fill ``parts`` (PARTS, size) for `interpolate`; needs three more slopes."""
+def prepare_dense(step, p, progress, w, room):
+    """Fill ``room.parts`` (PARTS, size) for `interpolate`; needs three more slopes."""
+    t, h, Y = step.t, step.h, progress.state
+    new, slopes, parts, state = room.new, room.slopes, room.parts, room.state
     size = len(Y)
     for extra in range(len(A_DENSE)):
         stage = STAGES + 1 + extra
@@ -73,8 +79,9 @@ def prepare_dense(t, h, Y, new, p, status, closed, w, slopes, room, parts):
             total = 0.0
             for k in range(stage):
                 total += A_DENSE[extra, k] * slopes[k, i]
-            room[i] = Y[i] + h * total
-        derivative(t + C_DENSE[extra] * h, room, p, status, closed, w, slopes[stage])
+            state[i] = Y[i] + h * total
+        derivative(t + C_DENSE[extra] * h, state, p, progress.status, progress.closed, w,
+                   slopes[stage])
     for i in range(size):
         change = new[i] - Y[i]
         parts[0, i] = change

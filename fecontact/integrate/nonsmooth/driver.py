@@ -15,7 +15,7 @@ from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import POWERS
+from fecontact.system.kernels import POWER_COUNT
 
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
@@ -93,48 +93,48 @@ def integrate_set_valued(
     scheme = _chosen(problem, scheme)
     begin = clock.perf_counter()
     n, m = system.basis.contact_nodes, system.basis.modes
-    efforts = len(POWERS)
-    Y = np.concatenate([state, np.zeros(efforts + n)])
-    room: tuple[Any, ...] = (kinds.workspace_for(problem),)
+    course = kinds.progress_for(problem, state, float(times[0]), 0.01 * longest)
+    limits = kinds.Limits(
+        np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        _floor(system, state, times, longest), rtol, longest)
+    output = kinds.Output(times, np.empty((len(times), len(course.state))),
+                          np.empty((len(times), n)), np.empty((len(times), n)))
+    room: Any
     if scheme == "events":
         from fecontact.integrate.nonsmooth.event_driven import run_events as run
         from fecontact.integrate.nonsmooth.event_search import room_for
-        room = *room, room_for(problem, len(Y))
+        room = room_for(problem, len(course.state))
     else:
+        from fecontact.integrate.nonsmooth.time_stepping import room_for as stepping_room
         from fecontact.integrate.nonsmooth.time_stepping import run_steps as run
-    states = np.empty((len(times), len(Y)))
-    friction, normal = np.empty((len(times), n)), np.empty((len(times), n))
-    status = np.where(np.any(problem.rows != 0.0, axis=1), kinds.OPEN, kinds.FIXED)
-    closed, counts = np.zeros(n, dtype=np.int64), np.zeros(6, dtype=np.int64)
-    reached = np.array([times[0], 0.01 * longest])
-    carried = np.zeros(3 + n)
-    floor = _floor(system, state, times, longest)
-    stops = np.array(system.breakpoints(float(times[0]), float(times[-1])))
-    outcome, ended = 0, Status.FINISHED
+        room = stepping_room(problem)
+    workspace = kinds.workspace_for(problem)
+    counts, reached = course.counts, course.clock
+    outcome, ended = kinds.GOING_ON, Status.FINISHED
     try:
-        while outcome == 0:
-            outcome = run(reached, times, stops, problem, rtol, longest, floor, Y, status, closed,
-                          counts, carried, _STEPS_PER_CALL, states, friction, normal, *room)
+        while outcome == kinds.GOING_ON:
+            outcome = run(problem, limits, course, output, workspace, room, _STEPS_PER_CALL)
             if progress is not None:
-                progress(float(reached[0]))
+                progress(float(reached[kinds.TIME]))
     except KeyboardInterrupt:
-        if not counts[4]:  # nothing was computed that could be kept
+        if not counts[kinds.OUTPUTS]:  # nothing was computed that could be kept
             raise
         ended = Status.INTERRUPTED
     statistics: dict[str, Any] = {
-        "scheme": scheme, "steps": int(counts[0]), "rejected": int(counts[1]),
-        "events": int(counts[2]), "impacts": int(counts[3]),
+        "scheme": scheme, "steps": int(counts[kinds.STEPS]),
+        "rejected": int(counts[kinds.REJECTED]), "events": int(counts[kinds.EVENTS]),
+        "impacts": int(counts[kinds.IMPACTS]),
         "seconds": clock.perf_counter() - begin}
-    if outcome > 1:
+    if outcome in (kinds.STUCK, kinds.DIVERGED):
         ended = Status.MINIMUM_STEP if outcome == kinds.STUCK else Status.NOT_FINITE
-    done = int(counts[4])
-    time, states = times[:done], states[:done]
-    friction, normal = friction[:done], normal[:done]
-    if ended is not Status.FINISHED and done and reached[0] > time[-1] and np.isfinite(Y).all():
-        time, states = np.append(time, reached[0]), np.vstack([states, Y])
+    done, Y, last = int(counts[kinds.OUTPUTS]), course.state, float(reached[kinds.TIME])
+    time, states = times[:done], output.states[:done]
+    friction, normal = output.friction[:done], output.normal[:done]
+    if ended is not Status.FINISHED and done and last > time[-1] and np.isfinite(Y).all():
+        time, states = np.append(time, last), np.vstack([states, Y])
         friction = np.vstack([friction, friction[-1:]])
         normal = np.vstack([normal, normal[-1:]])
-    end = 2 * m + efforts
+    end = 2 * m + POWER_COUNT
     return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
                     statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
                     friction_force=friction)
@@ -232,7 +232,7 @@ def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
 
 
 def _floor(system: ContactSystem, state: Array, times: Array, longest: float) -> Array:
-    """Values (2 m + 8 + n,) below which the error is not measured relative to the state."""
+    """Values (2 m + p + n,) below which the error is not measured relative to the state."""
     m, n = system.basis.modes, system.basis.contact_nodes
     arrays, drive = system.arrays, system.drive
     largest = np.abs(system.basis.T[:, :2]).max(axis=(0, 1))
@@ -252,4 +252,4 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
                   (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
               + 0.5 * driven @ driven)
     return np.concatenate([depth / largest, np.maximum(speed / largest, _DRIVEN * driven),
-                           np.full(len(POWERS) + n, energy or 0.5 * speed**2)])
+                           np.full(POWER_COUNT + n, energy or 0.5 * speed**2)])

@@ -21,10 +21,10 @@ from fecontact.core.compiled import (
     integers,
     vector,
 )
+from fecontact.core.dense_lu import factorise, solve
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
     CURVED,
-    EFFORTS,
     FIXED,
     FORCE,
     GROUND_RATE,
@@ -39,8 +39,20 @@ from fecontact.integrate.nonsmooth.problem import (
     STICK,
     WORKSPACE,
 )
-from fecontact.laws.signatures import friction_at, ground_at, normal_at, signal_at
-from fecontact.system.kernels import body_powers, node_motion
+from fecontact.laws.signatures import friction_at, normal_at, signal_at
+from fecontact.system.kernels import (
+    BELT,
+    CONTACT_DAMPING,
+    FRICTION,
+    GROUND,
+    POWER_COUNT,
+    body_acceleration,
+    body_powers,
+    given_at,
+    node_contact,
+    node_motion,
+    pressing_force,
+)
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
 DERIVATIVE = types.void(f8, vector, PROBLEM, integers, integers, WORKSPACE, vector)
@@ -54,27 +66,11 @@ def derivative(t, Y, p, status, closed, w, out):
 
 
 @helper
-def solve(A, b, size):
-    """Solve A x = b of the given size in place, with row exchanges; x is in b."""
-    for k in range(size):
-        pivot = k
-        for i in range(k + 1, size):
-            if abs(A[i, k]) > abs(A[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for i in range(k, size):
-                A[k, i], A[pivot, i] = A[pivot, i], A[k, i]
-            b[k], b[pivot] = b[pivot], b[k]
-        for i in range(k + 1, size):
-            factor = A[i, k] / A[k, k]
-            if factor != 0.0:
-                for j in range(k + 1, size):
-                    A[i, j] -= factor * A[k, j]
-                b[i] -= factor * b[k]
-    for k in range(size - 1, -1, -1):
-        for j in range(k + 1, size):
-            b[k] -= A[k, j] * b[j]
-        b[k] /= A[k, k]
+def solve_small(w, size):
+    """Replace the first entries of w.right by the solution, with the first rows of w.matrix."""
+    matrix = w.matrix[:size, :size]
+    factorise(matrix, size, w.pivots)
+    solve(matrix, w.pivots[:size], w.right[:size])
 
 
 @helper
@@ -90,67 +86,55 @@ def speed_rate(t, p):
 
 @helper
 def free_acceleration(t, Y, s, out):
-    """Fill out (m,) with q'' without contact."""
-    m = s.Tx.shape[1]
-    drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
-    drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]
-    for i in range(m):
-        total = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
-                 + drive_y * s.drive_shapes[1, i])
-        for k in range(m):
-            total -= s.stiffness[i, k] * Y[k] + s.damping[i, k] * Y[m + k]
-        out[i] = total
-    for k in range(len(s.load)):
-        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
-        for i in range(m):
-            out[i] += value * s.load_shapes[k, i]
+    """Fill out (m,) with q'' without contact; returns the motion of the ground."""
+    moved = given_at(t, s, out)
+    body_acceleration(out, Y, s, out)
+    return moved
 
 
 @helper
-def contact_powers(t, s, nodes, friction, elastic, out):
-    """Add the powers at the nodes to out (8,) and put those of friction behind them (n,).
+def contact_powers(moved, s, nodes, friction, elastic, out):
+    """Add the powers at the nodes to out (p,) and put those of friction behind them (n,).
 
     ``elastic`` says whether the normal forces come from the normal laws.
     """
-    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
     for j in range(len(nodes)):
         force, R = nodes[j, FORCE], friction[j]
-        out[1] += force * nodes[j, GROUND_RATE]
-        out[2] -= R * speed
+        out[GROUND] += force * nodes[j, GROUND_RATE]
+        out[BELT] -= R * moved.speed
         if elastic and force != 0.0:
             stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
-            out[6] += (force - stored) * nodes[j, RATE]
-        out[EFFORTS + j] = R * nodes[j, SLIP]
-        out[7] += out[EFFORTS + j]
+            out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
+        out[POWER_COUNT + j] = R * nodes[j, SLIP]
+        out[FRICTION] += out[POWER_COUNT + j]
 
 
 @helper
-def observe(t, Y, p, nodes):
+def stick_limit(j, pressing, p):
+    """Largest friction force of node j in stick."""
+    s = p.system
+    if p.static[j] >= 0.0:
+        return p.static[j] * pressing
+    return friction_at(s.friction[j])(CREEP, pressing, s.friction_parameters[j])[0]
+
+
+@helper
+def observe(moved, Y, p, nodes):
     """Fill ``nodes`` from the positions and velocities in Y; rigid stops have no force yet."""
     s = p.system
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     for j in range(len(nodes)):
-        x, height, x_rate, height_rate = node_motion(j, Y, s)
-        xi = s.abscissa[j] + x - travel
-        ground, slope, curvature = ground_at(s.profile)(xi, s.profile_parameters)
-        slip = x_rate - speed
-        u, v = ground - height - s.gap[j], slope * slip - height_rate
+        contact = node_contact(j, node_motion(j, Y, s), moved, s)
         force = 0.0
         if p.restitution < 0.0:
-            force = normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
-        pressing = abs(force)
-        if s.friction_scale != 0 and force != 0.0:
-            pressing *= ground_at(s.friction_scale)(xi, s.friction_scale_parameters)[0]
-        limit = 0.0
-        if pressing > 0.0:
-            if p.static[j] >= 0.0:
-                limit = p.static[j] * pressing
-            else:
-                limit = friction_at(s.friction[j])(CREEP, pressing, s.friction_parameters[j])[0]
-        nodes[j, FORCE], nodes[j, PRESSING], nodes[j, LIMIT] = force, pressing, limit
-        nodes[j, PENETRATION], nodes[j, RATE], nodes[j, SLIP] = u, v, slip
-        nodes[j, GROUND_RATE], nodes[j, SLOPE] = slope * slip, slope
-        nodes[j, CURVED] = curvature * slip * slip
+            force = normal_at(s.normal[j])(contact.penetration, contact.rate,
+                                           s.normal_parameters[j])[0]
+        pressing = pressing_force(contact.place, force, s)
+        nodes[j, FORCE], nodes[j, PRESSING] = force, pressing
+        nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
+        nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
+        nodes[j, SLIP], nodes[j, SLOPE] = contact.slip, contact.slope
+        nodes[j, GROUND_RATE] = contact.slope * contact.slip
+        nodes[j, CURVED] = contact.curvature * contact.slip * contact.slip
 
 
 @helper
@@ -184,7 +168,7 @@ def hold_stops(t, p, closed, w, acceleration):
             for i in range(m):
                 total += (s.Ty[j, i] - slope * s.Tx[j, i]) * s.Ty[w.indices[b], i]
             w.matrix[a, b] = total
-    solve(w.matrix, w.right, count)
+    solve_small(w, count)
     for a in range(count):
         j = w.indices[a]
         w.nodes[j, FORCE] = w.right[a]
@@ -214,7 +198,7 @@ def hold_clusters(t, p, status, w, acceleration):
             for i in range(m):
                 total += p.rows[c, i] * p.rows[w.indices[b], i]
             w.matrix[a, b] = total
-    solve(w.matrix, w.right, count)
+    solve_small(w, count)
     for a in range(count):
         c = w.indices[a]
         w.total[c] = w.right[a]
@@ -222,9 +206,7 @@ def hold_clusters(t, p, status, w, acceleration):
             acceleration[i] -= p.rows[c, i] * w.right[a]
 
 
-def _derivative(
-    t, held_Y, held_p, held_status, held_closed, held_w, held_out,
-):
+def _derivative(t, held_Y, held_p, held_status, held_closed, held_w, held_out):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
     Y, p, w, out = borrowed(held_Y), borrowed(held_p), borrowed(held_w), borrowed(held_out)
     status, closed = borrowed(held_status), borrowed(held_closed)
@@ -233,8 +215,8 @@ def _derivative(
     for i in range(m):
         out[i] = Y[m + i]
     acceleration = out[m : 2 * m]
-    free_acceleration(t, Y, s, acceleration)
-    observe(t, Y, p, w.nodes)
+    moved = free_acceleration(t, Y, s, acceleration)
+    observe(moved, Y, p, w.nodes)
     w.total[:] = 0.0
     w.limit[:] = 0.0
     w.pressing[:] = 0.0
@@ -263,7 +245,7 @@ def _derivative(
             if status[c] == STICK and w.limit[c] > 0.0:
                 w.friction[j] = w.total[c] * w.nodes[j, LIMIT] / w.limit[c]
     body_powers(t, Y, s, out[2 * m :])
-    contact_powers(t, s, w.nodes, w.friction, p.restitution < 0.0, out[2 * m :])
+    contact_powers(moved, s, w.nodes, w.friction, p.restitution < 0.0, out[2 * m :])
 
 
 compiled_derivative = compile_law(DERIVATIVE, "derivative(t, Y, p, status, closed, w, out)",

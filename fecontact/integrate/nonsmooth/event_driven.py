@@ -10,149 +10,266 @@ import math
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, f8, i8, integers, kernel, matrix, vector
-from fecontact.integrate.nonsmooth.dop853 import (
-    STAGES,
-    error,
-    interpolate,
-    prepare_dense,
-    step,
-)
+from fecontact.core.compiled import borrowed, helper, i8, kernel
+from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative
 from fecontact.integrate.nonsmooth.event_search import ROOM, first_changes
 from fecontact.integrate.nonsmooth.problem import (
+    DEPTH_SIZE,
     DIVERGED,
     EVENTS,
     FINISHED,
     FORCE,
     GOING_ON,
     IMPACTS,
+    LENGTH,
+    LIMITS,
+    OUTPUT,
     OUTPUTS,
     PENETRATION,
     PROBLEM,
+    PROGRESS,
     RATE,
+    RATE_SIZE,
     REJECTED,
+    SLIP_SIZE,
     STARTED,
     STEPS,
     STICK,
     STUCK,
+    TIME,
     WORKSPACE,
+    Step,
 )
 from fecontact.integrate.nonsmooth.transitions import (
     decide_clusters,
     hold_velocity,
     resolve_impacts,
 )
-from fecontact.system.kernels import drive_jump
+from fecontact.system.kernels import DRIVE, drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
 EARLY = 0.25
+# Events in a row without any time between them after which a run is stuck.
+_MOST_IDLE = 200
 
 
-@kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
-                 integers, vector, i8, matrix, matrix, matrix, WORKSPACE, ROOM))
-def run_events(
-    clock, held_times, stops, held_p, rtol, longest, held_floor, held_Y, held_status, held_closed,
-    counts, largest, limit, held_states, held_friction, held_normal, held_w, held_room,
-):
-    """Go on for at most ``limit`` steps, up to the last of ``times``.
+@helper
+def _start(t, p, limits, progress, w, room):
+    """Decide at the start of a run which clusters stick and which stops are closed."""
+    largest, clusters = progress.largest, len(p.rows)
+    derivative(t, progress.state, p, progress.status, progress.closed, w, room.rate)
+    if p.restitution >= 0.0:
+        height = 0.0
+        for j in range(len(p.cluster)):
+            room.touched[j] = w.nodes[j, PENETRATION] >= 0.0
+            room.parting[j] = False
+            height = max(height, abs(w.nodes[j, PENETRATION]))
+            largest[RATE_SIZE] = max(largest[RATE_SIZE], abs(w.nodes[j, RATE]))
+        resolve_impacts(t, p, progress, room, 1e-9 * largest[RATE_SIZE], height,
+                        1e-9 * limits.longest, w, room.rate)
+    else:
+        for c in range(clusters):
+            room.released[c] = room.arrived[c] = False
+            largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
+        decide_clusters(t, p, progress, room, 1e-12 * largest[SLIP_SIZE], w, room.rate)
 
-    ``clock`` is the time reached and the length of the next step; ``stops`` ascending times at
-    which a step ends; ``largest`` the largest slip velocity, penetration rate and penetration so
-    far. ``states`` (N, size), ``friction`` and ``normal`` (N, n) are filled as ``counts`` says.
-    """
-    times, p, floor, Y = borrowed(held_times), borrowed(held_p), borrowed(held_floor), borrowed(
-        held_Y)
-    status, closed, w = borrowed(held_status), borrowed(held_closed), borrowed(held_w)
-    states, friction, normal = (borrowed(held_states), borrowed(held_friction),
-                                borrowed(held_normal))
-    room = borrowed(held_room)
-    slopes, parts, new, rate, place = room.slopes, room.parts, room.new, room.rate, room.place
-    n = len(p.cluster)
-    clusters, m, size = len(p.rows), p.rows.shape[1], len(Y)
-    rigid = p.restitution >= 0.0
-    past = np.zeros(clusters + n, np.bool_)
-    fresh = np.zeros(clusters + n, np.bool_)
-    released, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
-    arrived = np.zeros(clusters, np.bool_)
-    touched, parting = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
-    t, h, end = clock[0], clock[1], times[-1]
-    tiny = 1e-14 * max(abs(times[0]), abs(end), longest)
-    stop = 0
-    while stop < len(stops) and stops[stop] <= t:
-        stop += 1
-    idle = 0
 
-    if counts[STARTED] == 0:
-        counts[STARTED] = 1
-        derivative(t, Y, p, status, closed, w, rate)
-        if rigid:
-            height = 0.0
-            for j in range(n):
-                touched[j] = w.nodes[j, PENETRATION] >= 0.0
-                height = max(height, abs(w.nodes[j, PENETRATION]))
-                largest[1] = max(largest[1], abs(w.nodes[j, RATE]))
-            resolve_impacts(t, Y, p, touched, parting, 1e-9 * largest[1], height,
-                            1e-9 * longest, status, closed, fresh[clusters:], w, rate)
-        else:
-            for c in range(clusters):
-                largest[0] = max(largest[0], abs(w.slip[c]))
-            decide_clusters(t, Y, p, released, arrived, 1e-12 * largest[0], status,
-                            fresh[:clusters], closed, w, rate)
-    while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= t:
-        derivative(t, Y, p, status, closed, w, rate)
+@helper
+def _write_at(t, progress, output, w):
+    """Write the outputs up to the moment t, at which w tells what acts."""
+    counts = progress.counts
+    while counts[OUTPUTS] < len(output.times) and output.times[counts[OUTPUTS]] <= t:
         row = counts[OUTPUTS]
-        states[row], friction[row] = Y, w.friction
-        normal[row] = w.nodes[:, FORCE]
+        output.states[row], output.friction[row] = progress.state, w.friction
+        output.normal[row] = w.nodes[:, FORCE]
         counts[OUTPUTS] += 1
 
-    derivative(t, Y, p, status, closed, w, slopes[0])
-    for _ in range(limit):
+
+@helper
+def _write_within(step, reached, with_end, p, progress, output, w, room):
+    """Write the outputs of a step up to the time ``reached``, at that too if ``with_end``."""
+    counts, times = progress.counts, output.times
+    while counts[OUTPUTS] < len(times) and (
+            times[counts[OUTPUTS]] < reached
+            or (with_end and times[counts[OUTPUTS]] == reached)):
+        row = counts[OUTPUTS]
+        interpolate((times[row] - step.t) / step.h, progress.state, room.parts,
+                    output.states[row])
+        derivative(times[row], output.states[row], p, progress.status, progress.closed, w,
+                   room.rate)
+        output.friction[row], output.normal[row] = w.friction, w.nodes[:, FORCE]
+        counts[OUTPUTS] += 1
+
+
+@helper
+def _sizes(progress, w):
+    """Largest slip velocity, penetration rate and penetration so far, those of w included."""
+    largest = progress.largest
+    quick, fast, deep = largest[SLIP_SIZE], largest[RATE_SIZE], largest[DEPTH_SIZE]
+    for c in range(len(w.slip)):
+        quick = max(quick, abs(w.slip[c]))
+    for j in range(len(w.nodes)):
+        fast, deep = max(fast, abs(w.nodes[j, RATE])), max(deep, abs(w.nodes[j, PENETRATION]))
+    return quick, fast, deep
+
+
+@helper
+def _shortened(length, size_of_error):
+    """Length of the next attempt at a step with too large an error."""
+    if math.isfinite(size_of_error):
+        return length * max(0.2, 0.9 * size_of_error**-0.125)
+    return length * 0.1
+
+
+@helper
+def _lengthened(length, size_of_error):
+    """Length of the step after an accepted one."""
+    h = length * min(5.0, max(0.5, 0.9 * max(size_of_error, 1e-12) ** -0.125))
+    return length if length < h < 1.1 * length else h
+
+
+@helper
+def _first_place(place):
+    """Where the first change is, 1 for none, and whether there is one."""
+    high, found = 1.0, False
+    for k in range(len(place)):
+        found = found or place[k] <= 1.0
+        high = min(high, place[k])
+    return high, found
+
+
+@helper
+def _mark_past(high, found, room):
+    """Mark what changes up to a part of the step; whether anything has just begun to move."""
+    again = False
+    for k in range(len(room.past)):
+        room.past[k] = found and room.place[k] <= high
+        again = again or (room.past[k] and room.fresh[k] and high < EARLY)
+    return again
+
+
+@helper
+def _accept(step, t, passing, p, progress, output, w, room):
+    """Go on to the end t of a step without events; ``passing`` a break of what is given."""
+    Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
+    m = p.rows.shape[1]
+    for i in range(len(Y)):
+        Y[i] = room.new[i]
+        room.slopes[0, i] = room.slopes[STAGES, i]
+    if passing:
+        work = drive_jump(step.latest, t, Y, p.system)
+        Y[2 * m + DRIVE] += work
+        last = counts[OUTPUTS] - 1
+        if last >= 0 and output.times[last] == t:
+            output.states[last, 2 * m + DRIVE] += work
+    room.fresh[:] = False
+    any_held = False
+    for c in range(len(p.rows)):
+        room.held[c] = status[c] == STICK
+        any_held = any_held or room.held[c]
+    if any_held:
+        derivative(t, Y, p, status, closed, w, room.rate)
+        hold_velocity(p, room.held, w, Y)
+    if passing:
+        derivative(t, Y, p, status, closed, w, room.slopes[0])
+
+
+@helper
+def _holds_on(p, progress, w, room):
+    """Whether all that was to let go holds: the repeated step may end just before it does."""
+    clusters, holds = len(p.rows), True
+    for k in range(len(room.past)):
+        if room.past[k]:
+            holds = holds and (
+                progress.closed[k - clusters] == 1 and w.nodes[k - clusters, FORCE] > 0.0
+                if k >= clusters else progress.status[k] == STICK and w.pressing[k] > 0.0
+                and abs(w.total[k]) < (1.0 - 1e-12) * w.limit[k])
+    return holds
+
+
+@helper
+def _change_stops(t, p, limits, progress, w, room):
+    """Impacts and partings of the marked stops; returns the longest flight of a rebound [s]."""
+    clusters, closed, largest = len(p.rows), progress.closed, progress.largest
+    for j in range(len(p.cluster)):
+        event = room.past[clusters + j]
+        room.touched[j] = event and closed[j] == 0
+        room.parting[j] = event and closed[j] == 1
+        if room.touched[j]:
+            progress.counts[IMPACTS] += 1
+    return resolve_impacts(t, p, progress, room, 0.01 * limits.rtol * largest[RATE_SIZE],
+                           largest[DEPTH_SIZE], 1e-9 * limits.longest, w, room.slopes[0])
+
+
+@helper
+def _change_clusters(t, again, p, progress, w, room):
+    """Release the marked clusters that stick, and bring those that slip to rest.
+
+    None is released if the moment is the begin of the step, looked at ``again``.
+    """
+    status = progress.status
+    for c in range(len(p.rows)):
+        past = room.past[c]
+        room.released[c] = past and status[c] == STICK and w.pressing[c] > 0.0 and not again
+        room.arrived[c] = past and (status[c] == 1 or status[c] == -1)
+        if room.released[c]:
+            status[c] = 1 if w.total[c] > 0.0 else -1
+    decide_clusters(t, p, progress, room, 1e-9 * progress.largest[SLIP_SIZE], w, room.slopes[0])
+
+
+@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, i8))
+def run_events(held_p, held_limits, held_progress, held_output, held_w, held_room, most):
+    """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
+
+    The rows of ``output`` are filled as ``progress.counts`` says.
+    """
+    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
+    output, w, room = borrowed(held_output), borrowed(held_w), borrowed(held_room)
+    Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
+    clock, largest, longest = progress.clock, progress.largest, limits.longest
+    t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
+    tiny = 1e-14 * max(abs(output.times[0]), abs(end), longest)
+    stop, idle = 0, 0
+    while stop < len(limits.stops) and limits.stops[stop] <= t:
+        stop += 1
+    room.fresh[:] = False
+    if counts[STARTED] == 0:
+        counts[STARTED] = 1
+        _start(t, p, limits, progress, w, room)
+    derivative(t, Y, p, status, closed, w, room.slopes[0])
+    _write_at(t, progress, output, w)
+    for _ in range(most):
         if t >= end:
             break
-        goal = end
-        if stop < len(stops):
-            goal = min(goal, stops[stop])
+        goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
         left = goal - t
-        reaching = h >= left * (1.0 - 1e-10)
-        length = left if reaching else min(h, longest)
-        length = min(length, longest)
-        reaching = reaching and length == left
+        length = min(left if h >= left * (1.0 - 1e-10) else h, longest)
+        reaching = length == left
         # At the end of a step that ends at a break, signals are as before the break.
-        latest = np.nextafter(goal, t)
-        step(t, latest, length, Y, p, status, closed, w, slopes, new)
-        size_of_error = error(length, Y, new, slopes, rtol, floor)
+        step = Step(t, length, np.nextafter(goal, t))
+        take(step, p, progress, w, room)
+        size_of_error = error(length, Y, limits, room)
         counts[STEPS] += 1
         if not size_of_error <= 1.0:
             counts[REJECTED] += 1
+            h = _shortened(length, size_of_error)
             if not math.isfinite(size_of_error) and length < 1e-6 * longest:
-                clock[0], clock[1] = t, length
+                clock[TIME], clock[LENGTH] = t, length
                 return DIVERGED
-            h = length * (max(0.2, 0.9 * size_of_error**-0.125)
-                          if math.isfinite(size_of_error) else 0.1)
             if h < tiny:
-                clock[0], clock[1] = t, h
+                clock[TIME], clock[LENGTH] = t, h
                 return STUCK
             continue
-        quick, fast, deep = largest[0], largest[1], largest[2]
-        for c in range(clusters):
-            quick = max(quick, abs(w.slip[c]))
-        for j in range(n):
-            fast, deep = max(fast, abs(w.nodes[j, RATE])), max(deep, abs(w.nodes[j, PENETRATION]))
-        prepare_dense(t, length, Y, new, p, status, closed, w, slopes, room.state, parts)
-
-        shorter = first_changes(t, latest, length, Y, p, status, closed, w, floor, rtol, room)
-        high, found, again = 1.0, False, False
-        for k in range(clusters + n):
-            found = found or place[k] <= 1.0
-            high = min(high, place[k])
+        quick, fast, deep = _sizes(progress, w)
+        prepare_dense(step, p, progress, w, room)
+        shorter = first_changes(step, p, limits, progress, w, room)
+        high, found = _first_place(room.place)
         if shorter < high and shorter * length > tiny:
             h = shorter * length
             counts[REJECTED] += 1
             continue
-        for k in range(clusters + n):
-            past[k] = found and place[k] <= high
-            again = again or (past[k] and fresh[k] and high < EARLY)
+        again = _mark_past(high, found, room)
         if again and length > tiny:
             # What has just begun to move cannot be told from its start: look at a shorter step.
             h = 0.2 * length
@@ -160,97 +277,40 @@ def run_events(
             continue
         if again:
             high = 0.0
-
-        reached = t + high * length
-        if not found and reaching:
-            reached = goal
-        while counts[OUTPUTS] < len(times) and (
-                times[counts[OUTPUTS]] < reached
-                or (not found and times[counts[OUTPUTS]] == reached)):
-            row = counts[OUTPUTS]
-            interpolate((times[row] - t) / length, Y, parts, states[row])
-            derivative(times[row], states[row], p, status, closed, w, rate)
-            friction[row], normal[row] = w.friction, w.nodes[:, FORCE]
-            counts[OUTPUTS] += 1
-
+        reached = goal if reaching and not found else t + high * length
+        _write_within(step, reached, not found, p, progress, output, w, room)
         if not found:
-            t = reached
-            for i in range(size):
-                Y[i] = new[i]
-                slopes[0, i] = slopes[STAGES, i]
-            passing = reaching and stop < len(stops) and goal == stops[stop]
+            t, idle = reached, 0
+            passing = reaching and stop < len(limits.stops) and goal == limits.stops[stop]
             if passing:
                 stop += 1
-                work = drive_jump(latest, t, Y, p.system)
-                Y[2 * m] += work
-                if counts[OUTPUTS] > 0 and times[counts[OUTPUTS] - 1] == t:
-                    states[counts[OUTPUTS] - 1, 2 * m] += work
-            fresh[:] = False
-            idle = 0
-            h = length * min(5.0, max(0.5, 0.9 * max(size_of_error, 1e-12) ** -0.125))
-            if length < h < 1.1 * length:
-                h = length
-            any_held = False
-            for c in range(clusters):
-                held[c] = status[c] == STICK
-                any_held = any_held or held[c]
-            largest[0], largest[1], largest[2] = quick, fast, deep
-            if any_held:
-                derivative(t, Y, p, status, closed, w, rate)
-                hold_velocity(p, held, w, Y)
-            if passing:
-                derivative(t, Y, p, status, closed, w, slopes[0])
+            largest[SLIP_SIZE], largest[RATE_SIZE], largest[DEPTH_SIZE] = quick, fast, deep
+            _accept(step, t, passing, p, progress, output, w, room)
+            h = _lengthened(length, size_of_error)
             continue
 
         idle = idle + 1 if high * length <= tiny else 0
-        if idle > 200:
-            clock[0], clock[1] = t, length
+        if idle > _MOST_IDLE:
+            clock[TIME], clock[LENGTH] = t, length
             return STUCK
         if high > 0.0:
-            step(t, latest, high * length, Y, p, status, closed, w, slopes, new)
-            for i in range(size):
-                Y[i] = new[i]
+            take(Step(t, high * length, step.latest), p, progress, w, room)
+            for i in range(len(Y)):
+                Y[i] = room.new[i]
             t = reached
-        derivative(t, Y, p, status, closed, w, rate)
+        derivative(t, Y, p, status, closed, w, room.rate)
         h = min(max(0.1 * length, 1e3 * tiny), longest)
-        # The repeated step may end, by its error, before what holds lets go: it holds on.
-        held_on = not again
-        for k in range(clusters + n):
-            if past[k]:
-                held_on = held_on and (
-                    closed[k - clusters] == 1 and w.nodes[k - clusters, FORCE] > 0.0
-                    if k >= clusters else status[k] == STICK and w.pressing[k] > 0.0
-                    and abs(w.total[k]) < (1.0 - 1e-12) * w.limit[k])
-        if not held_on:
-            counts[EVENTS] += 1
-        if held_on:
-            for i in range(size):
-                slopes[0, i] = rate[i]
-        elif rigid:
-            height = largest[2]
-            for j in range(n):
-                event = past[clusters + j]
-                touched[j], parting[j] = event and closed[j] == 0, event and closed[j] == 1
-                if touched[j]:
-                    counts[IMPACTS] += 1
-            flight = resolve_impacts(t, Y, p, touched, parting, 0.01 * rtol * largest[1], height,
-                                     1e-9 * longest, status, closed, fresh[clusters:], w, slopes[0])
-            h = min(h, max(0.5 * flight, tiny))
+        if not again and _holds_on(p, progress, w, room):
+            for i in range(len(Y)):
+                room.slopes[0, i] = room.rate[i]
         else:
-            for c in range(clusters):
-                released[c] = past[c] and status[c] == STICK and w.pressing[c] > 0.0 and not again
-                arrived[c] = past[c] and (status[c] == 1 or status[c] == -1)
-                if released[c]:
-                    status[c] = 1 if w.total[c] > 0.0 else -1
-            decide_clusters(t, Y, p, released, arrived, 1e-9 * largest[0], status,
-                            fresh[:clusters], closed, w, slopes[0])
+            counts[EVENTS] += 1
+            if p.restitution >= 0.0:
+                flight = _change_stops(t, p, limits, progress, w, room)
+                h = min(h, max(0.5 * flight, tiny))
+            else:
+                _change_clusters(t, again, p, progress, w, room)
         # Wherever the motion goes on from, an output at this moment shows what comes after.
-        while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= t:
-            row = counts[OUTPUTS]
-            states[row], friction[row] = Y, w.friction
-            normal[row] = w.nodes[:, FORCE]
-            counts[OUTPUTS] += 1
-    clock[0], clock[1] = t, h
+        _write_at(t, progress, output, w)
+    clock[TIME], clock[LENGTH] = t, h
     return FINISHED if t >= end else GOING_ON
-
-

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
-from fecontact.core.compiled import borrowed, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.compiled import borrowed, helper, kernel, matrix, vector
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import (
     DEPTH,
@@ -33,13 +34,17 @@ from fecontact.integrate.nonsmooth.dop853 import PARTS, SLOPES, interpolate
 from fecontact.integrate.nonsmooth.equations import derivative
 from fecontact.integrate.nonsmooth.problem import (
     FORCE,
+    LIMITS,
     OPEN,
     PROBLEM,
+    PROGRESS,
+    STEP,
     STICK,
     WORKSPACE,
     NonsmoothProblem,
 )
-from fecontact.laws.signatures import ground_at, normal_at, signal_at
+from fecontact.laws.signatures import ground_at, normal_at
+from fecontact.system.kernels import ground_motion
 
 # Rounding of a sum, and of forces that come from a system of equations, relative to their parts.
 _ROUNDING, _FORCE_ROUNDING = 2e-15, 1e-13
@@ -78,6 +83,13 @@ class Room(NamedTuple):
         What forces have left at some places, and their sizes.
     waiting : (DEPTH, 2) array
         Begins and widths of parts whose forces are left to look at.
+    past, fresh : (k + n,) boolean arrays
+        Clusters and stops that change at the moment looked at, and those that have just begun to
+        move.
+    released, arrived, held : (k,) boolean arrays
+        Clusters that reach the limit of stick, that come to rest, and that stick.
+    touched, parting : (n,) boolean arrays
+        Stops that are struck, and that open.
     """
 
     slopes: Array
@@ -94,9 +106,18 @@ class Room(NamedTuple):
     left: Array
     scale: Array
     waiting: Array
+    past: NDArray[np.bool_]
+    fresh: NDArray[np.bool_]
+    released: NDArray[np.bool_]
+    arrived: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+    touched: NDArray[np.bool_]
+    parting: NDArray[np.bool_]
 
 
-ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix], Room)
+_flags = types.Array(types.boolean, 1, "C")
+ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix]
+                        + [_flags] * 7, Room)
 
 
 def room_for(problem: NonsmoothProblem, size: int) -> Room:
@@ -106,20 +127,20 @@ def room_for(problem: NonsmoothProblem, size: int) -> Room:
     nested, bound, along, values = np.zeros((4, PARTS + 1))
     return Room(np.zeros((SLOPES, size)), np.zeros((PARTS, size)), new, state, rate,
                 np.zeros(k + n), nested, bound, along, values, np.zeros((DEPTH, PARTS + 2)),
-                np.zeros((_QUARTERS + 1, 2 * k + n)), np.zeros(2 * k + n), np.zeros((DEPTH, 2)))
+                np.zeros((_QUARTERS + 1, 2 * k + n)), np.zeros(2 * k + n), np.zeros((DEPTH, 2)),
+                *(np.zeros(count, dtype=bool) for count in (k + n, k + n, k, k, k, n, n)))
 
 
 @helper
-def _along(rows, j, first, Y, parts, c, b):
-    """Coefficients b of ``rows[j] Y[first:]`` over the step; returns the size of its terms."""
-    size = 0.0
+def _along(row, first, Y, room, b):
+    """Coefficients b of ``row Y[first:]`` over the step; returns the size of its terms."""
+    c, parts, size = room.nested, room.parts, 0.0
     c[:] = 0.0
-    for i in range(rows.shape[1]):
-        row = rows[j, i]
-        c[0] += row * Y[first + i]
-        size += abs(row) * (abs(Y[first + i]) + abs(parts[0, first + i]))
+    for i in range(len(row)):
+        c[0] += row[i] * Y[first + i]
+        size += abs(row[i]) * (abs(Y[first + i]) + abs(parts[0, first + i]))
         for k in range(PARTS):
-            c[1 + k] += row * parts[k, first + i]
+            c[1 + k] += row[i] * parts[k, first + i]
     from_nested(c, b)
     return size
 
@@ -133,18 +154,17 @@ def _through(values, b):
 
 
 @helper
-def _slip(k, sign, t, h, Y, parts, p, c, b, values):
-    """Coefficients b of ``sign`` times the slip velocity of cluster k, raised by its rounding."""
-    s = p.system
-    size = _along(p.rows, k, s.Tx.shape[1], Y, parts, c, b)
-    speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1]
+def _set_slip(k, sign, step, p, Y, room):
+    """Put ``sign`` times the slip velocity of cluster k, raised by its rounding, into the bound."""
+    s, b, values = p.system, room.bound, room.values
+    size = _along(p.rows[k], s.Tx.shape[1], Y, room, b)
+    speed = ground_motion(step.t, s).speed
     if p.steady != 0:
         for i in range(len(b)):
             b[i] -= speed
     else:
         for i in range(len(b)):
-            values[i] = -signal_at(s.ground_motion)(t + _PLACES[i] * h,
-                                                    s.ground_motion_parameters)[1]
+            values[i] = -ground_motion(step.t + _PLACES[i] * step.h, s).speed
             speed = max(abs(speed), abs(values[i]))
         _through(values, b)
     for i in range(len(b)):
@@ -152,18 +172,18 @@ def _slip(k, sign, t, h, Y, parts, p, c, b, values):
 
 
 @helper
-def _add_ground(j, t, h, Y, parts, p, c, b, x, values):
-    """Add the ground under node j to b; returns the part of the step that resolves its waves."""
-    s = p.system
+def _add_ground(j, step, p, Y, room):
+    """Add the ground under node j to the bound; returns the part that resolves its waves."""
+    s, b, x, values = p.system, room.bound, room.along, room.values
     if p.relief[2] == np.inf:
         for i in range(len(b)):
             b[i] += p.relief[0]
         return 1.0
-    _along(s.Tx, j, 0, Y, parts, c, x)
+    _along(s.Tx[j], 0, Y, room, x)
     low, high = np.inf, -np.inf
     for i in range(len(x)):
-        travel = signal_at(s.ground_motion)(t + _PLACES[i] * h, s.ground_motion_parameters)[0]
-        xi = s.abscissa[j] + value(x, _PLACES[i], c) - travel
+        travel = ground_motion(step.t + _PLACES[i] * step.h, s).travel
+        xi = s.abscissa[j] + value(x, _PLACES[i], room.nested) - travel
         low, high = min(low, xi), max(high, xi)
         values[i] = ground_at(s.profile)(xi, s.profile_parameters)[0]
     _through(values, b)
@@ -207,10 +227,12 @@ def first_pressed(b, above, finest, j, s, room):
 
 
 @helper
-def _forces(t, latest, h, part, Y, parts, p, status, closed, w, state, rate, out):
+def _forces(part, step, p, progress, w, room, out):
     """Fill out (2 k + n,) with what sticking clusters and closed stops have left, both ways."""
-    interpolate(part, Y, parts, state)
-    derivative(min(t + part * h, latest), state, p, status, closed, w, rate)
+    status, closed = progress.status, progress.closed
+    interpolate(part, progress.state, room.parts, room.state)
+    derivative(min(step.t + part * step.h, step.latest), room.state, p, status, closed, w,
+               room.rate)
     clusters = len(p.rows)
     out[:] = 1.0
     for k in range(clusters):
@@ -234,10 +256,43 @@ def _past(out, size):
 
 
 @helper
-def _first_let_go(t, latest, h, end, Y, p, status, closed, w, room):
+def _narrow(low, high, step, p, progress, w, room):
+    """Note what lets go first between two parts of the step, at the earliest moment."""
+    clusters, left, size = len(p.rows), room.left, room.scale
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        _forces(middle, step, p, progress, w, room, left[0])
+        if _past(left[0], size):
+            high = middle
+        else:
+            low = middle
+    _forces(high, step, p, progress, w, room, left[0])
+    for r in range(len(size)):
+        if left[0, r] < -_FORCE_ROUNDING * size[r]:
+            room.place[r if r < clusters else r - clusters] = high
+
+
+@helper
+def _clear(left, size):
+    """Whether nothing lets go between the quarters of a part, as far as they tell."""
+    clear = True
+    for r in range(len(size)):
+        last = _LAST * abs(left[0, r] - 4.0 * left[1, r] + 6.0 * left[2, r]
+                           - 4.0 * left[3, r] + left[4, r])
+        for k in range(_QUARTERS + 1):
+            bound = -last
+            for i in range(_QUARTERS + 1):
+                bound += _FIT_QUARTERS[k, i] * left[i, r]
+            clear = clear and bound >= -_FORCE_ROUNDING * size[r]
+    return clear
+
+
+@helper
+def _first_let_go(end, step, p, progress, w, room):
     """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
-    clusters, count = len(p.rows), 2 * len(p.rows) + len(closed)
-    parts, state, rate, left, size = room.parts, room.state, room.rate, room.left, room.scale
+    left, size = room.left, room.scale
     size[:] = 0.0
     room.waiting[0, 0], room.waiting[0, 1], waiting = 0.0, end, 1
     while waiting > 0:
@@ -245,38 +300,16 @@ def _first_let_go(t, latest, h, end, Y, p, status, closed, w, room):
         low, high = 0.0, NOWHERE
         for i in range(_QUARTERS + 1):
             here = begin + width * i / _QUARTERS
-            _forces(t, latest, h, here, Y, parts, p, status, closed, w, state, rate, left[i])
-            for r in range(count):
+            _forces(here, step, p, progress, w, room, left[i])
+            for r in range(len(size)):
                 size[r] = max(size[r], abs(left[i, r]))
             if i > 0 and _past(left[i], size):
                 low, high = begin + width * (i - 1) / _QUARTERS, here
                 break
         if high <= 1.0:
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                if middle <= low or middle >= high:
-                    break
-                _forces(t, latest, h, middle, Y, parts, p, status, closed, w, state, rate,
-                        left[0])
-                if _past(left[0], size):
-                    high = middle
-                else:
-                    low = middle
-            _forces(t, latest, h, high, Y, parts, p, status, closed, w, state, rate, left[0])
-            for r in range(count):
-                if left[0, r] < -_FORCE_ROUNDING * size[r]:
-                    room.place[r if r < clusters else r - clusters] = high
+            _narrow(low, high, step, p, progress, w, room)
             return
-        clear = True
-        for r in range(count):
-            last = _LAST * abs(left[0, r] - 4.0 * left[1, r] + 6.0 * left[2, r]
-                               - 4.0 * left[3, r] + left[4, r])
-            for k in range(_QUARTERS + 1):
-                bound = -last
-                for i in range(_QUARTERS + 1):
-                    bound += _FIT_QUARTERS[k, i] * left[i, r]
-                clear = clear and bound >= -_FORCE_ROUNDING * size[r]
-        if not clear and width > _SHORTEST * end:
+        if not _clear(left, size) and width > _SHORTEST * end:
             room.waiting[waiting, 0], room.waiting[waiting - 1, 0] = begin, begin + 0.5 * width
             room.waiting[waiting, 1] = room.waiting[waiting - 1, 1] = 0.5 * width
             waiting += 1
@@ -284,10 +317,85 @@ def _first_let_go(t, latest, h, end, Y, p, status, closed, w, room):
             waiting -= 1
 
 
-@kernel(types.f8(f8, f8, f8, vector, PROBLEM, integers, integers, WORKSPACE, vector, f8, ROOM))
-def first_changes(
-    t, latest, h, held_Y, held_p, held_status, held_closed, held_w, held_floor, rtol, held_room,
-):
+@helper
+def _search_stops(step, p, progress, room):
+    """Note where open stops close.
+
+    Returns the first such part, the one to which the step has to be shortened, and whether stops
+    are closed.
+    """
+    s, b, Y = p.system, room.bound, progress.state
+    clusters = len(p.rows)
+    first, shorter, forces = 1.0, 1.0, False
+    for j in range(len(s.gap)):
+        if progress.closed[j]:
+            forces = True
+            continue
+        size = _along(s.Ty[j], 0, Y, room, b)
+        size += s.gap[j] + max(abs(p.relief[0]), abs(p.relief[1]))
+        for i in range(len(b)):
+            b[i] = -b[i] - s.gap[j]
+        if largest(b) + p.relief[1] < 0.0:
+            continue
+        shorter = min(shorter, _add_ground(j, step, p, Y, room))
+        for i in range(len(b)):
+            b[i] = _ROUNDING * size - b[i]
+        room.place[clusters + j] = first_below(b, room.halves)
+        first = min(first, room.place[clusters + j])
+    return first, shorter, forces
+
+
+@helper
+def _search_clusters(step, p, progress, room):
+    """Note where slip comes to rest; returns the first such part, and whether clusters stick."""
+    first, forces = 1.0, False
+    for k in range(len(p.rows)):
+        status = progress.status[k]
+        if status == STICK:
+            forces = True
+        elif status == 1 or status == -1:
+            _set_slip(k, float(status), step, p, progress.state, room)
+            room.place[k] = first_below(room.bound, room.halves)
+            first = min(first, room.place[k])
+    return first, forces
+
+
+@helper
+def _search_nodes(first, forces, step, p, limits, progress, room):
+    """Note where clusters that are open touch the ground; returns as :func:`_search_stops`."""
+    s, b, Y, place = p.system, room.bound, progress.state, room.place
+    n, m = s.Tx.shape
+    shorter = 1.0
+    for j in range(n):
+        _along(s.Ty[j], 0, Y, room, b)
+        depth = 0.0
+        for i in range(m):
+            depth = max(depth, abs(s.Ty[j, i]) * limits.floor[i])
+        for i in range(len(b)):
+            b[i] = -b[i] - s.gap[j]
+        if (pressed(smallest(b) + p.relief[0], j, s) == 0.0
+            and pressed(largest(b) + p.relief[1], j, s) == 0.0):
+            continue
+        part = _add_ground(j, step, p, Y, room)
+        before, c = pressed(b[0], j, s), p.cluster[j]
+        if progress.status[c] == OPEN:
+            if before == 0.0:
+                shorter = min(shorter, part)
+                touch = first_pressed(b, 0.0, FINEST, j, s, room.halves)
+                place[c] = min(place[c], touch)
+                first = min(first, touch)
+            else:
+                forces = True
+            continue
+        above = UNFELT * max(before, pressed(b[PARTS], j, s)) + pressed(
+            0.01 * limits.rtol * depth, j, s)
+        if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:
+            shorter = min(shorter, part, first_pressed(b, above, ROUGHLY, j, s, room.halves))
+    return first, shorter, forces
+
+
+@kernel(types.f8(STEP, PROBLEM, LIMITS, PROGRESS, WORKSPACE, ROOM))
+def first_changes(step, held_p, held_limits, held_progress, held_w, held_room):
     """Fill ``room.place`` with the part of a step at which each cluster and stop first changes.
 
     ``room.parts`` is the interpolation of the step. NOWHERE for those that do not change. Of what
@@ -295,63 +403,14 @@ def first_changes(
     Returns the part to which the step has to be shortened because it passes a contact that its
     stages have not felt, or waves too short for it; 1 if it has not.
     """
-    Y, p, w, floor = borrowed(held_Y), borrowed(held_p), borrowed(held_w), borrowed(held_floor)
-    status, closed, room = borrowed(held_status), borrowed(held_closed), borrowed(held_room)
-    s, parts, place, halves = p.system, room.parts, room.place, room.halves
-    c, b, x, values = room.nested, room.bound, room.along, room.values
-    n, m = s.Tx.shape
-    clusters = len(p.rows)
-    place[:] = NOWHERE
-    first, shorter, forces = 1.0, 1.0, False
+    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
+    w, room = borrowed(held_w), borrowed(held_room)
+    room.place[:] = NOWHERE
     if p.restitution >= 0.0:
-        for j in range(n):
-            if closed[j]:
-                forces = True
-                continue
-            size = _along(s.Ty, j, 0, Y, parts, c, b)
-            size += s.gap[j] + max(abs(p.relief[0]), abs(p.relief[1]))
-            for i in range(len(b)):
-                b[i] = -b[i] - s.gap[j]
-            if largest(b) + p.relief[1] < 0.0:
-                continue
-            shorter = min(shorter, _add_ground(j, t, h, Y, parts, p, c, b, x, values))
-            for i in range(len(b)):
-                b[i] = _ROUNDING * size - b[i]
-            place[clusters + j] = first_below(b, halves)
-            first = min(first, place[clusters + j])
+        first, shorter, forces = _search_stops(step, p, progress, room)
     else:
-        for k in range(clusters):
-            if status[k] == STICK:
-                forces = True
-            elif status[k] == 1 or status[k] == -1:
-                _slip(k, float(status[k]), t, h, Y, parts, p, c, b, values)
-                place[k] = first_below(b, halves)
-                first = min(first, place[k])
-        for j in range(n):
-            _along(s.Ty, j, 0, Y, parts, c, b)
-            depth = 0.0
-            for i in range(m):
-                depth = max(depth, abs(s.Ty[j, i]) * floor[i])
-            for i in range(len(b)):
-                b[i] = -b[i] - s.gap[j]
-            if (pressed(smallest(b) + p.relief[0], j, s) == 0.0
-                and pressed(largest(b) + p.relief[1], j, s) == 0.0):
-                continue
-            part = _add_ground(j, t, h, Y, parts, p, c, b, x, values)
-            before = pressed(b[0], j, s)
-            if status[p.cluster[j]] == OPEN:
-                if before == 0.0:
-                    shorter = min(shorter, part)
-                    touch = first_pressed(b, 0.0, FINEST, j, s, halves)
-                    place[p.cluster[j]] = min(place[p.cluster[j]], touch)
-                    first = min(first, touch)
-                else:
-                    forces = True
-                continue
-            above = UNFELT * max(before, pressed(b[PARTS], j, s)) + pressed(
-                0.01 * rtol * depth, j, s)
-            if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:
-                shorter = min(shorter, part, first_pressed(b, above, ROUGHLY, j, s, halves))
+        first, forces = _search_clusters(step, p, progress, room)
+        first, shorter, forces = _search_nodes(first, forces, step, p, limits, progress, room)
     if forces:
-        _first_let_go(t, latest, h, first, Y, p, status, closed, w, room)
+        _first_let_go(first, step, p, progress, w, room)
     return shorter

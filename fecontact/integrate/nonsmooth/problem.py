@@ -7,26 +7,30 @@ from numba import types
 
 from fecontact.core.compiled import f8, i8, integers, matrix, vector
 from fecontact.core.types import Array, Integers
-from fecontact.system.kernels import SYSTEM
+from fecontact.system.kernels import POWER_COUNT, SYSTEM
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
 # curve of the coefficient has not begun to change.
 STEEP, CREEP = 1e36, 1e-18
 
 # Columns of `Workspace.nodes`.
-FORCE, PRESSING, PENETRATION, RATE, SLIP, GROUND_RATE, SLOPE, CURVED, LIMIT = range(9)
 NODE_COLUMNS = 9
+FORCE, PRESSING, PENETRATION, RATE, SLIP, GROUND_RATE, SLOPE, CURVED, LIMIT = range(NODE_COLUMNS)
 
 # Status of a cluster; a slipping one has the sign of its slip velocity, +1 or -1.
 OPEN, STICK, FIXED = 0, 2, 3
 
-EFFORTS = 8
-
 # What a run returns: steps used up, end reached, step too short, numbers not finite.
 GOING_ON, FINISHED, STUCK, DIVERGED = range(4)
 
-# Entries of a run's ``counts``: what it has done, outputs written, whether it has begun.
-STEPS, REJECTED, EVENTS, IMPACTS, OUTPUTS, STARTED = range(6)
+# Entries of Progress.clock: the time reached, and the length of the next step.
+TIME, LENGTH = range(2)
+# Entries of Progress.counts: what the run has done, outputs written, whether it has begun.
+COUNTS = 6
+STEPS, REJECTED, EVENTS, IMPACTS, OUTPUTS, STARTED = range(COUNTS)
+# Entries of Progress.largest: slip velocity, penetration rate and penetration.
+SIZES = 3
+SLIP_SIZE, RATE_SIZE, DEPTH_SIZE = range(SIZES)
 
 
 class NonsmoothProblem(NamedTuple):
@@ -56,6 +60,66 @@ PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, vector, i8
                            NonsmoothProblem)
 
 
+class Limits(NamedTuple):
+    """What limits the steps of a run.
+
+    ``stops`` are ascending times at which a step ends; ``floor`` (size,) are values below which
+    the error is not measured relative to the state; ``longest`` is the longest step.
+    """
+
+    stops: Array
+    floor: Array
+    rtol: float
+    longest: float
+
+
+LIMITS = types.NamedTuple([vector, vector, f8, f8], Limits)
+
+
+class Progress(NamedTuple):
+    """How far a run has come.
+
+    ``state`` is Y; ``status`` (k,) is that of the clusters, ``closed`` (n,) tells the closed
+    stops; ``largest`` (3,) are the largest sizes so far, and ``carried`` (n,) the friction forces
+    of implicit steps.
+    """
+
+    clock: Array
+    counts: Integers
+    state: Array
+    status: Integers
+    closed: Integers
+    largest: Array
+    carried: Array
+
+
+PROGRESS = types.NamedTuple([vector, integers, vector, integers, integers, vector, vector],
+                            Progress)
+
+
+class Output(NamedTuple):
+    """Output times (N,), and states (N, size), friction and normal forces (N, n) there."""
+
+    times: Array
+    states: Array
+    friction: Array
+    normal: Array
+
+
+OUTPUT = types.NamedTuple([vector, matrix, matrix, matrix], Output)
+
+
+class Step(NamedTuple):
+    """A step: begin, length, and the last time at which what is given in time counts."""
+
+    t: float
+    h: float
+    latest: float
+
+
+STEP = types.NamedUniTuple(f8, 3, Step)
+
+
 class Workspace(NamedTuple):
     """Results per node and per cluster of the last evaluation, and room for small systems."""
 
@@ -68,10 +132,11 @@ class Workspace(NamedTuple):
     matrix: Array
     right: Array
     indices: Integers
+    pivots: Integers
 
 
 WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, matrix, vector,
-                              integers], Workspace)
+                              integers, integers], Workspace)
 
 
 def workspace_for(problem: NonsmoothProblem) -> Workspace:
@@ -80,4 +145,14 @@ def workspace_for(problem: NonsmoothProblem) -> Workspace:
     size = max(n, k)
     return Workspace(np.zeros((n, NODE_COLUMNS)), np.zeros(n), np.zeros(k), np.zeros(k),
                      np.zeros(k), np.zeros(k), np.zeros((size, size)), np.zeros(size),
-                     np.zeros(size, np.int64))
+                     np.zeros(size, np.int64), np.zeros(size, np.int64))
+
+
+def progress_for(problem: NonsmoothProblem, state: Array, time: float, length: float) -> Progress:
+    """A run that is about to start."""
+    n = len(problem.cluster)
+    status = np.where(np.any(problem.rows != 0.0, axis=1), OPEN, FIXED)
+    return Progress(
+        np.array([time, length]), np.zeros(COUNTS, dtype=np.int64),
+        np.concatenate([state, np.zeros(POWER_COUNT + n)]), status,
+        np.zeros(n, dtype=np.int64), np.zeros(SIZES), np.zeros(n))

@@ -17,16 +17,17 @@ solution methods, Computer Methods in Applied Mechanics and Engineering 92 (1991
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
-from fecontact.core.compiled import helper
-from fecontact.integrate.nonsmooth.equations import free_acceleration
-from fecontact.integrate.nonsmooth.problem import (
-    CREEP,
-)
-from fecontact.laws.signatures import friction_at, ground_at, normal_at, signal_at
-from fecontact.system.kernels import node_motion
+from fecontact.core.compiled import block, helper, matrix, vector
+from fecontact.core.types import Array
+from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
+from fecontact.integrate.nonsmooth.problem import CREEP
+from fecontact.laws.signatures import friction_at
+from fecontact.system.kernels import node_contact, node_motion, normal_gradients
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
@@ -38,52 +39,90 @@ _HASTY = 8
 KEPT, HESITANT, FREE = range(3)
 
 
+class Stage(NamedTuple):
+    """The equations of a stage, ``V = known + g q''(t, start + g V, V, R)``.
+
+    ``start`` and ``known`` (m,) are Q_e and V_e; Y (2 m,) is the state at the stage.
+    """
+
+    t: float
+    g: float
+    start: Array
+    known: Array
+    Y: Array
+
+
+class Hold(NamedTuple):
+    """What holds the nodes (n,) in stick.
+
+    ``grip`` is r, ``multiplier`` is lambda, and ``side`` the sign of the slip of each node at the
+    last evaluation, zero for stick.
+    """
+
+    grip: Array
+    multiplier: Array
+    side: Array
+
+
+HOLD = types.NamedUniTuple(vector, 3, Hold)
+
+
+class NewtonRoom(NamedTuple):
+    """Room for Newton's method.
+
+    Rows ``active`` (2, n, m), Tx and Ty, of the nodes under force, and their ``gradients``
+    (2, n, m), dR/dV and -dF/dV; ``partial`` (3, 4) of one node; ``linear`` (m, m) is
+    1 + g C + g^2 K, ``matrix`` the whole matrix; ``balance`` and ``residual`` (m,).
+    """
+
+    gradients: Array
+    active: Array
+    partial: Array
+    linear: Array
+    matrix: Array
+    balance: Array
+    residual: Array
+
+
+NEWTON_ROOM = types.NamedTuple([block] * 2 + [matrix] * 3 + [vector] * 2, NewtonRoom)
+
+
+def newton_room_for(nodes: int, modes: int) -> NewtonRoom:
+    """Room for so many nodes and modes."""
+    linear, whole = np.zeros((2, modes, modes))
+    balance, residual = np.zeros((2, modes))
+    return NewtonRoom(np.zeros((2, nodes, modes)), np.zeros((2, nodes, modes)), np.zeros((3, 4)),
+                      linear, whole, balance, residual)
+
+
 @helper
-def _linearise(
-        t, Y, g, p, grip, multiplier, side, turning, force, gradients, active, balance):
+def _linearise(stage, moved, p, hold, turning, room, force):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
-    Adds ``Ty F - Tx R`` to ``balance`` (m,), fills ``force`` (n,) with R, ``active`` (2, n, m)
-    with rows Tx, Ty and ``gradients`` (2, n, m) with dR/dV and -dF/dV of the nodes under force.
-    ``side`` (n,) is the sign of the slip of each node at the last call, zero for stick. KEPT
-    nodes stay as they are; HESITANT ones that would turn their slip around are first tried as
-    sticking, or the iteration would jump across stick for ever. Returns the number of nodes under
-    force and the largest creep velocity of a sticking node, infinite when a node has
-    changed between stick and slip.
+    Adds ``Ty F - Tx R`` to ``room.balance``, fills ``force`` (n,) with R, and ``active`` and
+    ``gradients`` of the room. KEPT nodes stay on their side; HESITANT ones that would turn their
+    slip around are first tried as sticking, or the iteration would jump across stick for ever.
+    Returns the number of nodes under force and the largest creep velocity of a sticking node,
+    infinite when a node has changed between stick and slip.
     """
-    s = p.system
+    s, g, side, partial = p.system, stage.g, hold.side, room.partial
     n, m = s.Tx.shape
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
     count, creep = 0, 0.0
     for j in range(n):
         force[j] = 0.0
-        x, height, x_rate, height_rate = node_motion(j, Y, s)
-        xi = s.abscissa[j] + x - travel
-        ground, slope, curvature = ground_at(s.profile)(xi, s.profile_parameters)
-        slip = x_rate - speed
-        F, F_u, F_v = normal_at(s.normal[j])(ground - height - s.gap[j],
-                                             slope * slip - height_rate, s.normal_parameters[j])
+        contact = node_contact(j, node_motion(j, stage.Y, s), moved, s)
+        F, pressing = normal_gradients(j, contact, s, partial)
         if F == 0.0:
             continue
-        along = g * (F_u * slope + F_v * curvature * slip) + F_v * slope
-        away = -g * F_u - F_v
-        pressing = abs(F)
-        sign = 1.0 if F >= 0.0 else -1.0
-        pressing_along, pressing_away = sign * along, sign * away
-        if s.friction_scale != 0:
-            scale, scale_x, _ = ground_at(s.friction_scale)(xi, s.friction_scale_parameters)
-            pressing_along = scale * pressing_along + g * scale_x * pressing
-            pressing_away *= scale
-            pressing *= scale
-        limit = p.static[j] * pressing
-        if p.static[j] < 0.0:
-            limit = friction_at(s.friction[j])(CREEP, pressing, s.friction_parameters[j])[0]
-        trial = multiplier[j] + grip[j] * slip
+        slip = contact.slip
+        along, away = g * partial[0, 0] + partial[0, 2], g * partial[0, 1] + partial[0, 3]
+        limit = stick_limit(j, pressing, p)
+        trial = hold.multiplier[j] + hold.grip[j] * slip
         turned = trial if abs(trial) > limit else 0.0
         if turning == KEPT:
             turned = side[j]
         if turned == 0.0 or (turning == HESITANT and turned * side[j] < 0.0):
-            R, R_along, R_away = trial, grip[j], 0.0
+            R, R_along, R_away = trial, hold.grip[j], 0.0
             creep = max(creep, abs(slip)) if turned == side[j] == 0.0 else math.inf
             side[j] = 0.0
         else:
@@ -96,89 +135,89 @@ def _linearise(
             if sense * slip < 0.0:
                 creep = max(creep, abs(slip))
                 R_v = 0.0
-            R_along, R_away = R_v + R_F * pressing_along, R_F * pressing_away
+            R_along = R_v + R_F * (g * partial[2, 0] + partial[2, 2])
+            R_away = R_F * (g * partial[2, 1] + partial[2, 3])
         force[j] = R
         for i in range(m):
             tx, ty = s.Tx[j, i], s.Ty[j, i]
-            balance[i] += ty * F - tx * R
-            active[0, count, i], active[1, count, i] = tx, ty
-            gradients[0, count, i] = R_along * tx + R_away * ty
-            gradients[1, count, i] = -along * tx - away * ty
+            room.balance[i] += ty * F - tx * R
+            room.active[0, count, i], room.active[1, count, i] = tx, ty
+            room.gradients[0, count, i] = R_along * tx + R_away * ty
+            room.gradients[1, count, i] = -along * tx - away * ty
         count += 1
     return count, creep
 
 
 @helper
-def _residual(
-        t, g, start, known, Y, p, grip, multiplier, side, turning, force, room, balance,
-        residual):
-    """What is left of the equations of a stage, with places and contact at the velocities in Y."""
-    m = len(start)
+def _evaluate(stage, p, hold, turning, room, force):
+    """Fill ``room.residual`` and ``room.balance`` for the velocities in Y, and the places there."""
+    Y, m = stage.Y, len(stage.start)
     for i in range(m):
-        Y[i] = start[i] + g * Y[m + i]
-    free_acceleration(t, Y, p.system, balance)
-    count, creep = _linearise(t, Y, g, p, grip, multiplier, side, turning, force, room[:2],
-                              room[2:], balance)
+        Y[i] = stage.start[i] + stage.g * Y[m + i]
+    moved = free_acceleration(stage.t, Y, p.system, room.balance)
+    count, creep = _linearise(stage, moved, p, hold, turning, room, force)
     for i in range(m):
-        residual[i] = known[i] + g * balance[i] - Y[m + i]
+        room.residual[i] = stage.known[i] + stage.g * room.balance[i] - Y[m + i]
     return count, creep
 
 
 @helper
-def solve_stage(
-        t, g, start, known, Y, p, grip, multiplier, side, force, room, linear,
-        system_matrix, floor, rtol, finest):
+def _shorten(stage, p, hold, change, downhill, room, force):
+    """Shorten a Newton step to where the minimum along it lies; ``downhill`` is its slope."""
+    m = len(stage.start)
+    low, high, part = 0.0, 1.0, 1.0
+    for _ in range(40):
+        _evaluate(stage, p, hold, FREE, room, force)
+        uphill = 0.0
+        for i in range(m):
+            uphill -= room.residual[i] * change[i]
+        if abs(uphill) <= 0.1 * abs(downhill) or (part == 1.0 and uphill < 0.0):
+            break
+        if uphill > 0.0:
+            high = part
+        else:
+            low = part
+        middle = 0.5 * (low + high)
+        for i in range(m):
+            stage.Y[m + i] += (middle - part) * change[i]
+        part = middle
+
+
+@helper
+def solve_stage(stage, p, hold, limits, finest, room, force):
     """Solve one stage for the velocities, Y[m : 2 m]; returns whether that succeeded.
 
-    ``start`` and ``known`` (m,) are Q_e and V_e, ``linear`` is 1 + g C + g^2 K. With given normal
-    forces the equations are those of a convex minimum: when the sticking set is not found at
-    once, each Newton step is shortened to where the minimum along it lies.
+    A sticking node may creep at ``finest``. With given normal forces the equations are those of a
+    convex minimum: when the sticking set is not found at once, each Newton step is shortened to
+    where the minimum along it lies.
     """
-    m = len(start)
-    balance, residual = np.empty(m), np.empty(m)
+    Y, m, floor, whole = stage.Y, len(stage.start), limits.floor, room.matrix
     turning = KEPT
     for iteration in range(_ITERATIONS):
-        count, _ = _residual(t, g, start, known, Y, p, grip, multiplier, side, turning, force,
-                             room, balance, residual)
+        count, _ = _evaluate(stage, p, hold, turning, room, force)
         turning = HESITANT if iteration < _HASTY else FREE
-        system_matrix[:] = linear
+        whole[:] = room.linear
         if count:
-            Tx, Ty = room[2, :count].T, room[3, :count].T
-            system_matrix += g * (np.dot(Tx, room[0, :count]) + np.dot(Ty, room[1, :count]))
+            Tx, Ty = room.active[0, :count].T, room.active[1, :count].T
+            whole += stage.g * (np.dot(Tx, room.gradients[0, :count])
+                                + np.dot(Ty, room.gradients[1, :count]))
         for i in range(m):
-            if not math.isfinite(residual[i]):
+            if not math.isfinite(room.residual[i]):
                 return False
-        change = np.linalg.solve(system_matrix, residual)
+        change = np.linalg.solve(whole, room.residual)
         moved, downhill = 0.0, 0.0
         for i in range(m):
-            downhill += residual[i] * change[i]
+            downhill += room.residual[i] * change[i]
             Y[m + i] += change[i]
-            moved = max(moved, abs(change[i]) / (rtol * (floor[m + i] + abs(Y[m + i]))))
+            moved = max(moved, abs(change[i]) / (limits.rtol * (floor[m + i] + abs(Y[m + i]))))
         if moved <= 1e-2:
-            _, creep = _residual(t, g, start, known, Y, p, grip, multiplier, side, turning, force,
-                                 room, balance, residual)
+            _, creep = _evaluate(stage, p, hold, turning, room, force)
             if creep <= finest:
                 return True
             if creep < math.inf:
                 # The creep belongs to the old multiplier and must not count again with the new.
-                multiplier[:] = force
+                hold.multiplier[:] = force
                 turning = KEPT
         elif turning == FREE:
-            low, high, part = 0.0, 1.0, 1.0
-            for _ in range(40):
-                _residual(t, g, start, known, Y, p, grip, multiplier, side, FREE, force, room,
-                          balance, residual)
-                uphill = 0.0
-                for i in range(m):
-                    uphill -= residual[i] * change[i]
-                if abs(uphill) <= 0.1 * abs(downhill) or (part == 1.0 and uphill < 0.0):
-                    break
-                if uphill > 0.0:
-                    high = part
-                else:
-                    low = part
-                middle = 0.5 * (low + high)
-                for i in range(m):
-                    Y[m + i] += (middle - part) * change[i]
-                part = middle
+            _shorten(stage, p, hold, change, downhill, room, force)
     return False

@@ -10,35 +10,54 @@ Numerical Analysis 14 (1977).
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, f8, helper, i8, integers, kernel, matrix, vector
+from fecontact.core.compiled import borrowed, helper, i8, kernel, matrix, vector
+from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH, NOWHERE, first_below, fit
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
 from fecontact.integrate.nonsmooth.event_search import ROUGHLY, UNFELT, first_pressed, pressed
 from fecontact.integrate.nonsmooth.problem import (
     DIVERGED,
-    EFFORTS,
     FINISHED,
     FORCE,
     GOING_ON,
+    LENGTH,
     LIMIT,
+    LIMITS,
+    NODE_COLUMNS,
+    OUTPUT,
     OUTPUTS,
     PENETRATION,
     PROBLEM,
+    PROGRESS,
     RATE,
     REJECTED,
     SLIP,
+    SLIP_SIZE,
     STARTED,
     STEPS,
     STUCK,
+    TIME,
     WORKSPACE,
+    NonsmoothProblem,
+    Step,
 )
-from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, solve_stage
-from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import body_powers, drive_jump
+from fecontact.integrate.nonsmooth.stage_newton import (
+    GRIP,
+    HOLD,
+    NEWTON_ROOM,
+    ROUNDING,
+    Hold,
+    NewtonRoom,
+    Stage,
+    newton_room_for,
+    solve_stage,
+)
+from fecontact.system.kernels import DRIVE, POWER_COUNT, body_powers, drive_jump, ground_motion
 
 GAMMA = 0.43586652150845899942
 A21 = 0.5 * (1.0 - GAMMA)
@@ -46,61 +65,132 @@ B1 = -0.25 * (6.0 * GAMMA**2 - 16.0 * GAMMA + 1.0)
 B2 = 0.25 * (6.0 * GAMMA**2 - 20.0 * GAMMA + 5.0)
 ERROR_1 = B1 - GAMMA / (1.0 - GAMMA)
 ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
+NODES = (GAMMA, GAMMA + A21, 1.0)
+STAGES = len(NODES)
 _THIRDS = fit(np.arange(4) / 3.0)
 # A step is cut so often at most before what is left counts as error.
 CUTS = 3
 
 
+class Room(NamedTuple):
+    """Room for implicit steps.
+
+    Attributes
+    ----------
+    newton, hold : NewtonRoom, Hold
+        Those of the stages.
+    states, accelerations, forces, rates : (3, 2 m), (3, m), (3, n), (3, p + n) arrays
+        Of the stages: Y, q'', friction forces and powers.
+    start, known : (m,) arrays
+        Places and velocities that a stage adds to.
+    new, before, after : (size,), (m + p + n,), (m + p + n,) arrays
+        Y at the end of the step; accelerations and powers at both ends.
+    old : (n, NODE_COLUMNS) array
+        What `observe` says of the begin.
+    inertia : (n,) array
+        Tx Tx^T of each node.
+    cubic, speed, halves : (4,), (4,), (DEPTH, 5) arrays
+        Polynomials over the step, and parts of it.
+    """
+
+    newton: NewtonRoom
+    hold: Hold
+    states: Array
+    accelerations: Array
+    forces: Array
+    rates: Array
+    start: Array
+    known: Array
+    new: Array
+    before: Array
+    after: Array
+    old: Array
+    inertia: Array
+    cubic: Array
+    speed: Array
+    halves: Array
+
+
+ROOM = types.NamedTuple(
+    [NEWTON_ROOM, HOLD] + [matrix] * 4 + [vector] * 5 + [matrix] + [vector] * 3 + [matrix], Room)
+
+
+def room_for(problem: NonsmoothProblem) -> Room:
+    """Room for a problem."""
+    n, m = problem.system.Tx.shape
+    size = m + POWER_COUNT + n
+    start, known = np.zeros((2, m))
+    before, after = np.zeros((2, size))
+    return Room(newton_room_for(n, m), Hold(*np.zeros((3, n))), np.zeros((STAGES, 2 * m)),
+                np.zeros((STAGES, m)), np.zeros((STAGES, n)), np.zeros((STAGES, size - m)),
+                start, known, np.zeros(m + size), before, after, np.zeros((n, NODE_COLUMNS)),
+                np.zeros(n), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))
+
+
 @helper
-def _passed_over(t, h, before, after, old, p, tolerance, floor, rtol, nodes, b, speed, room):
+def _slips_back(j, h, p, w, tolerance, room):
+    """Part of a step at which node j slips back between ends with slip of one sense; or 1."""
+    s, b, speed = p.system, room.cubic, room.speed
+    first, last = room.old[j, SLIP], w.nodes[j, SLIP]
+    if not (room.old[j, FORCE] != 0.0 and w.nodes[j, FORCE] != 0.0 and first * last > 0.0
+            and min(abs(first), abs(last)) > tolerance):
+        return 1.0
+    sign = 1.0 if first > 0.0 else -1.0
+    rise, fall = 0.0, 0.0
+    for i in range(s.Tx.shape[1]):
+        rise += s.Tx[j, i] * room.before[i]
+        fall += s.Tx[j, i] * room.accelerations[STAGES - 1, i]
+    b[0], b[3] = first + speed[0], last + speed[3]
+    b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
+    for i in range(4):
+        b[i] = sign * (b[i] - speed[i]) + tolerance
+    back = first_below(b, room.halves)
+    if back == NOWHERE:
+        return 1.0
+    b[0], b[1], b[2], b[3] = b[3], b[2], b[1], b[0]
+    return 0.5 * (back + 1.0 - first_below(b, room.halves))
+
+
+@helper
+def _touches(j, h, p, w, limits, room):
+    """Part of a step at which node j touches between ends that do not feel it; or 1."""
+    s, b = p.system, room.cubic
+    b[0], b[3] = room.old[j, PENETRATION], w.nodes[j, PENETRATION]
+    b[1], b[2] = b[0] + h * room.old[j, RATE] / 3.0, b[3] - h * w.nodes[j, RATE] / 3.0
+    depth = 0.0
+    for i in range(s.Ty.shape[1]):
+        depth = max(depth, abs(s.Ty[j, i]) * limits.floor[i])
+    above = UNFELT * max(pressed(b[0], j, s), pressed(b[3], j, s))
+    above += pressed(limits.rtol * depth, j, s)
+    if max(pressed(b.min(), j, s), pressed(b.max(), j, s)) > above:
+        return first_pressed(b, above, ROUGHLY, j, s, room.halves)
+    return 1.0
+
+
+@helper
+def _passed_over(step, p, limits, tolerance, w, room):
     """Part of a step at which a node slips back, or touches, between ends that show neither; or 1.
 
-    ``old`` and ``nodes`` are what `observe` fills at both ends, ``before`` and ``after`` the
-    accelerations there; between them cubics count. Reversals below ``tolerance`` are left out.
+    Between the ends cubics count. Reversals below ``tolerance`` are left out.
     """
-    s = p.system
-    n, m = s.Tx.shape
     for i in range(4):
-        speed[i] = 0.0
+        room.speed[i] = 0.0
         for k in range(4):
-            speed[i] += _THIRDS[i, k] * signal_at(s.ground_motion)(
-                t + h * k / 3.0, s.ground_motion_parameters)[1]
+            room.speed[i] += _THIRDS[i, k] * ground_motion(step.t + step.h * k / 3.0,
+                                                           p.system).speed
     shorter = 1.0
-    for j in range(n):
-        first, last = old[j, SLIP], nodes[j, SLIP]
-        if (old[j, FORCE] != 0.0 and nodes[j, FORCE] != 0.0 and first * last > 0.0
-                and min(abs(first), abs(last)) > tolerance):
-            sign = 1.0 if first > 0.0 else -1.0
-            rise, fall = 0.0, 0.0
-            for i in range(m):
-                rise += s.Tx[j, i] * before[i]
-                fall += s.Tx[j, i] * after[i]
-            b[0], b[3] = first + speed[0], last + speed[3]
-            b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
-            for i in range(4):
-                b[i] = sign * (b[i] - speed[i]) + tolerance
-            back = first_below(b, room)
-            if back != NOWHERE:
-                b[0], b[1], b[2], b[3] = b[3], b[2], b[1], b[0]
-                shorter = min(shorter, 0.5 * (back + 1.0 - first_below(b, room)))
-        b[0], b[3] = old[j, PENETRATION], nodes[j, PENETRATION]
-        b[1], b[2] = b[0] + h * old[j, RATE] / 3.0, b[3] - h * nodes[j, RATE] / 3.0
-        depth = 0.0
-        for i in range(m):
-            depth = max(depth, abs(s.Ty[j, i]) * floor[i])
-        above = UNFELT * max(pressed(b[0], j, s), pressed(b[3], j, s))
-        above += pressed(rtol * depth, j, s)
-        if max(pressed(b.min(), j, s), pressed(b.max(), j, s)) > above:
-            shorter = min(shorter, first_pressed(b, above, ROUGHLY, j, s, room))
+    for j in range(len(room.old)):
+        shorter = min(shorter, _slips_back(j, step.h, p, w, tolerance, room))
+        shorter = min(shorter, _touches(j, step.h, p, w, limits, room))
     return shorter
 
 
 @helper
-def _output(
-        row, time, t, h, Y, before, after, new, p, old_force, force, w, states, friction,
-        normal):
-    """State at an output time within a step, by cubics through both ends."""
+def _write_row(row, t, h, p, progress, output, w, room):
+    """State at an output time within a step of length h, by cubics through both ends."""
     m = p.system.Tx.shape[1]
+    Y, new, before, after = progress.state, room.new, room.before, room.after
+    states, time = output.states, output.times[row]
     x = (time - t) / h
     early, late = (1.0 - x) * (1.0 - x), x * x
     for i in range(m):
@@ -112,129 +202,189 @@ def _output(
     for i in range(2 * m, len(Y)):
         states[row, i] = (early * ((1.0 + 2.0 * x) * Y[i] + x * h * before[i - m])
                           + late * ((3.0 - 2.0 * x) * new[i] + (x - 1.0) * h * after[i - m]))
-    observe(time, states[row], p, w.nodes)
-    normal[row] = w.nodes[:, FORCE]
-    for j in range(len(force)):
-        friction[row, j] = (1.0 - x) * old_force[j] + x * force[j]
+    observe(ground_motion(time, p.system), states[row], p, w.nodes)
+    output.normal[row] = w.nodes[:, FORCE]
+    for j in range(len(progress.carried)):
+        output.friction[row, j] = ((1.0 - x) * progress.carried[j]
+                                   + x * room.forces[STAGES - 1, j])
 
 
-@kernel(types.i8(vector, vector, vector, PROBLEM, f8, f8, vector, vector, integers, integers,
-                 integers, vector, i8, matrix, matrix, matrix, WORKSPACE))
-def run_steps(
-    clock, held_times, stops, held_p, rtol, longest, held_floor, held_Y, status, closed, counts,
-    held_carried, limit, held_states, held_friction, held_normal, held_w,
-):
-    """Go on for at most ``limit`` steps, up to the last of ``times``.
-
-    Arguments as for :func:`fecontact.integrate.nonsmooth.event_driven.run_events`; ``carried`` is
-    the largest slip velocity so far, two unused numbers and the friction force (n,) of each node.
-    """
-    times, p, floor, Y = borrowed(held_times), borrowed(held_p), borrowed(held_floor), borrowed(
-        held_Y)
-    carried, states, w = borrowed(held_carried), borrowed(held_states), borrowed(held_w)
-    friction, normal = borrowed(held_friction), borrowed(held_normal)
+@helper
+def _set_inertia(p, limits, room):
+    """Fill ``room.inertia``; returns the largest floor of the slip velocities."""
     s = p.system
     n, m = s.Tx.shape
-    size = len(Y)
-    room = np.empty((4, n, m))
-    linear, system_matrix = np.empty((m, m)), np.empty((m, m))
-    stage_states, accelerations = np.empty((3, 2 * m)), np.empty((3, m))
-    rates, new = np.empty((3, EFFORTS + n)), np.empty(size)
-    start, known = np.empty(m), np.empty(m)
-    before, after = np.empty(size - m), np.empty(size - m)
-    grip, multiplier, stage_force = np.empty(n), np.empty(n), np.empty((3, n))
-    old, cubic, speed = np.empty_like(w.nodes), np.empty(4), np.empty(4)
-    halves = np.empty((DEPTH, 5))
-    side = np.zeros(n)
-    force = carried[3:]
-    inertia = np.empty(n)
     slowest = 0.0
     for j in range(n):
-        inertia[j], part = 0.0, 0.0
+        room.inertia[j], part = 0.0, 0.0
         for i in range(m):
-            inertia[j] += s.Tx[j, i] * s.Tx[j, i]
-            part = max(part, abs(s.Tx[j, i]) * floor[m + i])
+            room.inertia[j] += s.Tx[j, i] * s.Tx[j, i]
+            part = max(part, abs(s.Tx[j, i]) * limits.floor[m + i])
         slowest = max(slowest, part)
-    t, h, end = clock[0], clock[1], times[-1]
-    tiny = 1e-14 * max(abs(times[0]), abs(end), longest)
-    stop = 0
-    while stop < len(stops) and stops[stop] <= t:
-        stop += 1
-    in_a_row, cuts, known_before = 0, 0, False
+    return slowest
 
-    for _ in range(limit):
+
+@helper
+def _prepare(step, quick, p, progress, w, room):
+    """Set the linear matrix of a step, and what holds the sticking nodes."""
+    s, hold, inertia, linear = p.system, room.hold, room.inertia, room.newton.linear
+    g = GAMMA * step.h
+    n, m = s.Tx.shape
+    for i in range(m):
+        for k in range(m):
+            linear[i, k] = g * s.damping[i, k] + g * g * s.stiffness[i, k]
+        linear[i, i] += 1.0
+    for j in range(n):
+        # Of a force within its limit the rounding of the slip velocity may move no more.
+        softest = inertia[j] * g / GRIP
+        if w.nodes[j, LIMIT] > 0.0:
+            softest += ROUNDING * quick / w.nodes[j, LIMIT]
+        hold.grip[j] = 1.0 / softest if inertia[j] > 0.0 else 0.0
+        hold.multiplier[j] = progress.carried[j]
+
+
+@helper
+def _solve_stages(step, finest, p, limits, progress, room):
+    """Solve the stages of a step; returns how many succeeded."""
+    m = p.system.Tx.shape[1]
+    Y, h, g = progress.state, step.h, GAMMA * step.h
+    start, known, states, accelerations = (room.start, room.known, room.states,
+                                           room.accelerations)
+    for k in range(STAGES):
+        state = states[k]
+        for i in range(m):
+            start[i], known[i] = Y[i], Y[m + i]
+            if k == 1:
+                start[i] += h * A21 * states[0, m + i]
+                known[i] += h * A21 * accelerations[0, i]
+            elif k == 2:
+                start[i] += h * (B1 * states[0, m + i] + B2 * states[1, m + i])
+                known[i] += h * (B1 * accelerations[0, i] + B2 * accelerations[1, i])
+            state[m + i] = Y[m + i] if k == 0 else states[k - 1, m + i]
+        stage = Stage(min(step.t + NODES[k] * h, step.latest), g, start, known, state)
+        if not solve_stage(stage, p, room.hold, limits, finest, room.newton, room.forces[k]):
+            return k
+        for i in range(m):
+            accelerations[k, i] = (state[m + i] - known[i]) / g
+        room.hold.multiplier[:] = room.forces[k]
+    return STAGES
+
+
+@helper
+def _error(step, p, limits, Y, room):
+    """Error of the state in units of what is allowed, filtered by the matrix of the last stage."""
+    s, start, known, floor = p.system, room.start, room.known, limits.floor
+    states, accelerations = room.states, room.accelerations
+    m, h, g = s.Tx.shape[1], step.h, GAMMA * step.h
+    for i in range(m):
+        start[i] = h * (ERROR_1 * states[0, m + i] + ERROR_2 * states[1, m + i]
+                        + GAMMA * states[2, m + i])
+        known[i] = h * (ERROR_1 * accelerations[0, i] + ERROR_2 * accelerations[1, i]
+                        + GAMMA * accelerations[2, i])
+    for i in range(m):
+        for k in range(m):
+            known[i] -= g * s.stiffness[i, k] * start[k]
+    filtered = np.linalg.solve(room.newton.matrix, known)
+    worst = 0.0
+    for i in range(m):
+        place = start[i] + g * filtered[i]
+        worst = max(worst, abs(place) / (limits.rtol * (floor[i] + abs(Y[i]))),
+                    abs(filtered[i]) / (limits.rtol * (floor[m + i] + abs(Y[m + i]))))
+    return worst
+
+
+@helper
+def _set_rates(step, p, w, room):
+    """Fill ``room.rates`` with the powers at the stages, and w with the nodes at the end."""
+    for k in range(STAGES):
+        moment = min(step.t + NODES[k] * step.h, step.latest)
+        moved = ground_motion(moment, p.system)
+        observe(moved, room.states[k], p, w.nodes)
+        body_powers(moment, room.states[k], p.system, room.rates[k])
+        contact_powers(moved, p.system, w.nodes, room.forces[k], True, room.rates[k])
+
+
+@helper
+def _set_end(h, m, progress, room):
+    """Fill ``room.new`` and ``room.after`` from the stages of an accepted step."""
+    Y, rates = progress.state, room.rates
+    room.new[: 2 * m] = room.states[STAGES - 1]
+    for i in range(rates.shape[1]):
+        room.new[2 * m + i] = Y[2 * m + i] + h * (
+            B1 * rates[0, i] + B2 * rates[1, i] + GAMMA * rates[2, i])
+    room.after[:m] = room.accelerations[STAGES - 1]
+    room.after[m:] = rates[STAGES - 1]
+
+
+@helper
+def _accept(step, reached, p, progress, output, w, room):
+    """Write the outputs of a step and go on to its end."""
+    counts, times = progress.counts, output.times
+    if counts[STARTED] == 0:
+        counts[STARTED] = 1
+        progress.carried[:] = room.forces[0]
+    while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= reached:
+        _write_row(counts[OUTPUTS], step.t, reached - step.t, p, progress, output, w, room)
+        counts[OUTPUTS] += 1
+    progress.state[:] = room.new
+    room.before[:] = room.after
+    progress.carried[:] = room.forces[STAGES - 1]
+
+
+@helper
+def _pass_break(step, t, p, progress, output):
+    """Add the work that the drive puts in where its motions jump, at the time t."""
+    first = 2 * p.system.Tx.shape[1]
+    work = drive_jump(step.latest, t, progress.state, p.system)
+    progress.state[first + DRIVE] += work
+    last = progress.counts[OUTPUTS] - 1
+    if last >= 0 and output.times[last] == t:
+        output.states[last, first + DRIVE] += work
+
+
+@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, i8))
+def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room, most):
+    """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
+
+    The rows of ``output`` are filled as ``progress.counts`` says.
+    """
+    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
+    output, w, room = borrowed(held_output), borrowed(held_w), borrowed(held_room)
+    Y, counts, clock, largest = progress.state, progress.counts, progress.clock, progress.largest
+    n, m = p.system.Tx.shape
+    slowest = _set_inertia(p, limits, room)
+    room.hold.side[:] = 0.0
+    t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
+    tiny = 1e-14 * max(abs(output.times[0]), abs(end), limits.longest)
+    stop, in_a_row, cuts, known_before = 0, 0, 0, False
+    while stop < len(limits.stops) and limits.stops[stop] <= t:
+        stop += 1
+    for _ in range(most):
         if t >= end:
             break
-        goal = end
-        if stop < len(stops):
-            goal = min(goal, stops[stop])
-        length = min(h, longest)
+        goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
+        length = min(h, limits.longest)
         reaching = length >= (goal - t) * (1.0 - 1e-10)
         if reaching:
             length = goal - t
         # At the end of a step that ends at a break, signals are as before the break.
-        latest = np.nextafter(goal, t)
-        g = GAMMA * length
+        step = Step(t, length, np.nextafter(goal, t))
         counts[STEPS] += 1
-        observe(t, Y, p, w.nodes)
-        old[:] = w.nodes
-        quick = carried[0] + abs(signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1])
-        for i in range(m):
-            for k in range(m):
-                linear[i, k] = g * s.damping[i, k] + g * g * s.stiffness[i, k]
-            linear[i, i] += 1.0
-        for j in range(n):
-            # Of a force within its limit the rounding of the slip velocity may move no more.
-            softest = inertia[j] * g / GRIP
-            if w.nodes[j, LIMIT] > 0.0:
-                softest += ROUNDING * quick / w.nodes[j, LIMIT]
-            grip[j] = 1.0 / softest if inertia[j] > 0.0 else 0.0
-            multiplier[j] = force[j]
-        finest = (1e-2 * rtol + 1e-11) * max(slowest, quick)
-        good = True
-        for k in range(3):
-            node = GAMMA if k == 0 else (GAMMA + A21 if k == 1 else 1.0)
-            state = stage_states[k]
-            for i in range(m):
-                start[i], known[i] = Y[i], Y[m + i]
-                if k == 1:
-                    start[i] += length * A21 * stage_states[0, m + i]
-                    known[i] += length * A21 * accelerations[0, i]
-                elif k == 2:
-                    start[i] += length * (B1 * stage_states[0, m + i]
-                                          + B2 * stage_states[1, m + i])
-                    known[i] += length * (B1 * accelerations[0, i] + B2 * accelerations[1, i])
-                state[m + i] = Y[m + i] if k == 0 else stage_states[k - 1, m + i]
-            good = solve_stage(min(t + node * length, latest), g, start, known, state, p, grip,
-                               multiplier, side, stage_force[k], room, linear, system_matrix,
-                               floor, rtol, finest)
-            if not good:
-                break
-            for i in range(m):
-                accelerations[k, i] = (state[m + i] - known[i]) / g
-            multiplier[:] = stage_force[k]
-        if not good:
+        moved = ground_motion(t, p.system)
+        observe(moved, Y, p, w.nodes)
+        room.old[:] = w.nodes
+        quick = largest[SLIP_SIZE] + abs(moved.speed)
+        _prepare(step, quick, p, progress, w, room)
+        finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
+        solved = _solve_stages(step, finest, p, limits, progress, room)
+        if solved < STAGES:
             counts[REJECTED] += 1
             h = 0.25 * length
             if h < tiny:
-                clock[0], clock[1] = t, h
-                return DIVERGED if not math.isfinite(state[m]) else STUCK
+                clock[TIME], clock[LENGTH] = t, h
+                return STUCK if math.isfinite(room.states[solved, m]) else DIVERGED
             continue
-
-        for i in range(m):
-            start[i] = length * (ERROR_1 * stage_states[0, m + i] + ERROR_2 * stage_states[1, m + i]
-                                 + GAMMA * stage_states[2, m + i])
-            known[i] = length * (ERROR_1 * accelerations[0, i] + ERROR_2 * accelerations[1, i]
-                                 + GAMMA * accelerations[2, i])
-        for i in range(m):
-            for k in range(m):
-                known[i] -= g * s.stiffness[i, k] * start[k]
-        filtered = np.linalg.solve(system_matrix, known)
-        worst = 0.0
-        for i in range(m):
-            place = start[i] + g * filtered[i]
-            worst = max(worst, abs(place) / (rtol * (floor[i] + abs(Y[i]))),
-                        abs(filtered[i]) / (rtol * (floor[m + i] + abs(Y[m + i]))))
+        worst = _error(step, p, limits, Y, room)
         if worst > 1.0:
             counts[REJECTED] += 1
             in_a_row += 1
@@ -242,58 +392,31 @@ def run_steps(
             factor = 0.9 * worst ** (-1.0 / 3.0) if in_a_row == 1 else 0.7 / worst
             h = length * max(factor, 0.02)
             if h < tiny:
-                clock[0], clock[1] = t, h
+                clock[TIME], clock[LENGTH] = t, h
                 return STUCK
             continue
-
-        for k in range(3):
-            node = GAMMA if k == 0 else (GAMMA + A21 if k == 1 else 1.0)
-            moment = min(t + node * length, latest)
-            observe(moment, stage_states[k], p, w.nodes)
-            body_powers(moment, stage_states[k], s, rates[k])
-            contact_powers(moment, s, w.nodes, stage_force[k], True, rates[k])
+        _set_rates(step, p, w, room)
         if not known_before:
-            before[:m] = accelerations[0]
-            before[m:] = rates[0]
+            room.before[:m] = room.accelerations[0]
+            room.before[m:] = room.rates[0]
         if cuts < CUTS:
-            part = _passed_over(t, length, before, accelerations[2], old, p,
-                                rtol * (slowest + quick), floor, rtol, w.nodes, cubic, speed,
-                                halves)
+            part = _passed_over(step, p, limits, limits.rtol * (slowest + quick), w, room)
             if part * length > tiny and part < 1.0:
                 counts[REJECTED] += 1
                 cuts += 1
                 h = part * length
                 continue
         for j in range(n):
-            carried[0] = max(carried[0], abs(w.nodes[j, SLIP]))
-        new[: 2 * m] = stage_states[2]
-        for i in range(EFFORTS + n):
-            new[2 * m + i] = Y[2 * m + i] + length * (
-                B1 * rates[0, i] + B2 * rates[1, i] + GAMMA * rates[2, i])
-        reached = goal if reaching else t + length
-        after[:m] = accelerations[2]
-        after[m:] = rates[2]
-        if counts[STARTED] == 0:
-            counts[STARTED] = 1
-            force[:] = stage_force[0]
-        while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= reached:
-            row = counts[OUTPUTS]
-            _output(row, times[row], t, reached - t, Y, before, after, new, p, force,
-                    stage_force[2], w, states, friction, normal)
-            counts[OUTPUTS] += 1
-        t = reached
-        Y[:] = new
-        before[:] = after
+            largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.nodes[j, SLIP]))
+        _set_end(length, m, progress, room)
+        t = goal if reaching else t + length
+        _accept(step, t, p, progress, output, w, room)
         known_before = True
-        force[:] = stage_force[2]
-        if reaching and stop < len(stops) and goal == stops[stop]:
+        if reaching and stop < len(limits.stops) and goal == limits.stops[stop]:
             stop += 1
             known_before = False
-            work = drive_jump(latest, t, Y, s)
-            Y[2 * m] += work
-            if counts[OUTPUTS] > 0 and times[counts[OUTPUTS] - 1] == t:
-                states[counts[OUTPUTS] - 1, 2 * m] += work
+            _pass_break(step, t, p, progress, output)
         in_a_row, cuts = 0, 0
         h = length * min(8.0, max(0.3, 0.9 * max(worst, 1e-12) ** (-1.0 / 3.0)))
-    clock[0], clock[1] = t, h
+    clock[TIME], clock[LENGTH] = t, h
     return FINISHED if t >= end else GOING_ON

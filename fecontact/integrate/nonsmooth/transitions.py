@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.integrate.nonsmooth.equations import derivative, solve, speed_rate
+from fecontact.integrate.nonsmooth.equations import derivative, solve_small, speed_rate
 from fecontact.integrate.nonsmooth.problem import (
     CURVED,
     FIXED,
@@ -25,6 +25,7 @@ from fecontact.integrate.nonsmooth.problem import (
     SLOPE,
     STICK,
 )
+from fecontact.system.kernels import CONTACT_DAMPING
 
 SWEEPS = 20000
 
@@ -47,7 +48,7 @@ def hold_velocity(p, held, w, Y):
             for i in range(m):
                 total += p.rows[w.indices[a], i] * p.rows[w.indices[b], i]
             w.matrix[a, b] = total
-    solve(w.matrix, w.right, count)
+    solve_small(w, count)
     for a in range(count):
         for i in range(m):
             Y[m + i] -= p.rows[w.indices[a], i] * w.right[a]
@@ -81,16 +82,17 @@ def _least_friction(p, candidate, relative, w):
 
 
 @helper
-def decide_clusters(
-        t, Y, p, released, arrived, near, status, fresh, closed, w, out):
+def decide_clusters(t, p, progress, room, near, w, out):
     """Set the status of all clusters at a moment at which some may change.
 
-    ``released`` clusters have reached the limit of stick and slip in the sense of ``status``;
+    ``room.released`` clusters have reached the limit of stick and slip in the sense of ``status``;
     those whose slip has ``arrived`` at its end, up to the error of the step, and others with a
-    slip velocity below ``near`` stick or slip by their forces. ``fresh`` tells those that begin
-    to slip from no slip velocity.
+    slip velocity below ``near`` stick or slip by their forces. ``room.fresh`` tells those that
+    begin to slip from no slip velocity. Fills ``out`` with Y'.
     """
     clusters, m = p.rows.shape
+    Y, status, closed = progress.state, progress.status, progress.closed
+    released, arrived, fresh = room.released, room.arrived, room.fresh
     derivative(t, Y, p, status, closed, w, out)
     candidate, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
     for c in range(clusters):
@@ -188,7 +190,7 @@ def _push(p, touching, w, Y, first):
             for i in range(m):
                 total += (s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]) * s.Ty[w.indices[b], i]
             w.matrix[a, b] = total
-    solve(w.matrix, w.right, count)
+    solve_small(w, count)
     for a in range(count):
         for i in range(m):
             Y[first + i] += s.Ty[w.indices[a], i] * w.right[a]
@@ -205,16 +207,18 @@ def _pack(touching, w, column):
 
 
 @helper
-def resolve_impacts(t, Y, p, touched, parting, slow, height, brief, status, closed, fresh, w, out):
-    """Impacts of the ``touched`` nodes, then which stops stay closed.
+def resolve_impacts(t, p, progress, room, slow, height, brief, w, out):
+    """Impacts of the ``room.touched`` nodes, then which stops stay closed.
 
-    ``parting`` nodes were closed and lift off. After the impact, stops whose penetration rate is
-    below ``slow``, or whose rebound is lower than the rounding of the ``height`` [m] or shorter
+    ``room.parting`` nodes were closed and lift off. After the impact, stops whose penetration rate
+    is below ``slow``, or whose rebound is lower than the rounding of the ``height`` [m] or shorter
     than the time ``brief`` [s], close if a force presses them. Returns the longest flight that a
-    rebound may take [s], infinite if none.
+    rebound may take [s], infinite if none, and fills ``out`` with Y'.
     """
     s = p.system
     n, m = s.Tx.shape
+    Y, status, closed = progress.state, progress.status, progress.closed
+    touched, parting, fresh = room.touched, room.parting, room.fresh[len(p.rows):]
     touching = np.zeros(n, np.bool_)
     for j in range(n):
         touching[j] = touched[j] or closed[j] or parting[j]
@@ -237,7 +241,7 @@ def resolve_impacts(t, Y, p, touched, parting, slow, height, brief, status, clos
             Y[m + i] += s.Ty[j, i] * w.right[j]
     for i in range(m):
         before -= 0.5 * Y[m + i] * Y[m + i]
-    Y[2 * m + 6] += before
+    Y[2 * m + CONTACT_DAMPING] += before
 
     derivative(t, Y, p, status, closed, w, out)
     closed[:] = False

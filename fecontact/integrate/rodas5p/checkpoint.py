@@ -33,7 +33,7 @@ class Checkpoint:
     def of(cls, path: Path, run: Run, state: Array) -> "Checkpoint":
         """The checkpoint of a run that has not begun, from a state."""
         mark = hashlib.sha256()
-        for item in (*_leaves(run.arrays), *_leaves(run.control), run.times, state,
+        for item in (*_leaves(run.problem), run.times, state,
                      run.watch.own_parameters, run.watch.stick_speed):
             # Addresses of laws are integers, and differ from process to process.
             if np.asarray(item).dtype.kind == "f":

@@ -15,13 +15,13 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.event_arrays import watch_for
-from fecontact.integrate.rodas5p.run import Run, Vary
-from fecontact.integrate.rodas5p.state import Control, progress_for, room_for
+from fecontact.integrate.rodas5p.run import Run
+from fecontact.integrate.rodas5p.state import Control, Output, Problem, progress_for, room_for
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
-from fecontact.integrate.rodas5p.variational import variation_for
+from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import POWERS
+from fecontact.system.kernels import POWER_COUNT
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.
@@ -113,9 +113,10 @@ def start(
     first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * longest)
     return Run(
-        system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), times, control,
+        Problem(system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), control),
         progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
-        np.zeros((len(times), len(state))), np.zeros((len(times), len(POWERS) + n)),
+        Output(times, np.zeros((len(times), len(state))),
+               np.zeros((len(times), POWER_COUNT + n))),
         Vary(above.arrays, below.arrays, width, variation_for(
             columns, m, n, states, width, float(vary_rtol or _LOOSER * rtol),
             1.0 if vary_rtol else _FADED),
@@ -220,9 +221,8 @@ def integrate(
     if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
         times = np.append(times, run.time)
         states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
-    powers = len(POWERS)
-    return Solution(times, states, work[:, :powers], ended, statistics,
-                    node_friction_work=work[:, powers:], events=run.events)
+    return Solution(times, states, work[:, :POWER_COUNT], ended, statistics,
+                    node_friction_work=work[:, POWER_COUNT:], events=run.events)
 
 
 ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,

@@ -43,13 +43,14 @@ def set_given(t, s, given, pull):
             given[DRIVE_X + axis] = value
             given[DRIVE_X_RATE + axis] = rate
     given[TRAVEL], given[SPEED] = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    for i in range(len(pull)):
-        pull[i] = (s.constant_load[i] + given[DRIVE_X] * s.drive_shapes[0, i]
-                   + given[DRIVE_Y] * s.drive_shapes[1, i])
-    for k in range(len(s.load)):
-        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
-        for i in range(len(pull)):
-            pull[i] += value * s.load_shapes[k, i]
+    kernels.set_load(t, given[DRIVE_X], given[DRIVE_Y], s, pull)
+
+
+@helper
+def motion_of(j, w):
+    """Motion of node j, as :func:`project` puts it into w (3, 2 n)."""
+    n = w.shape[1] // 2
+    return kernels.NodeMotion(w[0, j], w[0, n + j], w[1, j], w[1, n + j])
 
 
 @helper
@@ -93,14 +94,14 @@ def set_rate(y, s, shapes, given, pull, w, small, rate):
     m, rows = shapes.shape
     n = rows // 2
     states = (len(y) - 2 * m) // n
-    places, speeds, forces = w[0], w[1], w[2]
-    project(shapes, y, places, speeds)
+    forces = w[2]
+    project(shapes, y, w[0], w[1])
+    moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
     force, rates = small.force[0], small.rates[0]
     for j in range(n):
         first = 2 * m + j * states
-        F, R, _, _, _, _ = kernels.node_forces(
-            j, places[j], places[n + j], speeds[j], speeds[n + j],
-            y[first : first + s.memory[j]], given[TRAVEL], given[SPEED], s, force, rates)
+        F, R, _ = kernels.node_forces(j, motion_of(j, w), moved, y[first : first + s.memory[j]],
+                                      s, force, rates)
         forces[j] = -R
         forces[n + j] = F
         for k in range(states):
@@ -114,14 +115,14 @@ def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):
     m, rows = shapes.shape
     n = rows // 2
     states = (len(y) - 2 * m) // n
-    places, speeds, forces = w[0], w[1], w[2]
-    project(shapes, y, places, speeds)
+    forces = w[2]
+    project(shapes, y, w[0], w[1])
+    moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
     for j in range(n):
         first = 2 * m + j * states
-        F, R = kernels.node_gradients(
-            j, places[j], places[n + j], speeds[j], speeds[n + j],
-            y[first : first + s.memory[j]], given[TRAVEL], given[SPEED], s,
-            out.force[j], out.rates[j], out.partial[j])
+        F, R, _ = kernels.node_gradients(j, motion_of(j, w), moved,
+                                         y[first : first + s.memory[j]], s, out.force[j],
+                                         out.rates[j], out.partial[j])
         forces[j] = -R
         forces[n + j] = F
         for k in range(states):

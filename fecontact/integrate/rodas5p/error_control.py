@@ -5,7 +5,7 @@ import numpy as np
 from fecontact.core.compiled import helper
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
-from fecontact.system.kernels import powers
+from fecontact.system.kernels import POWER_COUNT, powers
 
 
 @helper
@@ -51,14 +51,14 @@ def slip_error(error, s, shapes, control, progress, room):
 
 
 @helper
-def energy_scale(control, progress, room):
+def _energy_scale(control, progress, room):
     """The largest of kinetic energy, work of a power and the energy scale so far [J]."""
     m = len(control.largest)
     kinetic = 0.0
     for i in range(m):
         kinetic += 0.5 * room.after[m + i] ** 2
     energy = max(max(progress.numbers[ENERGY], kinetic), control.energy_scale)
-    for k in range(8):
+    for k in range(POWER_COUNT):
         energy = max(energy, abs(progress.work[k]))
     progress.numbers[ENERGY] = energy
     return energy
@@ -103,19 +103,7 @@ _DIFFERENCE = _third_difference()
 
 
 @helper
-def work_error(h, power):
-    """Estimated error of the work of the system's powers in a step, the largest of them [J]."""
-    largest = 0.0
-    for k in range(8):
-        difference = 0.0
-        for point in range(4):
-            difference += _DIFFERENCE[point] * power[point, k]
-        largest = max(largest, abs(difference))
-    return h * largest
-
-
-@helper
-def add_up(t, h, latest, s, progress, room):
+def _set_powers(step, s, progress, room):
     """Fill ``room.power`` with the powers at the points of a step."""
     for k in range(len(progress.power)):
         room.power[0, k] = progress.power[k]
@@ -125,8 +113,29 @@ def add_up(t, h, latest, s, progress, room):
             state = room.right
         else:
             state = room.after
-        powers(min(t + _POINTS[point] * h, latest), state, s, room.power[point, :8],
-               room.power[point, 8:])
+        powers(min(step.t + _POINTS[point] * step.h, step.latest), state, s,
+               room.power[point, :POWER_COUNT], room.power[point, POWER_COUNT:])
+
+
+@helper
+def _quadrature_error(h, power):
+    """Estimated error of the work of the system's powers in a step, the largest of them [J]."""
+    largest = 0.0
+    for k in range(POWER_COUNT):
+        difference = 0.0
+        for point in range(4):
+            difference += _DIFFERENCE[point] * power[point, k]
+        largest = max(largest, abs(difference))
+    return h * largest
+
+
+@helper
+def work_error(step, problem, progress, room):
+    """Error of the work in a step; fills ``room.power`` with the powers at the points of it."""
+    control = problem.control
+    _set_powers(step, problem.system, progress, room)
+    return _quadrature_error(step.h, room.power) / (
+        control.rtol * _energy_scale(control, progress, room))
 
 
 @helper

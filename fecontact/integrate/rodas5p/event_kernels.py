@@ -7,7 +7,7 @@ looked at too, so that none escapes. Functions of users and the stick of frictio
 known at the looks only.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -26,10 +26,9 @@ from fecontact.core.compiled import (
 )
 from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein
-from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, changes
+from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, Course, changes
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.laws.signatures import signal_at
 from fecontact.system import kernels as kernels
 from fecontact.system.kernels import SYSTEM
 
@@ -104,8 +103,38 @@ class Watch(NamedTuple):
 WATCH = types.NamedTuple(
     [vector, vector, matrix, integers, integers, matrix, vector, integers, integers, matrix,
      integers, vector, i8, integers, matrix, matrix, integers], Watch)
-NOTE = f8(f8, f8, f8, SYSTEM, run_arrays.CONTROL, vector, run_arrays.ROOM, WATCH)
+NOTE = f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM, WATCH)
 note_events_at = function_at(NOTE)
+
+
+class _View(NamedTuple):
+    """A step that is looked into: the nodes' depths, its interpolant, and room.
+
+    ``before``, ``after`` (size,) and ``dense`` (3, size) are the interpolant; y (size,) is the
+    state that is looked at, ``force`` and ``rates`` are room for laws with memory.
+    """
+
+    step: Any
+    system: Any
+    depth: Array
+    before: Array
+    after: Array
+    dense: Array
+    y: Array
+    force: Array
+    rates: Array
+
+
+@helper
+def _view(step, problem, progress, room):
+    return _View(step, problem.system, problem.control.depth, progress.state, room.after,
+                 room.dense, room.right, room.scratch.force[0], room.scratch.rates[0])
+
+
+@helper
+def _time(part, step):
+    """Time at a part of a step."""
+    return min(step.t + part * step.h, step.latest)
 
 
 @helper
@@ -119,13 +148,12 @@ def _between(x, places, values):
 
 
 @helper
-def _zone(j, t, y, s, watch, depth, force, rates):
+def _zone_of(j, t, y, s, depth, force, rates, watch):
     """State of node j, and whether it is past the depth of its normal law."""
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    x, height, x_rate, height_rate = kernels.node_motion(j, y, s)
-    F, R, u, _, slip, _ = kernels.node_forces(j, x, height, x_rate, height_rate,
-                                              kernels.memory_of(j, y, s), travel, speed, s, force,
-                                              rates)
+    F, R, contact = kernels.node_forces(j, kernels.node_motion(j, y, s),
+                                        kernels.ground_motion(t, s), kernels.memory_of(j, y, s),
+                                        s, force, rates)
+    u, slip = contact.penetration, contact.slip
     zone = OPEN
     if F != 0.0:
         if s.memory[j] > 0 and len(watch.curve_speed) > 0 and watch.curve[j, 0] != 0.0:
@@ -134,6 +162,13 @@ def _zone(j, t, y, s, watch, depth, force, rates):
             sticks = abs(slip) < watch.stick_speed[j]
         zone = STICKING if sticks else SLIPPING
     return zone + DEEP if u > depth[j] else zone
+
+
+@helper
+def _zone(j, part, y, view, watch):
+    """As :func:`_zone_of` for a state y at a part of the step."""
+    return _zone_of(j, _time(part, view.step), y, view.system, view.depth, view.force, view.rates,
+                    watch)
 
 
 @helper
@@ -158,35 +193,35 @@ def _normal_zone(zone):
 
 
 @helper
-def _state_at(part, before, after, dense, y):
+def _look(part, view):
+    """Put the state at a part of the step into view.y."""
     if part == 1.0:
-        y[:] = after
+        view.y[:] = view.after
     else:
-        tableau.interpolated(part, before, after, dense, y)
+        tableau.interpolated(part, view.before, view.after, view.dense, view.y)
 
 
 @helper
-def _changed(j, t, h, latest, low, high, s, watch, depth, force, rates, before, after, dense, y):
+def _changed(j, low, high, view, watch):
     """Where node j leaves its state between two parts of a step, and for which; y is set there."""
     old = watch.zones[j] % DEEP
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        tableau.interpolated(middle, before, after, dense, y)
-        zone = _zone(j, min(t + middle * h, latest), y, s, watch, depth, force, rates)
-        if zone % DEEP == old:
+        tableau.interpolated(middle, view.before, view.after, view.dense, view.y)
+        if _zone(j, middle, view.y, view, watch) % DEEP == old:
             low = middle
         else:
             high = middle
-    _state_at(high, before, after, dense, y)
-    return high, _zone(j, min(t + high * h, latest), y, s, watch, depth, force, rates)
+    _look(high, view)
+    return high, _zone(j, high, view.y, view, watch)
 
 
 @helper
-def _own(k, t, h, latest, left, right, before, after, dense, watch, y):
+def _own(k, left, right, view, watch):
     """Value of a user's function at the right end, after its change of sign has been noted."""
     g, p = event_at(watch.own[k]), watch.own_parameters[k]
     old = watch.own_values[k]
-    new = g(min(t + right * h, latest), y, p)
+    new = g(_time(right, view.step), view.y, p)
     rising = old < 0.0 <= new
     falling = old > 0.0 >= new
     if not ((rising and watch.own_direction[k] >= 0) or (
@@ -195,19 +230,19 @@ def _own(k, t, h, latest, left, right, before, after, dense, watch, y):
     low, high = left, right
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        tableau.interpolated(middle, before, after, dense, y)
-        value = g(min(t + middle * h, latest), y, p)
+        tableau.interpolated(middle, view.before, view.after, view.dense, view.y)
+        value = g(_time(middle, view.step), view.y, p)
         if (value >= 0.0) if rising else (value <= 0.0):
             high = middle
         else:
             low = middle
-    _state_at(high, before, after, dense, y)
-    _note(watch, min(t + high * h, latest), FIRST_OWN + k, -1, y)
+    _look(high, view)
+    _note(watch, _time(high, view.step), FIRST_OWN + k, -1, view.y)
     return new
 
 
 @helper
-def _end(t, h, begun, watch):
+def _end(step, begun, watch):
     """Drop the events after the first at which the run stops; its part of the step, or 2."""
     stop = np.inf
     for row in range(begun, watch.counts[FOUND]):
@@ -222,7 +257,7 @@ def _end(t, h, begun, watch):
             watch.states[kept, :] = watch.states[row, :]
             kept += 1
     watch.counts[FOUND] = kept
-    return (stop - t) / h
+    return (stop - step.t) / step.h
 
 
 @kernel(types.void(f8, vector, SYSTEM, vector, WATCH, dynamics.GRADIENTS))
@@ -230,34 +265,28 @@ def begin(t, y, held_s, depth, held_watch, scratch):
     """Take the state at the start of a run for that from which things change."""
     s, watch = borrowed(held_s), borrowed(held_watch)
     for j in range(len(watch.zones)):
-        watch.zones[j] = _zone(j, t, y, s, watch, depth, scratch.force[0], scratch.rates[0])
+        watch.zones[j] = _zone_of(j, t, y, s, depth, scratch.force[0], scratch.rates[0], watch)
     for k in range(len(watch.own)):
         watch.own_values[k] = event_at(watch.own[k])(t, y, watch.own_parameters[k])
 
 
-@kernel(types.f8(f8, f8, f8, SYSTEM, vector, WATCH, dynamics.GRADIENTS, vector, vector, matrix,
-                 vector))
-def next_switch(
-    t, h, latest, held_s, held_depth, held_watch, held_scratch, held_before, held_after,
-    held_dense, held_y,
-):
+@kernel(types.f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM,
+                 WATCH))
+def next_switch(step, held_problem, held_progress, held_room, held_watch):
     """Part of the step until a normal force begins, ends or passes its depth; 1 if none does."""
-    s, watch, scratch = borrowed(held_s), borrowed(held_watch), borrowed(held_scratch)
-    depth, before, after = borrowed(held_depth), borrowed(held_before), borrowed(held_after)
-    dense, y = borrowed(held_dense), borrowed(held_y)
-    force, rates = scratch.force[0], scratch.rates[0]
+    problem, progress = borrowed(held_problem), borrowed(held_progress)
+    room, watch = borrowed(held_room), borrowed(held_watch)
+    view = _view(step, problem, progress, room)
     first = 1.0
     for j in range(len(watch.zones)):
         old = _normal_zone(watch.zones[j])
-        if _normal_zone(_zone(j, min(t + h, latest), after, s, watch, depth, force,
-                              rates)) == old:
+        if _normal_zone(_zone(j, 1.0, view.after, view, watch)) == old:
             continue
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            tableau.interpolated(middle, before, after, dense, y)
-            zone = _zone(j, min(t + middle * h, latest), y, s, watch, depth, force, rates)
-            if _normal_zone(zone) == old:
+            tableau.interpolated(middle, view.before, view.after, view.dense, view.y)
+            if _normal_zone(_zone(j, middle, view.y, view, watch)) == old:
                 low = middle
             else:
                 high = middle
@@ -281,8 +310,9 @@ def _keep_between(count, row, watch):
 
 
 @helper
-def _set_places(t, h, latest, s, control, before, room, watch):
+def _set_places(step, problem, before, room, watch):
     """Fill ``watch.places`` for a step."""
+    s, control = problem.system, problem.control
     n = len(watch.zones)
     b, row = room.bound[0], room.bound[2]
     levels = control.levels.shape[0]
@@ -298,8 +328,8 @@ def _set_places(t, h, latest, s, control, before, room, watch):
             if watch.counts[NODES] == 0 or (what == SLIP and s.memory[j] > 0) or (
                     count + MOST > len(watch.changed)):
                 continue
-            count += changes(what, j, t, h, latest, s, control.ground, room.courses, shift, b,
-                             room.halves, row, watch.changed[count : count + MOST])
+            course = Course(what, j, shift, step, s, control.ground, room.courses, row)
+            count += changes(b, course, room.halves, watch.changed[count : count + MOST])
         _keep_between(count, j, watch)
     for k in range(len(watch.own)):
         count = 0
@@ -318,81 +348,83 @@ def _set_places(t, h, latest, s, control, before, room, watch):
 
 
 @helper
-def _note_changes(
-    j, zone, t, h, latest, left, right, s, watch, depth, force, rates, before, after, dense, y,
-):
+def _note_changes(j, zone, left, right, view, watch):
     """Note what node j does between two parts of a step, at whose right end it is in a zone."""
     low = left
     for _ in range(_MOST_A_NODE):
         old = watch.zones[j] % DEEP
         if old == zone % DEEP:
             break
-        low, watch.zones[j] = _changed(j, t, h, latest, low, right, s, watch, depth, force,
-                                       rates, before, after, dense, y)
-        at, new = min(t + low * h, latest), watch.zones[j] % DEEP
+        low, watch.zones[j] = _changed(j, low, right, view, watch)
+        at, new = _time(low, view.step), watch.zones[j] % DEEP
         if old == OPEN:
-            _note(watch, at, TOUCH_DOWN, j, y)
+            _note(watch, at, TOUCH_DOWN, j, view.y)
         if new == OPEN:
-            _note(watch, at, LIFT_OFF, j, y)
+            _note(watch, at, LIFT_OFF, j, view.y)
         elif new == STICKING:
-            _note(watch, at, STICK, j, y)
+            _note(watch, at, STICK, j, view.y)
         elif old == STICKING:
-            _note(watch, at, SLIP_BEGINS, j, y)
+            _note(watch, at, SLIP_BEGINS, j, view.y)
     watch.zones[j] = zone
 
 
-def _note_events(t, h, latest, held_s, held_control, held_before, held_room, held_watch):
+@helper
+def _note_own(k, left, right, view, watch):
+    """Note the events of a user's function between two looks; view.y is the state at the right."""
+    row = len(watch.zones) + k
+    first = left
+    for i in range(watch.known[row]):
+        place = watch.places[row, i]
+        if first < place < right:
+            _look(place, view)
+            watch.own_values[k] = _own(k, first, place, view, watch)
+            first = place
+    _look(right, view)
+    watch.own_values[k] = _own(k, first, right, view, watch)
+    _look(right, view)
+
+
+@helper
+def _note_node(j, left, right, view, watch):
+    """Note the events of a node between two looks; view.y is the state at the right."""
+    first = left
+    for i in range(watch.known[j]):
+        place = watch.places[j, i]
+        if first < place < right:
+            _look(place, view)
+            zone = _zone(j, place, view.y, view, watch)
+            _note_changes(j, zone, first, place, view, watch)
+            first = place
+    if first != left:
+        _look(right, view)
+    zone = _zone(j, right, view.y, view, watch)
+    if watch.counts[NODES] == 0 or zone % DEEP == watch.zones[j] % DEEP:
+        watch.zones[j] = zone
+        return
+    _note_changes(j, zone, first, right, view, watch)
+    _look(right, view)
+
+
+def _note_events(step, held_problem, held_progress, held_room, held_watch):
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
-    s, watch, room = borrowed(held_s), borrowed(held_watch), borrowed(held_room)
-    control, before = borrowed(held_control), borrowed(held_before)
-    depth, after, dense, y = control.depth, room.after, room.dense, room.right
-    force, rates = room.scratch.force[0], room.scratch.rates[0]
+    problem, progress = borrowed(held_problem), borrowed(held_progress)
+    room, watch = borrowed(held_room), borrowed(held_watch)
+    view = _view(step, problem, progress, room)
     begun = watch.counts[FOUND]
-    n = len(watch.zones)
     looks = _LOOKS
     for k in range(len(watch.own)):
         if watch.linear[k] == 0:
             looks = _MORE_LOOKS
-    _set_places(t, h, latest, s, control, before, room, watch)
+    _set_places(step, problem, progress.state, room, watch)
     for look in range(looks):
         left, right = look / looks, (look + 1) / looks
-        _state_at(right, before, after, dense, y)
-        now = min(t + right * h, latest)
+        _look(right, view)
         for k in range(len(watch.own)):
-            first = left
-            for i in range(watch.known[n + k]):
-                place = watch.places[n + k, i]
-                if first < place < right:
-                    _state_at(place, before, after, dense, y)
-                    watch.own_values[k] = _own(k, t, h, latest, first, place, before, after,
-                                               dense, watch, y)
-                    first = place
-            _state_at(right, before, after, dense, y)
-            watch.own_values[k] = _own(k, t, h, latest, first, right, before, after, dense, watch,
-                                       y)
-            _state_at(right, before, after, dense, y)
-        for j in range(n):
-            first = left
-            for i in range(watch.known[j]):
-                place = watch.places[j, i]
-                if first < place < right:
-                    _state_at(place, before, after, dense, y)
-                    zone = _zone(j, min(t + place * h, latest), y, s, watch, depth, force, rates)
-                    _note_changes(j, zone, t, h, latest, first, place, s, watch, depth, force,
-                                  rates, before, after, dense, y)
-                    first = place
-            if first != left:
-                _state_at(right, before, after, dense, y)
-            zone = _zone(j, now, y, s, watch, depth, force, rates)
-            if watch.counts[NODES] == 0 or zone % DEEP == watch.zones[j] % DEEP:
-                watch.zones[j] = zone
-                continue
-            _note_changes(j, zone, t, h, latest, first, right, s, watch, depth, force, rates,
-                          before, after, dense, y)
-            _state_at(right, before, after, dense, y)
-    return _end(t, h, begun, watch)
+            _note_own(k, left, right, view, watch)
+        for j in range(len(watch.zones)):
+            _note_node(j, left, right, view, watch)
+    return _end(step, begun, watch)
 
 
 # By its address, so that it is not compiled into every step of runs that watch for nothing.
-note_events = compile_law(NOTE, "note_events(t, h, latest, s, control, before, room, watch)",
-                          _note_events)
+note_events = compile_law(NOTE, "note_events(step, problem, progress, room, watch)", _note_events)

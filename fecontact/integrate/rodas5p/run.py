@@ -1,7 +1,6 @@
 """A run of the compiled integrator: what it goes on from, and what it has found."""
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,21 +9,8 @@ from fecontact.core.types import Array
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import state, step_loop
 from fecontact.integrate.rodas5p.event_kernels import FOUND, Watch
-from fecontact.integrate.rodas5p.state import Control, Progress, Room
-from fecontact.integrate.rodas5p.variational import Variation
-
-
-class Vary(NamedTuple):
-    """Derivatives that go with a run, see :mod:`fecontact.integrate.rodas5p.variational`.
-
-    ``transitions`` (N, k, size) holds, for each output time, the columns since the one before.
-    """
-
-    above: Any
-    below: Any
-    width: float
-    variation: Variation
-    transitions: Array
+from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
+from fecontact.integrate.rodas5p.variational import Vary
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,28 +22,41 @@ class Run:
     status : int
         ``step_loop.RUNNING`` while output times are left, ``FINISHED``, ``MINIMUM_STEP``,
         ``NOT_FINITE``, or ``STOPPED`` at an event.
+    problem : Problem
+        What is integrated, and how finely.
+    output : Output
+        Output times and what belongs to them; rows from ``outputs`` on are not filled yet. Work
+        of the powers :data:`fecontact.system.kernels.POWERS`, then friction work of each node [J].
     variation : Vary
         Derivatives that go with the run.
-    states, work : arrays (N, 2 m + n s), (N, 8 + n)
-        At the output times; rows from ``outputs`` on are not filled yet. Work of the powers
-        :data:`fecontact.system.kernels.POWERS`, then friction work of each node [J].
     progress : Progress
         All that is needed to go on.
     watch : Watch
         What is watched for; what was found is in ``events``.
     """
 
-    arrays: Any
-    shapes: Array
-    times: Array
-    control: Control
+    problem: Problem
     progress: Progress
     room: Room
-    states: Array
-    work: Array
+    output: Output
     variation: Vary
     watch: Watch
     found: list[tuple[Array, Array]] = field(default_factory=list)
+
+    @property
+    def times(self) -> Array:
+        """Output times (N,) [s]."""
+        return self.output.times
+
+    @property
+    def states(self) -> Array:
+        """States (N, size) at the output times."""
+        return self.output.states
+
+    @property
+    def work(self) -> Array:
+        """Work (N, p + n) up to the output times [J]."""
+        return self.output.work
 
     @property
     def events(self) -> Events:
@@ -93,9 +92,8 @@ class Run:
 
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""
-        status = step_loop.advance(self.arrays, self.shapes, self.times, self.control,
-                                   self.progress, self.room, steps, self.states, self.work,
-                                   *self.variation, self.watch)
+        status = step_loop.advance(self.problem, self.progress, self.room, self.output,
+                                   self.variation, self.watch, steps)
         found = int(self.watch.counts[FOUND])
         if found:
             self.found.append((self.watch.found[:found].copy(), self.watch.states[:found].copy()))

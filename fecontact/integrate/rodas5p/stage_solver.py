@@ -20,6 +20,7 @@ import numpy as np
 from numba import types
 
 from fecontact.core.compiled import block, helper, integers, matrix, vector
+from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.dynamics import project
 
@@ -54,48 +55,12 @@ def reduced_for(modes: int, nodes: int, states: int) -> Reduced:
 
 
 @helper
-def factorise(a, pivots):
-    """LU factors of a (k, k) in place, with row interchanges; the diagonal is inverted."""
-    size = len(pivots)
-    for k in range(size):
-        row, largest = k, abs(a[k, k])
-        for i in range(k + 1, size):
-            if abs(a[i, k]) > largest:
-                row, largest = i, abs(a[i, k])
-        pivots[k] = row
-        if row != k:
-            for c in range(size):
-                a[k, c], a[row, c] = a[row, c], a[k, c]
-        a[k, k] = 1.0 / a[k, k]
-        for i in range(k + 1, size):
-            factor = a[i, k] * a[k, k]
-            a[i, k] = factor
-            for c in range(k + 1, size):
-                a[i, c] -= factor * a[k, c]
-
-
-@helper
-def back_substitute(a, pivots, x):
-    """Solve in place with the factors of :func:`factorise`."""
-    size = len(pivots)
-    for k in range(size):
-        row = pivots[k]
-        x[k], x[row] = x[row], x[k]
-    for i in range(1, size):
-        total = x[i]
-        for k in range(i):
-            total -= a[i, k] * x[k]
-        x[i] = total
-    for i in range(size - 1, -1, -1):
-        total = x[i]
-        for k in range(i + 1, size):
-            total -= a[i, k] * x[k]
-        x[i] = total * a[i, i]
-
-
-@helper
 def eliminate_memory(G, s, g, w):
-    """Fill the inverse and the weights of the nodes, by Gauss-Jordan elimination."""
+    """Fill the inverse and the weights of the nodes, by Gauss-Jordan elimination.
+
+    The inverse itself is wanted, of a few rows that need no pivoting: G outweighs the diagonal of
+    Zz, which is negative for all that relaxes.
+    """
     n, states = w.weights.shape
     for j in range(n):
         inverse = w.inverse[j]
@@ -103,7 +68,6 @@ def eliminate_memory(G, s, g, w):
             for other in range(states):
                 inverse[k, other] = -g.rates[j, k, 3 + other]
             inverse[k, k] += G
-        # G outweighs the diagonal of Zz, which is negative for all that relaxes.
         for k in range(states):
             pivot = 1.0 / inverse[k, k]
             inverse[k, k] = 1.0
@@ -200,7 +164,7 @@ def factorise_step(G, w):
         for k in range(m):
             w.factors[i, k] = -G * w.J[i, m + k] - w.J[i, k]
         w.factors[i, i] += G * G
-    factorise(w.factors, w.pivots)
+    factorise(w.factors, m, w.pivots)
 
 
 @helper
@@ -225,7 +189,7 @@ def solve_stage(G, s, shapes, g, w, r, motion, out):
         for k in range(m):
             total += w.J[i, k] * r[k]
         x[i] = total
-    back_substitute(w.factors, w.pivots, x)
+    solve(w.factors, w.pivots, x)
     for i in range(m):
         out[m + i] = x[i]
         out[i] = (r[i] + x[i]) / G

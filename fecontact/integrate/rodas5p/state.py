@@ -1,6 +1,6 @@
 """What the compiled integrator works on: limits, the state of a run, room to work in."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -10,13 +10,15 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
-from fecontact.system.kernels import POWERS
+from fecontact.system.kernels import POWER_COUNT, SYSTEM
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
 # fail may still lie ahead, else zero. ENERGY is the largest energy or work so far.
-TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS, ENERGY = range(8)
+NUMBERS = 8
+TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS, ENERGY = range(NUMBERS)
 # Entries of Progress.counts.
-STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(6)
+COUNTS = 6
+STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(COUNTS)
 
 
 class Control(NamedTuple):
@@ -70,6 +72,50 @@ class Control(NamedTuple):
 CONTROL = types.NamedTuple([vector] * 7 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
 
 
+class Problem(NamedTuple):
+    """What is integrated, and how finely.
+
+    ``shapes`` (m, 2 n) are the rows Tx, then Ty, of all contact nodes side by side.
+    """
+
+    system: Any
+    shapes: Array
+    control: Control
+
+
+PROBLEM = types.NamedTuple([SYSTEM, matrix, CONTROL], Problem)
+
+
+class Step(NamedTuple):
+    """A step that is tried.
+
+    Attributes
+    ----------
+    t, h, target : float
+        Its begin, its length, and the time at its end.
+    latest : float
+        The last time at which what is given in time counts: before ``target`` if that is a break.
+    speed : float
+        Speed of the ground just after its begin.
+    caution : float
+        Length of the step before, which failed, if this one is cut to end at a kink of the
+        forces; else zero.
+    at_break : bool
+        Whether it ends at a break.
+    """
+
+    t: float
+    h: float
+    target: float
+    latest: float
+    speed: float
+    caution: float
+    at_break: bool
+
+
+STEP_TYPE = types.NamedTuple([f8] * 6 + [types.boolean], Step)
+
+
 class Progress(NamedTuple):
     """All that a run needs to go on, bit for bit; copies of the arrays are a checkpoint.
 
@@ -81,8 +127,8 @@ class Progress(NamedTuple):
         y and y'.
     extremes : (m,) array
         Largest modal displacements so far.
-    work, power : (8 + n,) arrays
-        Work so far and powers, of the system and of each node's friction.
+    work, power : (p + n,) arrays
+        Work so far and powers: those of POWERS, p of them, then of each node's friction.
     gradients : Gradients
         Derivatives of the node forces.
     """
@@ -101,12 +147,23 @@ PROGRESS = types.NamedTuple(
     [vector, integers, vector, vector, vector, vector, vector, motion.GRADIENTS], Progress)
 
 
+class Output(NamedTuple):
+    """Output times (N,), and states (N, size) and work (N, p + n) there."""
+
+    times: Array
+    states: Array
+    work: Array
+
+
+OUTPUT = types.NamedTuple([vector, matrix, matrix], Output)
+
+
 class Room(NamedTuple):
     """Room to work in.
 
     Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
     what the names say; ``nodes`` (3, 2 n), ``given`` and ``pull`` for what acts at the time of a
-    stage, ``power`` (4, 8 + n) for a quadrature. ``ends`` to ``places`` serve to look at the
+    stage, ``power`` (4, p + n) for a quadrature. ``ends`` to ``places`` serve to look at the
     course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
     what they may do.
     """
@@ -155,7 +212,7 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
         np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
         stage, right, base, time_rate, after, rate_after,
         np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
-        np.zeros((4, len(POWERS) + nodes)), stage_solver.reduced_for(modes, nodes, states),
+        np.zeros((4, POWER_COUNT + nodes)), stage_solver.reduced_for(modes, nodes, states),
         gradients_for(nodes, states), gradients_for(nodes, states),
         np.zeros((3, 2 * nodes)), np.zeros((3, size)), np.zeros((courses.DOUBT + 1, 3 * nodes)),
         np.zeros((3, courses.COEFFICIENTS)),
@@ -164,10 +221,10 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
 
 def progress_for(state: Array, time: float, step: float, modes: int, nodes: int) -> Progress:
     """A run that is about to start."""
-    numbers = np.zeros(8)
+    numbers = np.zeros(NUMBERS)
     numbers[TIME], numbers[STEP] = time, step
     size = len(state)
     return Progress(
-        numbers, np.zeros(6, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
-        np.zeros(modes), np.zeros(len(POWERS) + nodes), np.zeros(len(POWERS) + nodes),
+        numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
+        np.zeros(modes), np.zeros(POWER_COUNT + nodes), np.zeros(POWER_COUNT + nodes),
         gradients_for(nodes, (size - 2 * modes) // nodes))

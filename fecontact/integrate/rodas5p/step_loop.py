@@ -3,12 +3,10 @@
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, borrowed, f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import borrowed, helper, i8, kernel
 from fecontact.integrate.courses import doubtful, keep_ends, restless, set_courses, set_ends
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
-    add_up,
-    energy_scale,
     set_scale,
     slip_error,
     state_error,
@@ -37,11 +35,12 @@ from fecontact.integrate.rodas5p.state import (
     STEP,
     STEPS,
     TIME,
+    Step,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
-from fecontact.integrate.rodas5p.variational import VARIATION, begin_anew, keep, propagate
+from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, propagate
 from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import SYSTEM, drive_jump, powers
+from fecontact.system.kernels import DRIVE, POWER_COUNT, drive_jump, powers
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
@@ -52,22 +51,80 @@ _MOST_AGAIN = 20
 
 
 @helper
-def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):
+def _start(t, problem, progress, room, output, watch):
+    """Prepare the first step of a run, and write its first output."""
+    s, control = problem.system, problem.control
+    dynamics.set_given(t, s, room.given, room.pull)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.shapes, room.given, room.pull,
+                                    room.nodes, progress.gradients, progress.rate)
+    if control.work:
+        powers(t, progress.state, s, progress.power[:POWER_COUNT], progress.power[POWER_COUNT:])
+    if _watched(watch) or watch.counts[KINKS]:
+        begin(t, progress.state, s, control.depth, watch, room.scratch)
+    for k in range(len(progress.state)):
+        output.states[0, k] = progress.state[k]
+    progress.counts[STARTED], progress.counts[OUTPUTS] = 1, 1
+
+
+@helper
+def _watched(watch):
+    """Whether events are watched for."""
+    return watch.counts[NODES] != 0 or len(watch.own) > 0
+
+
+@helper
+def _aim(t, h, exactly, speed, end, problem, progress, room):
+    """The next step to try, of about the length h, or ``exactly`` that, but not past a break.
+
+    A step of which one has just failed ends at a kink of the forces that lies ahead.
+    """
+    control, numbers = problem.control, progress.numbers
+    # The end, or the next break; that is approached from below.
+    stop, is_break = end, False
+    for k in range(len(control.breaks)):
+        if t < control.breaks[k] < stop:
+            stop, is_break = control.breaks[k], True
+    latest = np.nextafter(stop, t) if is_break else stop
+    target = t + h
+    if exactly:
+        target = min(target, stop)
+    elif target + 0.01 * h >= stop:
+        target = stop
+    elif target + h > stop:
+        target = t + 0.5 * (stop - t)
+    caution, limit = 0.0, numbers[CAUTIOUS]
+    if limit > 0.0:
+        reach = max(target - t, limit)
+        kink = dynamics.next_kink(progress.state, progress.rate, problem.system, problem.shapes,
+                                  progress.gradients, control.depth, control.slow, speed,
+                                  room.nodes, reach)
+        # Nearer ones are left to the error control, lest steps shrink without end.
+        if 1e-3 * limit < kink < 0.9 * reach:
+            # Rather a little too far than too short.
+            target = min(t + 1.0003 * kink, stop)
+            caution = limit
+        numbers[CAUTIOUS] = 0.0
+    return Step(t, target - t, target, latest, speed, caution, is_break and target == stop)
+
+
+@helper
+def _linearise(step, after_t, problem, progress, room):
     """What a step needs of the derivatives at its start besides the matrices."""
+    s, control = problem.system, problem.control
     m = len(control.largest)
-    later = min(t + 1e-4 * h, latest)
+    later = min(step.t + 1e-4 * step.h, step.latest)
     acceleration = 0.0
-    if later > t:
+    if later > step.t:
         speed = signal_at(s.ground_motion)(later, s.ground_motion_parameters)[1]
-        acceleration = (speed - room.given[dynamics.SPEED]) / (later - t)
+        acceleration = (speed - room.given[dynamics.SPEED]) / (later - step.t)
     for i in range(m):
         room.pull_rate[i] = 0.0
     for k in range(len(s.load)):
         rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
         for i in range(m):
             room.pull_rate[i] += rate * s.load_shapes[k, i]
-    dynamics.set_time_rate(s, shapes, room.given, acceleration, progress.gradients, room.pull_rate,
-                           room.nodes, room.time_rate)
+    dynamics.set_time_rate(s, problem.shapes, room.given, acceleration, progress.gradients,
+                           room.pull_rate, room.nodes, room.time_rate)
     for i in range(m):
         progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
         speed = abs(progress.state[m + i]) * control.largest[i]
@@ -75,25 +132,26 @@ def _linearise(t, after_t, h, latest, s, shapes, control, progress, room):
 
 
 @helper
-def _stages(t, h, latest, G, s, shapes, progress, room):
+def _stages(step, G, problem, progress, room):
     """All stages of a step, and its end in ``room.after``."""
+    s, shapes = problem.system, problem.shapes
     size = len(progress.state)
     m = len(room.pull)
-    last = t
+    last = step.t
     for i in range(tableau.STAGES):
         if i == 0:
             for k in range(size):
                 room.right[k] = progress.rate[k]
         else:
             tableau.combined(tableau.A[i], 1.0, progress.state, room.stages, room.stage)
-            now = min(t + tableau.NODES[i] * h, latest)
+            now = min(step.t + tableau.NODES[i] * step.h, step.latest)
             if now != last:
                 dynamics.set_given(now, s, room.given, room.pull)
                 last = now
             dynamics.set_rate(room.stage, s, shapes, room.given, room.pull, room.nodes,
                               room.scratch, room.base)
-            tableau.combined(tableau.C[i], 1.0 / h, room.base, room.stages, room.right)
-        factor = tableau.TIME[i] * h
+            tableau.combined(tableau.C[i], 1.0 / step.h, room.base, room.stages, room.right)
+        factor = tableau.TIME[i] * step.h
         if factor != 0.0:
             for k in range(m, size):
                 room.right[k] += factor * room.time_rate[k]
@@ -101,11 +159,139 @@ def _stages(t, h, latest, G, s, shapes, progress, room):
                                  room.nodes, room.stages[i])
     for k in range(size):
         room.after[k] = room.stage[k] + room.stages[tableau.STAGES - 1, k]
+    progress.counts[RATES] += tableau.STAGES
 
 
 @helper
-def _go_on(progress, room):
+def _attempt(step, new, end, problem, progress, room):
+    """Compute a step; ``new`` if it is the first attempt from where it begins."""
+    s = problem.system
+    G = 1.0 / (step.h * tableau.GAMMA)
+    memory = len(progress.state) > 2 * len(problem.control.largest)
+    if new:
+        _linearise(step, np.nextafter(step.t, end), problem, progress, room)
+    if memory:
+        stage_solver.eliminate_memory(G, s, progress.gradients, room.reduced)
+    if new or memory:
+        stage_solver.assemble(s, problem.shapes, progress.gradients, room.reduced)
+    stage_solver.factorise_step(G, room.reduced)
+    _stages(step, G, problem, progress, room)
+
+
+@helper
+def _error_at_end(step, end, problem, progress, room):
+    """Error of the state and of the slip velocities at the end of a step.
+
+    Where the state is within its tolerance, its rates and gradients are evaluated too.
+    """
+    s, shapes, control = problem.system, problem.shapes, problem.control
+    error = state_error(control, progress, room)
+    if error <= 1.0:
+        if step.at_break:
+            dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.pull)
+        dynamics.set_rate_and_gradients(room.after, s, shapes, room.given, room.pull, room.nodes,
+                                        room.gradients_after, room.rate_after)
+        error = slip_error(error, s, shapes, control, progress, room)
+    return error
+
+
+@helper
+def _unfelt_part(step, again, smallest, problem, progress, room):
+    """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
+    s, shapes, control = problem.system, problem.shapes, problem.control
+    if restless(step.speed, step.h, s, shapes, control, room) and again < _MOST_AGAIN:
+        set_courses(s, shapes, control.ground, progress.state, room.after, room)
+        if doubtful(step.speed, step.h, control.ground, control.levels, control.slip_scale, room):
+            part = first_unfelt_at(control.unfelt)(step, again, problem, progress, room)
+            if part * step.h > 100.0 * smallest and part < 1.0:
+                return part
+    return 1.0
+
+
+@helper
+def _switch_part(step, smallest, problem, progress, room, watch):
+    """Part of the step to which it has to be shortened, to end at a kink; 1 if there is none."""
+    part = next_switch(step, problem, progress, room, watch)
+    # Nearer to an end it is at that end, as far as the time can tell.
+    near = max(1e-6 * step.h, 100.0 * smallest)
+    if part * step.h > near and (1.0 - part) * step.h > near:
+        return part * (1.0 + 1e-9)
+    return 1.0
+
+
+@helper
+def _growth(error):
+    """Factor of the length of the next step, by the error of this one."""
+    if error > 1e-6:
+        return min(_LARGEST_FACTOR, max(_SMALLEST_FACTOR, _SAFETY * error**_POWER))
+    return _LARGEST_FACTOR
+
+
+@helper
+def _reject(step, error, progress, room):
+    """Take note of a step whose error is too large."""
+    if not error < np.inf:
+        room.stages[:] = 0.0
+    progress.counts[REJECTIONS] += 1
+    progress.numbers[REJECTED_LAST] = 1.0
+    progress.numbers[CAUTIOUS] = 0.0 if step.caution > 0.0 else step.h
+
+
+@helper
+def _find_events(step, problem, progress, room, watch):
+    """Note the events of an accepted step; the part of it after which the run ends, or 2."""
+    s, control = problem.system, problem.control
+    if _watched(watch):
+        set_courses(s, problem.shapes, control.ground, progress.state, room.after, room)
+        return note_events_at(watch.note)(step, problem, progress, room, watch)
+    if watch.counts[KINKS]:
+        begin(min(step.target, step.latest), room.after, s, control.depth, watch, room.scratch)
+    return 2.0
+
+
+@helper
+def _write(step, reached, problem, progress, room, output, vary):
+    """Write the outputs up to the time ``reached`` within the step."""
+    row = progress.counts[OUTPUTS]
+    if output.times[row] > reached:
+        return
+    if len(vary.variation.columns):
+        vary.transitions[row] = vary.variation.columns
+        begin_anew(vary.variation)
+    while row < len(output.times) and output.times[row] <= reached:
+        part = (output.times[row] - step.t) / step.h
+        tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
+        if problem.control.work:
+            work_until(part, step.h, progress.work, room.power, output.work[row])
+        row += 1
+    progress.counts[OUTPUTS] = row
+
+
+@helper
+def _stop_at(part, step, problem, progress, room):
+    """End the run at a part of the step."""
+    if problem.control.work:
+        work_until(part, step.h, progress.work, room.power, progress.work)
+    tableau.interpolated(part, progress.state, room.after, room.dense, room.right)
+    progress.state[:] = room.right
+    progress.counts[STEPS] += 1
+
+
+@helper
+def _go_on(step, problem, progress, room, output):
     """Make the end of the step the state of the run."""
+    if problem.control.work:
+        work_until(1.0, step.h, progress.work, room.power, progress.work)
+        if step.at_break:
+            powers(step.target, room.after, problem.system, progress.power[:POWER_COUNT],
+                   progress.power[POWER_COUNT:])
+            jump = drive_jump(step.latest, step.target, room.after, problem.system)
+            progress.work[DRIVE] += jump
+            last = progress.counts[OUTPUTS] - 1
+            if output.times[last] == step.target:
+                output.work[last, DRIVE] += jump
+        else:
+            progress.power[:] = room.power[3]
     for k in range(len(progress.state)):
         progress.state[k] = room.after[k]
         progress.rate[k] = room.rate_after[k]
@@ -119,209 +305,101 @@ def _go_on(progress, room):
             here.force[j, k] = there.force[j, k]
             for row in range(states):
                 here.rates[j, row, k] = there.rates[j, row, k]
+    keep_ends(n, room)
+    progress.counts[STEPS] += 1
 
 
-@kernel(types.i8(SYSTEM, matrix, vector, state.CONTROL, state.PROGRESS, state.ROOM,
-                 i8, matrix, matrix, SYSTEM, SYSTEM, f8, VARIATION, block, WATCH),
+@helper
+def _next_length(step, error, factor, longest, numbers):
+    """Length of the step after an accepted one."""
+    h = step.h
+    if numbers[LAST_STEP] > 0.0:
+        # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
+        factor = max(_SMALLEST_FACTOR, min(factor, factor * (h / numbers[LAST_STEP]) * (
+            max(error, 1e-6) / numbers[LAST_ERROR]) ** _POWER))
+    if numbers[REJECTED_LAST] != 0.0:
+        factor = min(factor, 1.0)
+    numbers[LAST_STEP], numbers[LAST_ERROR], numbers[REJECTED_LAST] = h, max(error, 1e-2), 0.0
+    if step.caution > 0.0:
+        numbers[CAUTIOUS] = step.caution
+    return min(h * factor, longest)
+
+
+@kernel(types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, VARY, WATCH, i8),
         nogil=True)
-def advance(
-    held_system, held_shapes, held_times, held_control, held_progress, held_room, most, held_out,
-    held_work, held_above, held_below, width, held_variation, held_transitions, held_watch,
-):
+def advance(held_problem, held_progress, held_room, held_output, held_vary, held_watch, most):
     """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
 
-    Fills the rows of ``out`` (N, size) and ``work`` (N, 8 + n) that belong to the output times
-    passed. A run that is continued gives the same numbers as one that was not interrupted.
+    Fills the rows of ``output`` that belong to the output times passed. A run that is continued
+    gives the same numbers as one that was not interrupted.
 
-    If the columns of ``variation`` are not empty, those that belong to each output time are put
-    into ``transitions`` (N, k, size), and begin anew there; the output times must then be breaks.
-    See :func:`fecontact.integrate.rodas5p.variational.propagate` for ``above``, ``below`` and
-    ``width``. What is watched for is noted in ``watch``; when that is full, the call returns.
+    If the columns of ``vary.variation`` are not empty, those that belong to each output time are
+    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
+    What is watched for is noted in ``watch``; when that is full, the call returns.
     """
-    s, shapes, times = borrowed(held_system), borrowed(held_shapes), borrowed(held_times)
-    control, progress, room = borrowed(held_control), borrowed(held_progress), borrowed(held_room)
-    out, work, watch = borrowed(held_out), borrowed(held_work), borrowed(held_watch)
-    above, below, variation = borrowed(held_above), borrowed(held_below), borrowed(held_variation)
-    transitions, columns = borrowed(held_transitions), variation.columns
-    watched = watch.counts[NODES] != 0 or len(watch.own) > 0
-    numbers, counts = progress.numbers, progress.counts
-    size = len(progress.state)
-    memory = size > 2 * len(control.largest)
-    t, h = numbers[TIME], numbers[STEP]
-    end = times[-1]
-    smallest = 1e-14 * max(abs(times[0]), abs(end))
+    problem, progress, room = borrowed(held_problem), borrowed(held_progress), borrowed(held_room)
+    output, vary, watch = borrowed(held_output), borrowed(held_vary), borrowed(held_watch)
+    s, control, numbers, counts = (problem.system, problem.control, progress.numbers,
+                                   progress.counts)
+    t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
+    smallest = 1e-14 * max(abs(output.times[0]), abs(end))
+    varies = len(vary.variation.columns) > 0
     if counts[STARTED] == 0:
-        dynamics.set_given(t, s, room.given, room.pull)
-        dynamics.set_rate_and_gradients(progress.state, s, shapes, room.given, room.pull,
-                                        room.nodes, progress.gradients, progress.rate)
-        if control.work:
-            powers(t, progress.state, s, progress.power[:8], progress.power[8:])
-        if watched or watch.counts[KINKS]:
-            begin(t, progress.state, s, control.depth, watch, room.scratch)
-        for k in range(size):
-            out[0, k] = progress.state[k]
-        counts[STARTED], counts[OUTPUTS] = 1, 1
-    set_ends(t, progress.state, s, shapes, control.ground, room.ends)
-    new, speed, attempts, to_switch, again = True, 0.0, 0, False, 0
-    while counts[OUTPUTS] < len(times):
+        _start(t, problem, progress, room, output, watch)
+    set_ends(t, progress.state, s, problem.shapes, control.ground, room.ends)
+    new, speed, attempts, exactly, again = True, 0.0, 0, False, 0
+    while counts[OUTPUTS] < len(output.times):
         # A step that failed is repeated before the call returns: derivatives are not kept.
-        if new and (attempts >= most or (watched and full(watch))):
+        if new and (attempts >= most or (_watched(watch) and full(watch))):
             break
         attempts += 1
-        # The end, or the next break; that is approached from below.
-        stop, is_break = end, False
-        for k in range(len(control.breaks)):
-            if t < control.breaks[k] < stop:
-                stop, is_break = control.breaks[k], True
-        latest = np.nextafter(stop, t) if is_break else stop
-        target = t + h
-        if to_switch:
-            target = min(target, stop)
-        elif target + 0.01 * h >= stop:
-            target = stop
-        elif target + h > stop:
-            target = t + 0.5 * (stop - t)
         if new:
             # Rates just after t: they may jump at a break.
             dynamics.set_given(np.nextafter(t, end), s, room.given, room.pull)
             speed = room.given[dynamics.SPEED]
-        limited, caution = False, numbers[CAUTIOUS]
-        if caution > 0.0:
-            reach = max(target - t, caution)
-            kink = dynamics.next_kink(progress.state, progress.rate, s, shapes, progress.gradients,
-                                      control.depth, control.slow, speed, room.nodes, reach)
-            # Nearer ones are left to the error control, lest steps shrink without end.
-            if 1e-3 * caution < kink < 0.9 * reach:
-                # Rather a little too far than too short.
-                target = min(t + 1.0003 * kink, stop)
-                limited = True
-            numbers[CAUTIOUS] = 0.0
-        h = target - t
-
-        G = 1.0 / (h * tableau.GAMMA)
-        if new:
-            _linearise(t, np.nextafter(t, end), h, latest, s, shapes, control, progress, room)
-        if memory:
-            stage_solver.eliminate_memory(G, s, progress.gradients, room.reduced)
-        if new or memory:
-            stage_solver.assemble(s, shapes, progress.gradients, room.reduced)
+        step = _aim(t, h, exactly, speed, end, problem, progress, room)
+        _attempt(step, new, end, problem, progress, room)
         new = False
-        stage_solver.factorise_step(G, room.reduced)
-        _stages(t, h, latest, G, s, shapes, progress, room)
-        counts[RATES] += tableau.STAGES
-        error = state_error(control, progress, room)
-        if error <= 1.0:
-            if is_break and target == stop:
-                dynamics.set_given(np.nextafter(stop, end), s, room.given, room.pull)
-            dynamics.set_rate_and_gradients(room.after, s, shapes, room.given, room.pull,
-                                            room.nodes, room.gradients_after, room.rate_after)
-            error = slip_error(error, s, shapes, control, progress, room)
+
+        error, part = _error_at_end(step, end, problem, progress, room), 1.0
         if error <= 1.0:
             tableau.dense_coefficients(room.stages, room.dense)
-            if restless(speed, h, s, shapes, control, room) and again < _MOST_AGAIN:
-                set_courses(s, shapes, control.ground, progress.state, room.after, room)
-                if doubtful(speed, h, control.ground, control.levels, control.slip_scale, room):
-                    part = first_unfelt_at(control.unfelt)(
-                        t, h, latest, again, s, shapes, control, progress, room)
-                    if part * h > 100.0 * smallest and part < 1.0:
-                        counts[REJECTIONS] += 1
-                        h *= part
-                        to_switch = True
-                        again += 1
-                        continue
-            if control.work:
-                add_up(t, h, latest, s, progress, room)
-                error = max(error, work_error(h, room.power) / (
-                    control.rtol * energy_scale(control, progress, room)))
-
-        if error <= 1.0 and watch.counts[KINKS]:
-            part = next_switch(t, h, latest, s, control.depth, watch, room.scratch, progress.state,
-                               room.after, room.dense, room.right)
-            # Nearer to an end it is at that end, as far as the time can tell.
-            near = max(1e-6 * h, 100.0 * smallest)
-            if part * h > near and (1.0 - part) * h > near:
-                counts[REJECTIONS] += 1
-                h *= part * (1.0 + 1e-9)
-                to_switch = True
-                continue
-        to_switch = False
-        if error <= 1.0 and len(columns):
-            set_scale(control, progress, room)
-            error = max(error, propagate(
-                t, h, latest, G, s, above, below, width, shapes, control.slip_scale, control.depth,
-                control.memory_scale, progress.state, progress.gradients, room.reduced,
-                room.stages, room.right, variation) / variation.tolerance)
-
-        factor = _LARGEST_FACTOR
-        if error > 1e-6:
-            factor = min(_LARGEST_FACTOR, max(_SMALLEST_FACTOR, _SAFETY * error**_POWER))
-        if not error <= 1.0:
-            if not error < np.inf:
-                room.stages[:] = 0.0
+            part = _unfelt_part(step, again, smallest, problem, progress, room)
+            if part < 1.0:
+                again += 1
+            elif control.work:
+                error = max(error, work_error(step, problem, progress, room))
+        if error <= 1.0 and part == 1.0 and watch.counts[KINKS]:
+            part = _switch_part(step, smallest, problem, progress, room, watch)
+        exactly = part < 1.0
+        if exactly:
             counts[REJECTIONS] += 1
-            numbers[REJECTED_LAST] = 1.0
-            numbers[CAUTIOUS] = 0.0 if limited else h
-            h *= factor
+            h = step.h * part
+            continue
+        if error <= 1.0 and varies:
+            set_scale(control, progress, room)
+            error = max(error, propagate(step, problem, progress, room, vary)
+                        / vary.variation.tolerance)
+        factor = _growth(error)
+        if not error <= 1.0:
+            _reject(step, error, progress, room)
+            h = step.h * factor
             if not h >= smallest:
                 numbers[TIME], numbers[STEP] = t, h
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
 
-        ends = 2.0
-        if watched:
-            set_courses(s, shapes, control.ground, progress.state, room.after, room)
-            ends = note_events_at(watch.note)(
-                t, h, latest, s, control, progress.state, room, watch)
-        elif watch.counts[KINKS]:
-            begin(min(target, latest), room.after, s, control.depth, watch, room.scratch)
-        reached = target if ends > 1.0 else t + ends * h
-
-        if len(columns):
-            keep(variation)
-        row = counts[OUTPUTS]
-        if times[row] <= reached:
-            if len(columns):
-                transitions[row] = columns
-                begin_anew(variation)
-            while row < len(times) and times[row] <= reached:
-                part = (times[row] - t) / h
-                tableau.interpolated(part, progress.state, room.after, room.dense, out[row])
-                if control.work:
-                    work_until(part, h, progress.work, room.power, work[row])
-                row += 1
-            counts[OUTPUTS] = row
+        ends = _find_events(step, problem, progress, room, watch)
+        reached = step.target if ends > 1.0 else t + ends * step.h
+        if varies:
+            keep(vary.variation)
+        _write(step, reached, problem, progress, room, output, vary)
         if ends <= 1.0:
-            if control.work:
-                work_until(ends, h, progress.work, room.power, progress.work)
-            tableau.interpolated(ends, progress.state, room.after, room.dense, room.right)
-            progress.state[:] = room.right
-            numbers[TIME], numbers[STEP] = reached, h
-            counts[STEPS] += 1
+            _stop_at(ends, step, problem, progress, room)
+            numbers[TIME], numbers[STEP] = reached, step.h
             return STOPPED
-        if control.work:
-            work_until(1.0, h, progress.work, room.power, progress.work)
-            if is_break and target == stop:
-                powers(stop, room.after, s, progress.power[:8], progress.power[8:])
-                jump = drive_jump(latest, stop, room.after, s)
-                progress.work[0] += jump
-                if times[row - 1] == stop:
-                    work[row - 1, 0] += jump
-            else:
-                progress.power[:] = room.power[3]
-        _go_on(progress, room)
-        keep_ends(len(s.gap), room)
-        t = target
-        new, again = True, 0
-        counts[STEPS] += 1
-        if numbers[LAST_STEP] > 0.0:
-            # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
-            factor = max(_SMALLEST_FACTOR, min(factor, factor * (h / numbers[LAST_STEP]) * (
-                max(error, 1e-6) / numbers[LAST_ERROR]) ** _POWER))
-        if numbers[REJECTED_LAST] != 0.0:
-            factor = min(factor, 1.0)
-        numbers[LAST_STEP], numbers[LAST_ERROR], numbers[REJECTED_LAST] = h, max(error, 1e-2), 0.0
-        if limited:
-            numbers[CAUTIOUS] = caution
-        h = min(h * factor, control.longest)
+        _go_on(step, problem, progress, room, output)
+        t, new, again = step.target, True, 0
+        h = _next_length(step, error, factor, control.longest, numbers)
     numbers[TIME], numbers[STEP] = t, h
-    return FINISHED if counts[OUTPUTS] == len(times) else RUNNING
+    return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING

@@ -9,21 +9,20 @@ The step is then taken anew to a place within that stretch: its end feels the fo
 estimate of the error sees it.
 """
 
-from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8, matrix
+from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8
 from fecontact.integrate.courses import (
     COEFFICIENTS,
     DOUBT,
     GAP,
     SLIP,
+    Course,
     at,
     changes,
 )
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.laws.signatures import friction_at, normal_at
-from fecontact.system.kernels import SYSTEM
 
-_UNFELT = f8(f8, f8, f8, i8, SYSTEM, matrix, run_arrays.CONTROL, run_arrays.PROGRESS,
-             run_arrays.ROOM)
+_UNFELT = f8(run_arrays.STEP_TYPE, i8, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM)
 first_unfelt_at = function_at(_UNFELT)
 
 # An unfelt impulse counts from this part of the tolerance on.
@@ -77,55 +76,71 @@ def _unfelt_rub(j, inside, F, slip, ends, s):
     return force if force > 2.0 * abs(rub(ends, F, p)[0]) else 0.0
 
 
-def _first_unfelt(
-    t, h, latest, again, held_s, held_shapes, held_control, held_progress, held_room,
-):
+@helper
+def _largest(begin, end, b, course):
+    """Largest value of a course between two parts of the step, its place, and that at the ends.
+
+    Only ends of the step itself count; zero where neither lies between the parts.
+    """
+    place, largest, ends = begin, 0.0, 0.0
+    for look in range(_LOOKS + 1):
+        part = begin + (end - begin) * look / _LOOKS
+        value = at(part, b, course)
+        if abs(value) > abs(largest):
+            largest, place = value, part
+        if (part == 0.0 or part == 1.0) and abs(value) > abs(ends):
+            ends = value
+    return place, largest, ends
+
+
+@helper
+def _normal_force(place, course, height):
+    """Magnitude of the normal force of the course's node at a part of the step, without damping."""
+    s, n = course.system, len(course.system.gap)
+    for i in range(COEFFICIENTS):
+        height[i] = course.courses[i, n + course.node]
+    gap = Course(GAP, course.node, 0.0, course.step, s, course.bounds, course.courses, course.row)
+    return abs(_push(course.node, -at(place, height, gap), 0.0, s))
+
+
+def _first_unfelt(step, again, held_problem, held_progress, held_room):
     """Part of the step at which to end it because of what it did not feel; 2 if there is nothing.
 
     It is the earliest such place of all nodes: just past the begin of the stretch, or, when this
     is not the first attempt (``again``) or the begin is that of the step, where the force is
     largest.
     """
-    s, shapes, room = borrowed(held_s), borrowed(held_shapes), borrowed(held_room)
-    control, progress = borrowed(held_control), borrowed(held_progress)
-    courses, bounds, levels = room.courses, control.ground, control.levels
-    b, height, row, places = room.bound[0], room.bound[1], room.bound[2], room.places
+    problem, progress = borrowed(held_problem), borrowed(held_progress)
+    room = borrowed(held_room)
+    s, shapes, control = problem.system, problem.shapes, problem.control
+    levels, places = control.levels, room.places
+    b, height, row = room.bound[0], room.bound[1], room.bound[2]
     n = len(s.gap)
     first = 2.0
     for column in range(2 * n):
         what, j = (SLIP, column) if column < n else (GAP, column - n)
-        if courses[DOUBT, column] == 0.0 or (what == SLIP and s.memory[j] > 0):
+        if room.courses[DOUBT, column] == 0.0 or (what == SLIP and s.memory[j] > 0):
             continue
         for level in range(levels.shape[0] if what == GAP else 1):
             shift = levels[level, j] if what == GAP else 0.0
-            found = changes(what, j, t, h, latest, s, bounds, courses, shift, b, room.halves, row,
-                            places)
+            course = Course(what, j, shift, step, s, control.ground, room.courses, row)
+            found = changes(b, course, room.halves, places)
             for k in range(found + 1):
                 begin = places[k - 1] if k > 0 else 0.0
                 end = places[k] if k < found else 1.0
                 if begin >= first:
                     break
-                place, largest, ends = begin, 0.0, 0.0
-                for look in range(_LOOKS + 1):
-                    part = begin + (end - begin) * look / _LOOKS
-                    value = at(what, part, j, t, h, latest, s, bounds, courses, shift, b, row)
-                    if abs(value) > abs(largest):
-                        largest, place = value, part
-                    if (part == 0.0 or part == 1.0) and abs(value) > abs(ends):
-                        ends = value
-                inside, brief = begin > 0.0 and end < 1.0, (end - begin) * h
+                place, largest, ends = _largest(begin, end, b, course)
+                inside, brief = begin > 0.0 and end < 1.0, (end - begin) * step.h
                 force = 0.0
                 if what == GAP:
                     force = _unfelt_push(j, inside, shift, largest, ends, brief, s)
                 elif abs(largest) > control.slip_scale[j]:
-                    for i in range(COEFFICIENTS):
-                        height[i] = courses[i, n + j]
-                    F = abs(_push(j, -at(GAP, place, j, t, h, latest, s, bounds, courses, 0.0,
-                                         height, row), 0.0, s))
+                    F = _normal_force(place, course, height)
                     if F > 0.0:
                         force = _unfelt_rub(j, inside, F, largest, ends, s)
-                if force > 0.0 and _matters(2.0 / 3.0 * force * brief, column, h, shapes, control,
-                                            progress):
+                if force > 0.0 and _matters(2.0 / 3.0 * force * brief, column, step.h, shapes,
+                                            control, progress):
                     if again == 0 and begin > 0.0:
                         place = begin + _JUST_PAST * (end - begin)
                     first = min(first, place)
@@ -133,6 +148,5 @@ def _first_unfelt(
 
 
 # By its address: few steps need it, and it need not be compiled into all.
-first_unfelt = compile_law(
-    _UNFELT, "first_unfelt(t, h, latest, again, s, shapes, control, progress, room)",
-    _first_unfelt)
+first_unfelt = compile_law(_UNFELT, "first_unfelt(step, again, problem, progress, room)",
+                           _first_unfelt)

@@ -13,17 +13,17 @@ H_i and p_i are differences over steps that are small against the scales of the 
 but beside kinks.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import block, borrowed, f8, helper, kernel, matrix, vector
 from fecontact.core.types import Array
-from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
+from fecontact.integrate.rodas5p import dynamics, tableau
+from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
-from fecontact.laws.signatures import ground_at, signal_at
-from fecontact.system.kernels import SYSTEM
+from fecontact.system.kernels import SYSTEM, ground_motion, node_contact
 
 # Differences are taken over this part of the scales of the laws.
 _PART = 1e-4
@@ -32,17 +32,17 @@ _JUMP = 3.0 * _PART
 
 
 @helper
-def probing_distance(u, shapes, slip_scale, depth, memory_scale, w):
+def probing_distance(u, shapes, control, w):
     """Multiple e of the stage u that is small against the scales of all laws."""
     m, rows = shapes.shape
     n = rows // 2
     dynamics.project(shapes, u, w[0], w[1])
     largest = 1.0
     for j in range(n):
-        largest = max(largest, abs(w[1, j]) / slip_scale[j])
-        largest = max(largest, abs(w[0, n + j]) / depth[j])
-    for k in range(len(memory_scale)):
-        largest = max(largest, abs(u[2 * m + k]) / memory_scale[k])
+        largest = max(largest, abs(w[1, j]) / control.slip_scale[j])
+        largest = max(largest, abs(w[0, n + j]) / control.depth[j])
+    for k in range(len(control.memory_scale)):
+        largest = max(largest, abs(u[2 * m + k]) / control.memory_scale[k])
     return _PART / largest
 
 
@@ -82,14 +82,11 @@ def learn(here, usual):
 @helper
 def set_sinking(t, y, s, shapes, v, out):
     """Fill out (2, n): slope of the ground under each node, and rate of its penetration."""
-    n = len(s.abscissa)
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
+    moved = ground_motion(t, s)
     dynamics.project(shapes, y, v.nodes[0], v.nodes[1])
-    for j in range(n):
-        xi = s.abscissa[j] + v.nodes[0, j] - travel
-        slope = ground_at(s.profile)(xi, s.profile_parameters)[1]
-        out[0, j] = slope
-        out[1, j] = slope * (v.nodes[1, j] - speed) - v.nodes[1, n + j]
+    for j in range(len(s.abscissa)):
+        contact = node_contact(j, dynamics.motion_of(j, v.nodes), moved, s)
+        out[0, j], out[1, j] = contact.slope, contact.rate
 
 
 @helper
@@ -137,8 +134,8 @@ class Variation(NamedTuple):
     least : (k,) array
         What these are at least: what makes the column of a parameter, which begins at zero,
         worth attention.
-    stages : (8 k, size) array
-        U_i of column c in row 8 c + i.
+    stages : (STAGES k, size) array
+        U_i of column c in row STAGES c + i.
     tolerance, faded : float
         Error of a column in a step that is allowed, in units of its size; of the part ``faded``
         of the largest size that it has had where it is smaller.
@@ -181,6 +178,24 @@ VARIATION = types.NamedTuple(
     + [dynamics.GRADIENTS] * 4, Variation)
 
 
+class Vary(NamedTuple):
+    """Derivatives that go with a run.
+
+    ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
+    with width = 0 no parameter varies. ``transitions`` (N, k, size) holds, for each output time,
+    the columns since the one before.
+    """
+
+    above: Any
+    below: Any
+    width: float
+    variation: Variation
+    transitions: Array
+
+
+VARY = types.NamedTuple([SYSTEM, SYSTEM, f8, VARIATION, block], Vary)
+
+
 def variation_for(
     columns: int, modes: int, nodes: int, states: int, width: float, tolerance: float,
     faded: float,
@@ -209,12 +224,14 @@ def variation_for(
 
 
 @helper
-def _rates_between(t, Y, above, below, shapes, v, factor, rate, other, out):
+def _rates_between(t, Y, shapes, vary, factor, out):
     """Fill out = factor (f of the system above less f of that below)."""
-    dynamics.set_given(t, above, v.given, v.pull)
-    dynamics.set_rate(Y, above, shapes, v.given, v.pull, v.nodes, v.behind, rate)
-    dynamics.set_given(t, below, v.given, v.pull)
-    dynamics.set_rate(Y, below, shapes, v.given, v.pull, v.nodes, v.behind, other)
+    v = vary.variation
+    rate, other = v.vectors[4], v.vectors[5]
+    dynamics.set_given(t, vary.above, v.given, v.pull)
+    dynamics.set_rate(Y, vary.above, shapes, v.given, v.pull, v.nodes, v.behind, rate)
+    dynamics.set_given(t, vary.below, v.given, v.pull)
+    dynamics.set_rate(Y, vary.below, shapes, v.given, v.pull, v.nodes, v.behind, other)
     for k in range(len(Y)):
         out[k] = factor * (rate[k] - other[k])
 
@@ -236,69 +253,61 @@ def _largest_error(scale, v):
     return largest
 
 
-@kernel(types.f8(f8, f8, f8, f8, SYSTEM, SYSTEM, SYSTEM, f8, matrix, vector, vector, vector,
-                 vector, dynamics.GRADIENTS, stage_solver.REDUCED, matrix, vector, VARIATION))
-def propagate(
-    t, h, latest, G, held_s, held_above, held_below, width, held_shapes, held_slip, held_depth,
-    held_memory, held_state, held_gradients, held_reduced, held_stages, held_scale, held_v,
-):
-    """Carry the columns over the step from t to t + h whose stages and factors are given.
+@kernel(types.f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM,
+                 VARY))
+def propagate(step, held_problem, held_progress, held_room, held_vary):
+    """Carry the columns over the step whose stages and factors the room holds.
 
-    Returns the largest error of a column in units of its size, or of the part ``v.faded`` of the
-    largest it has been, with ``scale`` (size,) as the units of the state; columns of a parameter
-    that are still faint count as if they were not.
-
-    ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
-    with width = 0 no parameter varies.
+    Returns the largest error of a column in units of its size, or of the part ``faded`` of the
+    largest it has been, with ``room.right`` (size,) as the units of the state; columns of a
+    parameter that are still faint count as if they were not.
     """
-    s, shapes, v = borrowed(held_s), borrowed(held_shapes), borrowed(held_v)
-    above, below = borrowed(held_above), borrowed(held_below)
-    slip_scale, depth, memory_scale = (borrowed(held_slip), borrowed(held_depth),
-                                       borrowed(held_memory))
-    state, gradients = borrowed(held_state), borrowed(held_gradients)
-    reduced, stages, scale = borrowed(held_reduced), borrowed(held_stages), borrowed(held_scale)
+    problem, progress = borrowed(held_problem), borrowed(held_progress)
+    room, vary = borrowed(held_room), borrowed(held_vary)
+    s, shapes, v = problem.system, problem.shapes, vary.variation
+    state, gradients, reduced, stages = (progress.state, progress.gradients, room.reduced,
+                                         room.stages)
     size = len(state)
     m = len(v.none)
     w = v.nodes
-    Y, right, forced, rate, other = (v.vectors[0], v.vectors[1], v.vectors[3], v.vectors[4],
-                                     v.vectors[5])
-    ahead, behind = v.ahead, v.behind
+    Y, right, forced, rate = v.vectors[0], v.vectors[1], v.vectors[3], v.vectors[4]
+    varies = vary.width != 0.0
+    G = 1.0 / (step.h * tableau.GAMMA)
     if size == 2 * m:
         columns.set_solver(G, reduced, v)
-    set_sinking(t, state, s, shapes, v, v.sinking)
+    set_sinking(step.t, state, s, shapes, v, v.sinking)
+    speed = ground_motion(step.t, s).speed
     for i in range(tableau.STAGES):
-        now = t if i == 0 else min(t + tableau.NODES[i] * h, latest)
+        now = step.t if i == 0 else min(step.t + tableau.NODES[i] * step.h, step.latest)
         tableau.combined(tableau.A[i], 1.0, state, stages, Y)
         dynamics.set_given(now, s, v.given, v.pull)
         dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.inside, rate)
         learn(v.inside, v.usual)
-        advance = tableau.TIME[i] * h
-        reach = probing_distance(stages[i], shapes, slip_scale, depth, memory_scale, w)
-        if width != 0.0:
-            _rates_between(now, Y, above, below, shapes, v, 1.0 / width, rate, other, forced)
+        advance = tableau.TIME[i] * step.h
+        reach = probing_distance(stages[i], shapes, problem.control, w)
+        if varies:
+            _rates_between(now, Y, shapes, vary, 1.0 / vary.width, forced)
         for side in range(2):
             e = reach if side == 0 else -reach
             for k in range(size):
                 Y[k] = state[k] + e * stages[i, k]
-            later = t + e * advance
-            if width != 0.0:
-                _rates_between(later, Y, above, below, shapes, v, 0.5 / (e * width), rate, other,
-                               right)
+            later = step.t + e * advance
+            if varies:
+                _rates_between(later, Y, shapes, vary, 0.5 / (e * vary.width), right)
                 for k in range(size):
                     forced[k] += right[k]
             dynamics.set_given(later, s, v.given, v.pull)
             if side == 0:
-                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, ahead, rate)
+                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.ahead, rate)
             else:
-                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, behind, rate)
-        differences(ahead, gradients, behind, v.usual, 1.0 / reach, stages[i],
-                     signal_at(s.ground_motion)(t, s.ground_motion_parameters)[1] * advance,
-                     v.sinking, shapes, w)
+                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.behind, rate)
+        differences(v.ahead, gradients, v.behind, v.usual, 1.0 / reach, stages[i],
+                    speed * advance, v.sinking, shapes, w)
         if size > 2 * m:
-            columns.one_by_one(i, h, G, s, shapes, gradients, reduced, forced, width != 0.0, v)
+            columns.one_by_one(i, step.h, G, s, shapes, gradients, reduced, forced, varies, v)
         else:
-            columns.all_at_once(i, h, G, s, shapes, reduced, forced, width != 0.0, v)
-    return _largest_error(scale, v)
+            columns.all_at_once(i, step.h, G, s, shapes, reduced, forced, varies, v)
+    return _largest_error(room.right, v)
 
 
 @helper

@@ -8,6 +8,7 @@ columns go at once, by dense matrices of the size of the modes; else each goes f
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.dense_lu import solve
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 
 # Products of matrices with more multiplications than these go to BLAS.
@@ -24,7 +25,7 @@ def set_solver(G, reduced, v):
             x[i] = reduced.J[i, c] if c < m else 0.0
         if c >= m:
             x[c - m] = G
-        stage_solver.back_substitute(reduced.factors, reduced.pivots, x)
+        solve(reduced.factors, reduced.pivots, x)
         for i in range(m):
             v.solver[i, c] = x[i]
 

@@ -1,59 +1,13 @@
-"""Elimination with row interchanges of one small matrix, or of eight of the same size at once.
+"""Elimination with row interchanges of eight matrices of the same size at once, one in each lane.
 
-A matrix a (rows, columns) is more wide than high; of it the first ``count`` columns are
-eliminated. In place of these stand the factors of the rows, and on the diagonal the inverse pivots.
+Each interval of an orbit gives a matrix of some ten to a hundred rows, too small for vector
+instructions to pay; eight of them side by side are not. This takes 1.7 times less time than
+:mod:`fecontact.core.dense_lu` for eight matrices of 8 rows, 2.5 times for 16 rows and 3.5 times
+for 48. What is left in place of a matrix is the same; arrays have a last axis of eight lanes.
 """
 
+from fecontact.bifurcation.linalg.simd import WIDTH, magnitude, read, spread, where_larger, write
 from fecontact.core.compiled import helper
-from fecontact.core.simd import WIDTH, magnitude, read, spread, where_larger, write
-
-
-@helper
-def factorise(a, count, pivots):
-    """Eliminate the first columns of a (rows, columns) in place, with row interchanges."""
-    rows, columns = a.shape
-    for k in range(count):
-        row, largest = k, abs(a[k, k])
-        for i in range(k + 1, rows):
-            if abs(a[i, k]) > largest:
-                row, largest = i, abs(a[i, k])
-        pivots[k] = row
-        if row != k:
-            for c in range(columns):
-                a[k, c], a[row, c] = a[row, c], a[k, c]
-        inverse = 1.0 / a[k, k]
-        a[k, k] = inverse
-        i = k + 1
-        while i + 3 < rows:
-            f0, f1 = a[i, k] * inverse, a[i + 1, k] * inverse
-            f2, f3 = a[i + 2, k] * inverse, a[i + 3, k] * inverse
-            a[i, k], a[i + 1, k], a[i + 2, k], a[i + 3, k] = f0, f1, f2, f3
-            for c in range(k + 1, columns):
-                pivot = a[k, c]
-                a[i, c] -= f0 * pivot
-                a[i + 1, c] -= f1 * pivot
-                a[i + 2, c] -= f2 * pivot
-                a[i + 3, c] -= f3 * pivot
-            i += 4
-        while i < rows:
-            factor = a[i, k] * inverse
-            a[i, k] = factor
-            for c in range(k + 1, columns):
-                a[i, c] -= factor * a[k, c]
-            i += 1
-
-
-@helper
-def forward(a, count, pivots, r):
-    """Apply to a right side r (rows,) what :func:`factorise` did to the rows."""
-    for k in range(count):
-        row = pivots[k]
-        r[k], r[row] = r[row], r[k]
-    for i in range(1, len(r)):
-        total = r[i]
-        for k in range(min(i, count)):
-            total -= a[i, k] * r[k]
-        r[i] = total
 
 
 @helper
@@ -88,9 +42,10 @@ def _with_pivot(a, k, order, room):
 
 @helper
 def eliminate_lanes(a, count, order, room):
-    """As :func:`factorise` for a (rows, columns, 8); ``order`` (rows, 8) is filled.
+    """Eliminate the first columns of a (rows, columns, 8); ``order`` (rows, 8) is filled.
 
-    Four columns are eliminated from the rows below at once: less is read and written.
+    ``order`` says which row came to each place; ``room`` (8,) is overwritten. Four columns are
+    eliminated from the rows below at once: less is read and written.
     """
     rows, columns, _ = a.shape
     for i in range(rows):
@@ -132,19 +87,8 @@ def eliminate_lanes(a, count, order, room):
 
 
 @helper
-def reduce_row(a, count, row, weights):
-    """Eliminate the first entries of a further row (columns,); ``weights`` (count,) says how."""
-    columns = len(row)
-    for k in range(count):
-        factor = row[k] * a[k, k]
-        weights[k] = factor
-        for c in range(k + 1, columns):
-            row[c] -= factor * a[k, c]
-
-
-@helper
 def reduce_row_lanes(a, count, row, weights):
-    """As :func:`reduce_row`, for a row (columns, 8)."""
+    """Eliminate the first entries of a further row (columns, 8)."""
     columns = len(row)
     for k in range(count):
         factor = read(row[k]) * read(a[k, k])
@@ -155,7 +99,7 @@ def reduce_row_lanes(a, count, row, weights):
 
 @helper
 def forward_lanes(a, count, r):
-    """As :func:`forward`, for r (rows, 8) whose rows are in their order already."""
+    """Reduce a right side r (rows, 8) whose rows are in their ``order`` already."""
     rows = len(r)
     for k in range(count):
         known = read(r[k])
