@@ -155,7 +155,6 @@ def test_branches_that_cannot_be_followed_are_named(study, monkeypatch, capsys):
     (["--set", 'branch.switch=["hopf"]'], "switch = 'hopf' is not known"),
     (["--set", "branch.point=D"], "'D'"),
     (["--set", "branch.parameter=ground.sped"], "did you mean 'ground.speed'"),
-    (["--bounds", "1e-2"], "--bounds"),
     (["--set", "branch.kind=orbits"], "give transient"),
     (["--set", "drive.damping_x=300.0", "--set", "branch.kind=orbits", "--set",
       "branch.transient=20.0", "--set",

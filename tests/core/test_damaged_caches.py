@@ -8,9 +8,10 @@ from unittest import mock
 
 import numba
 import pytest
-from fecontact.core.simd import WIDTH
 
-from fecontact.core import compiled, simd
+from fecontact.bifurcation.linalg import simd
+from fecontact.bifurcation.linalg.simd import WIDTH
+from fecontact.core import compiled
 
 MODULE = '''
 from fecontact.core.compiled import compile_law, f8, kernel

@@ -187,8 +187,8 @@ def test_loads_at_points():
     assert load.forces[0] is force
     assert load == Load(5.0, (force, PointLoad(3, "phi", signal=Constant(1.0))))
     assert hash(load) == hash(Load(5.0, load.forces))
-    assert (PointLoad(signal=Constant(1.0)).point, PointLoad(signal=Constant(1.0)).direction) == (
-        "C", "y")
+    usual = PointLoad(signal=Constant(1.0))
+    assert (usual.point, usual.component) == ("C", "y")
 
 
 @pytest.mark.parametrize(("kind", "values", "message"), [

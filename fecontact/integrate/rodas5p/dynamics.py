@@ -35,15 +35,15 @@ GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
 
 
 @helper
-def set_given(t, s, given, pull):
-    """Fill ``given`` (6,) with what is given at time t, and ``pull`` (m,) with its modal force."""
+def set_given(t, s, given, load):
+    """Fill ``given`` (6,) with what is given at time t, and ``load`` (m,) with its modal force."""
     for axis in range(2):
         if s.drive_stiffness[axis] != 0.0:
             value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
             given[DRIVE_X + axis] = value
             given[DRIVE_X_RATE + axis] = rate
     given[TRAVEL], given[SPEED] = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    kernels.set_load(t, given[DRIVE_X], given[DRIVE_Y], s, pull)
+    kernels.set_load(t, given[DRIVE_X], given[DRIVE_Y], s, load)
 
 
 @helper
@@ -75,11 +75,11 @@ def project(shapes, y, places, speeds):
 
 
 @helper
-def gather(y, s, shapes, pull, forces, rate):
+def gather(y, s, shapes, load, forces, rate):
     """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -R, then all F."""
     m, rows = shapes.shape
     for i in range(m):
-        total = pull[i]
+        total = load[i]
         for k in range(m):
             total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
         for j in range(rows):
@@ -89,15 +89,15 @@ def gather(y, s, shapes, pull, forces, rate):
 
 
 @helper
-def set_rate(y, s, shapes, given, pull, w, small, rate):
-    """Fill ``rate`` (size,) with y'. ``w`` (3, 2 n) and ``small`` are room to work in."""
+def set_rate(y, s, shapes, given, load, w, scratch, rate):
+    """Fill ``rate`` (size,) with y'. ``w`` (3, 2 n) and ``scratch`` are room to work in."""
     m, rows = shapes.shape
     n = rows // 2
     states = (len(y) - 2 * m) // n
     forces = w[2]
     project(shapes, y, w[0], w[1])
     moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
-    force, rates = small.force[0], small.rates[0]
+    force, rates = scratch.force[0], scratch.rates[0]
     for j in range(n):
         first = 2 * m + j * states
         F, R, _ = kernels.node_forces(j, motion_of(j, w), moved, y[first : first + s.memory[j]],
@@ -106,11 +106,11 @@ def set_rate(y, s, shapes, given, pull, w, small, rate):
         forces[n + j] = F
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
-    gather(y, s, shapes, pull, forces, rate)
+    gather(y, s, shapes, load, forces, rate)
 
 
 @helper
-def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):
+def set_rate_and_gradients(y, s, shapes, given, load, w, out, rate):
     """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
     m, rows = shapes.shape
     n = rows // 2
@@ -127,7 +127,7 @@ def set_rate_and_gradients(y, s, shapes, given, pull, w, out, rate):
         forces[n + j] = F
         for k in range(states):
             rate[first + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
-    gather(y, s, shapes, pull, forces, rate)
+    gather(y, s, shapes, load, forces, rate)
 
 
 @helper

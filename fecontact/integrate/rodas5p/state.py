@@ -162,7 +162,7 @@ class Room(NamedTuple):
     """Room to work in.
 
     Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
-    what the names say; ``nodes`` (3, 2 n), ``given`` and ``pull`` for what acts at the time of a
+    what the names say; ``nodes`` (3, 2 n), ``given`` and ``load`` for what acts at the time of a
     stage, ``power`` (4, p + n) for a quadrature. ``ends`` to ``places`` serve to look at the
     course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
     what they may do.
@@ -178,7 +178,7 @@ class Room(NamedTuple):
     rate_after: Array
     nodes: Array
     given: Array
-    pull: Array
+    load: Array
     pull_rate: Array
     power: Array
     reduced: stage_solver.Reduced

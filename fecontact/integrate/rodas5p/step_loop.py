@@ -54,8 +54,8 @@ _MOST_AGAIN = 20
 def _start(t, problem, progress, room, output, watch):
     """Prepare the first step of a run, and write its first output."""
     s, control = problem.system, problem.control
-    dynamics.set_given(t, s, room.given, room.pull)
-    dynamics.set_rate_and_gradients(progress.state, s, problem.shapes, room.given, room.pull,
+    dynamics.set_given(t, s, room.given, room.load)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.shapes, room.given, room.load,
                                     room.nodes, progress.gradients, progress.rate)
     if control.work:
         powers(t, progress.state, s, progress.power[:POWER_COUNT], progress.power[POWER_COUNT:])
@@ -136,7 +136,7 @@ def _stages(step, G, problem, progress, room):
     """All stages of a step, and its end in ``room.after``."""
     s, shapes = problem.system, problem.shapes
     size = len(progress.state)
-    m = len(room.pull)
+    m = len(room.load)
     last = step.t
     for i in range(tableau.STAGES):
         if i == 0:
@@ -146,9 +146,9 @@ def _stages(step, G, problem, progress, room):
             tableau.combined(tableau.A[i], 1.0, progress.state, room.stages, room.stage)
             now = min(step.t + tableau.NODES[i] * step.h, step.latest)
             if now != last:
-                dynamics.set_given(now, s, room.given, room.pull)
+                dynamics.set_given(now, s, room.given, room.load)
                 last = now
-            dynamics.set_rate(room.stage, s, shapes, room.given, room.pull, room.nodes,
+            dynamics.set_rate(room.stage, s, shapes, room.given, room.load, room.nodes,
                               room.scratch, room.base)
             tableau.combined(tableau.C[i], 1.0 / step.h, room.base, room.stages, room.right)
         factor = tableau.TIME[i] * step.h
@@ -188,8 +188,8 @@ def _error_at_end(step, end, problem, progress, room):
     error = state_error(control, progress, room)
     if error <= 1.0:
         if step.at_break:
-            dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.pull)
-        dynamics.set_rate_and_gradients(room.after, s, shapes, room.given, room.pull, room.nodes,
+            dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.load)
+        dynamics.set_rate_and_gradients(room.after, s, shapes, room.given, room.load, room.nodes,
                                         room.gradients_after, room.rate_after)
         error = slip_error(error, s, shapes, control, progress, room)
     return error
@@ -355,7 +355,7 @@ def advance(held_problem, held_progress, held_room, held_output, held_vary, held
         attempts += 1
         if new:
             # Rates just after t: they may jump at a break.
-            dynamics.set_given(np.nextafter(t, end), s, room.given, room.pull)
+            dynamics.set_given(np.nextafter(t, end), s, room.given, room.load)
             speed = room.given[dynamics.SPEED]
         step = _aim(t, h, exactly, speed, end, problem, progress, room)
         _attempt(step, new, end, problem, progress, room)

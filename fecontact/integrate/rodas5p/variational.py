@@ -165,7 +165,7 @@ class Variation(NamedTuple):
     nodes: Array
     sinking: Array
     given: Array
-    pull: Array
+    load: Array
     none: Array
     inside: dynamics.Gradients
     ahead: dynamics.Gradients
@@ -228,10 +228,10 @@ def _rates_between(t, Y, shapes, vary, factor, out):
     """Fill out = factor (f of the system above less f of that below)."""
     v = vary.variation
     rate, other = v.vectors[4], v.vectors[5]
-    dynamics.set_given(t, vary.above, v.given, v.pull)
-    dynamics.set_rate(Y, vary.above, shapes, v.given, v.pull, v.nodes, v.behind, rate)
-    dynamics.set_given(t, vary.below, v.given, v.pull)
-    dynamics.set_rate(Y, vary.below, shapes, v.given, v.pull, v.nodes, v.behind, other)
+    dynamics.set_given(t, vary.above, v.given, v.load)
+    dynamics.set_rate(Y, vary.above, shapes, v.given, v.load, v.nodes, v.behind, rate)
+    dynamics.set_given(t, vary.below, v.given, v.load)
+    dynamics.set_rate(Y, vary.below, shapes, v.given, v.load, v.nodes, v.behind, other)
     for k in range(len(Y)):
         out[k] = factor * (rate[k] - other[k])
 
@@ -280,8 +280,8 @@ def propagate(step, held_problem, held_progress, held_room, held_vary):
     for i in range(tableau.STAGES):
         now = step.t if i == 0 else min(step.t + tableau.NODES[i] * step.h, step.latest)
         tableau.combined(tableau.A[i], 1.0, state, stages, Y)
-        dynamics.set_given(now, s, v.given, v.pull)
-        dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.inside, rate)
+        dynamics.set_given(now, s, v.given, v.load)
+        dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.load, w, v.inside, rate)
         learn(v.inside, v.usual)
         advance = tableau.TIME[i] * step.h
         reach = probing_distance(stages[i], shapes, problem.control, w)
@@ -296,11 +296,11 @@ def propagate(step, held_problem, held_progress, held_room, held_vary):
                 _rates_between(later, Y, shapes, vary, 0.5 / (e * vary.width), right)
                 for k in range(size):
                     forced[k] += right[k]
-            dynamics.set_given(later, s, v.given, v.pull)
+            dynamics.set_given(later, s, v.given, v.load)
             if side == 0:
-                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.ahead, rate)
+                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.load, w, v.ahead, rate)
             else:
-                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.pull, w, v.behind, rate)
+                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.load, w, v.behind, rate)
         differences(v.ahead, gradients, v.behind, v.usual, 1.0 / reach, stages[i],
                     speed * advance, v.sinking, shapes, w)
         if size > 2 * m:
