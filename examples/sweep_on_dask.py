@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 import fecontact as fc
-from fecontact.laws import Bound
+from fecontact.study import Span
 from fecontact.sweeps import dask_executor
 
 STUDY = Path(__file__).with_name("sweep_stick_slip.toml")
-AXES = {"ground.speed": Bound(1e-3, 12e-3, 12),
-        "friction.static_coefficient": Bound(0.6, 0.9, 5)}
+AXES = {"ground.speed": Span(1e-3, 12e-3, 12),
+        "friction.static_coefficient": Span(0.6, 0.9, 5)}
 
 
 def start(folder: str, *command: str) -> "subprocess.Popen[bytes]":

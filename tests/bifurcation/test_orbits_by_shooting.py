@@ -69,10 +69,10 @@ def test_events_agree_with_collocation(two_masses):
     near = max((at for at in orbits.points if at.parameter < 7.6), key=lambda at: at.parameter)
     beyond = min((at for at in orbits.points if at.parameter > 7.7), key=lambda at: at.parameter)
     wanted = (near.values["period"] + beyond.values["period"]) / 2.0
-    settings = ContinuationOptions(step=0.02, points=10, stop_at=["period"],
-                                   events={"period": lambda values: values["period"] - wanted})
+    options = ContinuationOptions(step=0.02, points=10, stop_at=["period"],
+                                  events={"period": lambda values: values["period"] - wanted})
     places = [orbit_branch(field, near.orbit(field, 2000), "B", method=method, bounds=(7.0, 8.3),
-                           options=settings).of_kind("period")[0].parameter
+                           options=options).of_kind("period")[0].parameter
               for method in (Shooting(), Collocation(intervals=100))]
     assert near.parameter < places[0] < beyond.parameter
     assert places[0] == pytest.approx(places[1], rel=1e-8)
@@ -112,14 +112,14 @@ def island():
         system, FOLD + 0.1 * (1.0 - p * p)))})
 
 
-def on_island(two_masses, settings, segments=4):
+def on_island(two_masses, options, segments=4):
     _, _, orbits = two_masses
     near = min((at for at in orbits.points if at.values["stable"]),
                key=lambda at: abs(at.parameter - 0.95))
     motion = replace(near.orbit(samples=2000),
                      parameter_values=[np.sqrt(1.0 - (near.parameter - FOLD) / 0.1)])
     return orbit_branch(island(), motion, method=Shooting(segments), bounds=(-1.5, 1.5),
-                        options=settings)
+                        options=options)
 
 
 @pytest.mark.parametrize("segments", [1, 4])

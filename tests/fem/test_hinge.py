@@ -43,7 +43,7 @@ def test_effective_mass_at_the_contact_is_the_moment_of_inertia_over_length_squa
 
 def test_the_hole_turns_as_a_whole_in_every_mode():
     body = pendulum("quadrilateral")
-    shapes = modal_basis(body, 6, contact_nodes=3).field.shapes
+    shapes = modal_basis(body, 6, contact_nodes=3).mode_shapes.shapes
     rim = np.unique(body.edge_nodes(body.mesh.boundaries["pivot"]))
     arm = body.nodes[rim] - np.array([0.0, 0.033 / 2])
     for mode in range(6):

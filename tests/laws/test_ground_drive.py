@@ -187,7 +187,7 @@ def test_loads_at_points():
     assert load.forces[0] is force
     assert load == Load(5.0, (force, PointLoad(3, "phi", signal=Constant(1.0))))
     assert hash(load) == hash(Load(5.0, load.forces))
-    assert (PointLoad(signal=Constant(1.0)).point, PointLoad(signal=Constant(1.0)).direction) == (
+    assert (PointLoad(signal=Constant(1.0)).point, PointLoad(signal=Constant(1.0)).component) == (
         "C", "y")
 
 

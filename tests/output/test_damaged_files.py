@@ -8,12 +8,13 @@ import pytest
 from sweep_study import Serial, write_study
 from synthetic import basis, run
 
-from fecontact import InputError, Range, read_case, sweep, write_case
+from fecontact import InputError, read_case, sweep, write_case
 from fecontact.bifurcation import Branch, BranchPoint, BranchStatus
 from fecontact.bifurcation.continuation.points import details_of
 from fecontact.core.files.stored import DamagedError, npz_arrays
 from fecontact.integrate import Events
 from fecontact.io import read_basis, read_branches, read_table, write_basis, write_branches
+from fecontact.study import Span
 
 
 @pytest.fixture(scope="module")
@@ -220,7 +221,7 @@ SHARDS = {
 def swept(tmp_path_factory):
     folder = tmp_path_factory.mktemp("swept")
     study = write_study(folder)
-    sweep(study, {"ground.speed": Range(1e-3, 2e-3, 2)}, Serial(), folder=folder / "f",
+    sweep(study, {"ground.speed": Span(1e-3, 2e-3, 2)}, Serial(), folder=folder / "f",
           summaries=["amplitude_x"])
     return study, folder / "f"
 
@@ -232,7 +233,7 @@ def test_a_damaged_shard_is_one_sentence(swept, content):
     shard.write_text(content)
     try:
         with pytest.raises(InputError) as caught:
-            sweep(study, {"ground.speed": Range(1e-3, 2e-3, 2)}, Serial(), folder=folder,
+            sweep(study, {"ground.speed": Span(1e-3, 2e-3, 2)}, Serial(), folder=folder,
                   summaries=["amplitude_x"], resume=True)
         assert str(caught.value).startswith(
             f"{shard} is damaged; remove it, and its cases are computed again")

@@ -557,7 +557,7 @@ def test_an_index_that_cannot_be_written_is_no_success(tmp_path, capsys):
     assert "index.csv cannot be written" in said.err
     (tmp_path / "s" / "index.csv").rmdir()
     assert execute([*tokens, "--resume"]) == 0
-    assert len(fe.read_table(tmp_path / "s" / "index.csv")) == 2
+    assert len(fe.io.read_table(tmp_path / "s" / "index.csv")) == 2
 
 
 @pytest.mark.parametrize("name", ["10:00.mp4", "-y.mp4", "pipe:1.mp4", "concat:a|b.mp4", "%d.mp4"])

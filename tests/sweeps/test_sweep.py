@@ -198,8 +198,8 @@ def test_bodies_that_change_are_computed_once_each(study, tmp_path, monkeypatch)
     from fecontact.study import BasisSettings
 
     made = []
-    original = BasisSettings.basis
-    monkeypatch.setattr(BasisSettings, "basis",
+    original = BasisSettings.modal_basis
+    monkeypatch.setattr(BasisSettings, "modal_basis",
                         lambda self, body: made.append(body.thickness) or original(self, body))
     axes = {"ground.speed": [1e-3, 2e-3, 3e-3], "body.thickness": [0.1, 0.15]}
     table = sweep(study, axes, Serial(), folder=tmp_path / "f", batch=2)
