@@ -74,7 +74,7 @@ def ensemble(
     systems: ContactSystem | Sequence[ContactSystem],
     times: ArrayLike,
     *,
-    initial: Initial | Sequence[Any] | Array = "rest",
+    initial: Initial | Sequence[Any] = "rest",
     rtol: float = 1e-6,
     max_step: float | None = None,
     chain: int = 1,

@@ -205,7 +205,7 @@ def test_no_solution_near_the_start():
     ({"step": 0.2}, "step = 0.2 must lie between"),
     ({"bounds": (1.0, 1.0)}, "the smaller one first"),
 ])
-def test_settings_are_checked(options, message):
+def test_options_are_checked(options, message):
     with pytest.raises(InputError, match=message):
         ContinuationOptions(**options)
 
