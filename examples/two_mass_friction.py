@@ -73,8 +73,8 @@ def diagram_over_B() -> dict[str, Branch]:
     field, bounds = oscillator(B=0.3), (0.3, 10.0)
     sliding = equilibrium_branch(field, parameter="B", bounds=bounds)
     first_hopf, second_hopf = sliding.of_kind("Hopf")
-    settings = ContinuationOptions(step=0.005, largest_step=0.04)
-    orbits = orbit_branch(field, first_hopf, method=Collocation(intervals=100), options=settings,
+    options = ContinuationOptions(step=0.005, largest_step=0.04)
+    orbits = orbit_branch(field, first_hopf, method=Collocation(intervals=100), options=options,
                           bounds=bounds, scales=SMALL)
     branches = {"steady sliding": sliding, "orbits": orbits}
     near = ContinuationOptions(step=0.005, largest_step=0.03)
@@ -84,7 +84,7 @@ def diagram_over_B() -> dict[str, Branch]:
                               bounds=bounds if period == 2 else (8.0, 9.6))
         branches[f"period {period}"] = orbits
     branches["second branch"] = orbit_branch(field, second_hopf, method=Collocation(intervals=100),
-                                             options=settings, bounds=bounds, scales=SMALL)
+                                             options=options, bounds=bounds, scales=SMALL)
     return branches | doubled(field, branches["second branch"], bounds, "second branch, period 2")
 
 
@@ -92,13 +92,13 @@ def doubled(
     field: ContactField, orbits: Branch, bounds: tuple[float, float], name: str,
 ) -> dict[str, Branch]:
     """Orbits of twice the period from each doubling of a branch, those once that lie on several."""
-    settings = ContinuationOptions(step=0.005, largest_step=0.04, points=300)
+    options = ContinuationOptions(step=0.005, largest_step=0.04, points=300)
     found: dict[str, Branch] = {}
     for point in orbits.of_kind("period doubling"):
         if not any(abs(place.parameter - point.parameter) < 1e-5
                    for other in found.values() for place in other.special):
             label = name + "'" * len(found)
-            found[label] = orbit_branch(field, point, options=settings, bounds=bounds)
+            found[label] = orbit_branch(field, point, options=options, bounds=bounds)
     return found
 
 
@@ -106,11 +106,11 @@ def diagram_over_speed() -> dict[str, Branch]:
     """Orbits over v_0 from both Hopf points, B = 20, D = 0.1."""
     field, bounds = oscillator(B=20.0, v0=8.0), (1.2, 8.0)
     sliding = equilibrium_branch(field, parameter="ground.speed", bounds=bounds, direction=-1.0)
-    settings = ContinuationOptions(step=0.005, largest_step=0.04, points=600)
+    options = ContinuationOptions(step=0.005, largest_step=0.04, points=600)
     branches = {"steady sliding": sliding}
     for name, point in zip(("orbits", "second branch"), sliding.of_kind("Hopf"), strict=True):
         branches[name] = orbit_branch(field, point, method=Collocation(intervals=100),
-                                      options=settings, bounds=bounds, scales=LARGE)
+                                      options=options, bounds=bounds, scales=LARGE)
     return branches | doubled(field, branches["orbits"], bounds, "period 2")
 
 

@@ -5,8 +5,8 @@ Geometry, mesh, :class:`ElasticBody`, :class:`ModalBasis`, :class:`ContactSystem
 The public names stand in ``__init__.pyi``; each is loaded when it is first used.
 """
 
-import lazy_loader
+from fecontact.core.namespace import namespace
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

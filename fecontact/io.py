@@ -1,5 +1,5 @@
 """Files: bases, branches and tables, matrices of other programs, and exports."""
 
-import lazy_loader
+from fecontact.core.namespace import namespace
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub("fecontact", __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

@@ -1,5 +1,5 @@
 """All plots: each takes what it draws, returns the matplotlib Figure and may write a file."""
 
-import lazy_loader
+from fecontact.core.namespace import namespace
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub("fecontact", __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import pydoc
+import re
 import subprocess
 import sys
 import textwrap
@@ -34,6 +35,35 @@ def test_every_name_has_one_place():
     assert len(fecontact.__all__) < 60
     assert set(NAMESPACES) <= set(fecontact.__all__)
     assert fecontact.laws.LuGreFriction.__module__ == "fecontact.laws.friction.bristle"
+
+
+@pytest.mark.parametrize(("space", "name", "told"), [
+    ("fecontact", "LuGreFriction", "it is fecontact.laws.LuGreFriction."),
+    ("fecontact.laws", "simulate", "it is fecontact.simulate."),
+    ("fecontact.laws", "LugreFriction", "did you mean fecontact.laws.LuGreFriction?"),
+    ("fecontact.plot", "plot_mode", "did you mean fecontact.plot.plot_modes?"),
+    ("fecontact.io", "xyz", "has no name 'xyz'."),
+])
+def test_names_that_are_elsewhere_are_told(space, name, told):
+    with pytest.raises(AttributeError, match=rf"^{re.escape(space)} has no name '{name}'") as error:
+        getattr(importlib.import_module(space), name)
+    assert str(error.value).endswith(told)
+
+
+@pytest.mark.parametrize("space", NAMESPACES)
+def test_namespaces_have_a_docstring_and_keep_their_names(space):
+    module = importlib.import_module(f"fecontact.{space}")
+    assert module.__doc__
+    assert dir(module) == sorted(module.__all__)
+    for name in module.__all__:
+        getattr(module, name)
+        assert name not in vars(fecontact), name
+
+
+@pytest.mark.parametrize(("space", "name"), PUBLIC)
+def test_names_are_not_hidden_by_modules_of_that_name(space, name):
+    """``fecontact.analysis.receptance`` is the function, whatever was imported before it."""
+    assert not inspect.ismodule(getattr(importlib.import_module(space), name))
 
 
 def public_things():

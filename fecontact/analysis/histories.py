@@ -18,7 +18,7 @@ _OF_NODES = {"normal_force": "N", "friction_force": "N", "penetration": "m",
              "friction_work": "J"}
 _TOTALS = {"total_normal_force": "normal_force", "total_friction_force": "friction_force",
            "total_friction_work": "friction_work"}
-_AXES = {"x": 0, "y": 1, "phi": 2}
+_COMPONENTS = {"x": 0, "y": 1, "phi": 2}
 
 QUANTITIES = (*_OF_POINTS, *_OF_NODES, *_TOTALS)
 
@@ -77,17 +77,17 @@ def history(
         return History(getattr(trajectory, quantity)[:, node], _OF_NODES[quantity],
                        f"{title} of {point_name(point)}")
     motion = getattr(trajectory, quantity)(point)
-    if component not in _AXES or _AXES[component] >= motion.shape[1]:
+    if component not in _COMPONENTS or _COMPONENTS[component] >= motion.shape[1]:
         raise InputError(f"component = {component!r} is not one of {point_name(point)}; choose "
-                         f"from {choices(list(_AXES)[: motion.shape[1]])}.")
+                         f"from {choices(list(_COMPONENTS)[: motion.shape[1]])}.")
     unit = _OF_POINTS[quantity]
     unit = unit.replace("m", "rad") if component == "phi" else unit
-    return History(motion[:, _AXES[component]], unit,
+    return History(motion[:, _COMPONENTS[component]], unit,
                    f"{title} {component} of {point_name(point)}")
 
 
-def usual_axis(system: ContactSystem) -> str:
-    """Axis in which a system moves most: y where only this is driven, else x."""
+def usual_component(system: ContactSystem) -> str:
+    """Component in which a system moves most: y where only this is driven, else x."""
     drive = system.drive
     return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"
 

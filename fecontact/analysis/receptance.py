@@ -18,7 +18,7 @@ Place = tuple[str | int, str]
 Kind = Literal["receptance", "mobility", "accelerance"]
 
 _POWERS = {"receptance": 0, "mobility": 1, "accelerance": 2}
-_DIRECTIONS = {"x": 0, "y": 1, "phi": 2}
+_COMPONENTS = {"x": 0, "y": 1, "phi": 2}
 _UNITS = {"x": "m", "y": "m", "phi": "rad"}
 _RATES = ("", "/s", "/s^2")
 _CHUNK = 2_000_000  # entries of dynamic stiffness matrices at a time
@@ -33,9 +33,9 @@ class Receptance:
     frequency_hz : (F,) array
         [Hz].
     values : (F, R, E) complex array
-        Response r to excitation e; see :attr:`units`.
-    responses, excitations : tuples of (point, direction)
-        Directions x, y, and phi: a rotation as response, a moment as excitation.
+        Response r to excitation e; see :meth:`unit`.
+    responses, excitations : tuples of (point, component)
+        Components x, y, and phi: a rotation as response, a moment as excitation.
     kind : 'receptance', 'mobility' or 'accelerance'
         Displacement, velocity or acceleration per force.
     growing : (k,) complex array
@@ -110,19 +110,19 @@ def receptance(
         A basis is the body alone; a system has the springs and dashpots of its drive.
     frequency_hz : (F,) array
         [Hz], zero or above.
-    excitations, responses : sequences of (point, direction)
+    excitations, responses : sequences of (point, component)
         Points by name, contact nodes by number; 'x', 'y' or 'phi'. Responses where the
         excitations are by default.
     kind : 'receptance', 'mobility' or 'accelerance'
         Displacement, velocity or acceleration per force.
     linearised_at : 'rest', 'sliding' or (2 m + n s,) array, optional
         Equilibrium about which a system moves, with its contact; see
-        :func:`fecontact.integrate.initial_state.initial_state`.
+        :func:`fecontact.integrate.initial_state`.
 
     Raises
     ------
     InputError
-        For points, directions or a kind that do not exist, negative frequencies, or a
+        For points, components or a kind that do not exist, negative frequencies, or a
         linearisation of a basis.
     AnalysisError
         Where the response is infinite: at frequency zero of a body that nothing holds, or at an
@@ -203,13 +203,13 @@ def _rows(basis: ModalBasis, places: tuple[Place, ...]) -> Array:
     rows = []
     for place in places:
         if not isinstance(place, tuple) or len(place) != 2:
-            raise InputError(f"{place!r} must be a pair of a point and a direction, like "
+            raise InputError(f"{place!r} must be a pair of a point and a component, like "
                              f"('B', 'x').")
-        point, direction = place
-        if direction not in _DIRECTIONS:
-            raise InputError(f"The direction {direction!r} at {point!r} must be one of "
-                             f"{choices(_DIRECTIONS)}.")
-        rows.append(basis.T[basis.point_index(point), _DIRECTIONS[direction]])
+        point, component = place
+        if component not in _COMPONENTS:
+            raise InputError(f"The component {component!r} at {point!r} must be one of "
+                             f"{choices(_COMPONENTS)}.")
+        rows.append(basis.T[basis.point_index(point), _COMPONENTS[component]])
     if not rows:
         raise InputError("A frequency response needs at least one excitation and one response.")
     return np.array(rows)

@@ -1,5 +1,5 @@
 """Equilibria, periodic orbits, their stability and bifurcations, followed over parameters."""
 
-import lazy_loader
+from fecontact.core.namespace import namespace
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

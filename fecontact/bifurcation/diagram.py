@@ -44,7 +44,7 @@ class Branches:
         The displacement that is observed.
     found : dict of name to Branch
         With the range of the observed displacement; see
-        :func:`fecontact.bifurcation.orbits.samples.observe`.
+        :func:`fecontact.bifurcation.observe`.
     notes : list of str
         Sentences on branches that could not be followed.
     interrupted : bool

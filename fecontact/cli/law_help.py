@@ -26,7 +26,7 @@ def law_help(name: str) -> str:
     """The documentation of the laws of a name, and how they stand in a study file.
 
     The name is that in study files or that of the class; capitals do not matter. A law of one's
-    own, ``FILE.py:CLASS``, is checked too, see :func:`fecontact.laws.check.check_law`.
+    own, ``FILE.py:CLASS``, is checked too, see :func:`fecontact.laws.check_law`.
 
     Raises
     ------

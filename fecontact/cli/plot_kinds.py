@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.histories import Point, usual_axis
+from fecontact.analysis.histories import Point, usual_component
 from fecontact.analysis.receptance import Place, receptance
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
@@ -27,7 +27,7 @@ class PlotRequest:
     Attributes
     ----------
     quantity, component : str
-        As for :func:`fecontact.analysis.histories.history`; the axis by default that of the drive.
+        As for :func:`fecontact.analysis.history`; the component by default that of the drive.
     points : tuple of points
         Named points and contact nodes; all that a history shows, of which the other plots show
         the first.
@@ -42,7 +42,7 @@ class PlotRequest:
 
     def __post_init__(self) -> None:
         if self.highest_hz is not None:
-            require_positive("plot", highest=self.highest_hz)
+            require_positive("plot", highest_hz=self.highest_hz)
 
     @property
     def point(self) -> Point:
@@ -50,7 +50,7 @@ class PlotRequest:
         return self.points[0] if self.points else "B"
 
     @property
-    def direction(self) -> str:
+    def shown_component(self) -> str:
         """The component, x where none is chosen."""
         return self.component or "x"
 
@@ -65,7 +65,7 @@ def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
     if not isinstance(c.point, str | int):
         raise InputError(f"The receptance is one of named points and contact nodes, not of "
                          f"{c.point!r}.")
-    place: list[Place] = [(c.point, c.direction)]
+    place: list[Place] = [(c.point, c.shown_component)]
     found = [receptance(run.system, f, place)]
     labels = ["apart from the ground"]
     # Without steady sliding, as on waves, there is nothing to linearise about.
@@ -77,18 +77,19 @@ def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
 
 KINDS: dict[str, Draw] = {
     "history": lambda run, c, path: plots.plot_history(run, c.points, path=path),
-    "phase": lambda run, c, path: plots.plot_phase(run, c.point, c.direction, path=path),
-    "contact": lambda run, c, path: plots.plot_contact_map(run, path=path),
+    "phase": lambda run, c, path: plots.plot_phase(run, c.point, c.shown_component, path=path),
+    "contact_map": lambda run, c, path: plots.plot_contact_map(run, path=path),
     "energies": lambda run, c, path: plots.plot_energies(run, path=path),
     "modes": lambda run, c, path: plot_modes(run.system.basis, path=path),
     "spectrum": lambda run, c, path: analysis.plot_spectrum(
-        run, c.quantity, c.point, c.direction, highest_hz=c.highest_hz, path=path),
+        run, c.quantity, c.point, c.shown_component, highest_hz=c.highest_hz, path=path),
     "density": lambda run, c, path: analysis.plot_spectrum(
-        run, c.quantity, c.point, c.direction, density=True, highest_hz=c.highest_hz, path=path),
+        run, c.quantity, c.point, c.shown_component, density=True, highest_hz=c.highest_hz,
+        path=path),
     "spectrogram": lambda run, c, path: analysis.plot_spectrogram(
-        run, c.quantity, c.point, c.direction, highest_hz=c.highest_hz, path=path),
+        run, c.quantity, c.point, c.shown_component, highest_hz=c.highest_hz, path=path),
     "poincare": lambda run, c, path: analysis.plot_poincare(
-        run, c.point, c.direction, path=path),
+        run, c.point, c.shown_component, path=path),
     "friction_work": lambda run, c, path: analysis.plot_friction_work(run, path=path),
     "receptance": _receptance,
 }
@@ -130,7 +131,7 @@ def redraw(
     part = trajectory if whole else trajectory.between(t_start, t_end)
     chosen = choice or PlotRequest()
     if chosen.component is None:
-        chosen = replace(chosen, component=usual_axis(part.system))
+        chosen = replace(chosen, component=usual_component(part.system))
     return KINDS[kind](part, chosen, path)
 
 

@@ -49,17 +49,18 @@ def write_run(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Pa
 
 def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
     """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
-    from fecontact.analysis.histories import usual_axis
+    from fecontact.analysis.histories import usual_component
     from fecontact.output.plots import run as plots
 
     system, points = trajectory.system, study.output.points
     middle = system.basis.contact_nodes // 2
     point = points[0] if points else "B" if system.basis.T[0].any() else middle
-    history, phase, contact, energies = files = [
-        folder / f"{study.name}-{what}.png" for what in ("history", "phase", "contact", "energies")]
+    history, phase, contact_map, energies = files = [
+        folder / f"{study.name}-{kind}.png"
+        for kind in ("history", "phase", "contact_map", "energies")]
     plots.plot_history(trajectory, points, path=history)
-    plots.plot_phase(trajectory, point, usual_axis(system), path=phase)
-    plots.plot_contact_map(trajectory, path=contact)
+    plots.plot_phase(trajectory, point, usual_component(system), path=phase)
+    plots.plot_contact_map(trajectory, path=contact_map)
     plots.plot_energies(trajectory, path=energies)
     return files
 

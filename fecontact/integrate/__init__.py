@@ -1,5 +1,5 @@
+"""Solvers and what goes with them: events, ensembles, initial states, sensitivities."""
 
+from fecontact.core.namespace import namespace
 
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

@@ -99,7 +99,8 @@ def set_courses(s, shapes, bounds, before, after, room):
     """Fill ``room.courses`` (6, 2 n or 3 n) with the coefficients over a step.
 
     Velocities of the nodes along the ground, heights with their gap, and where the ground is not
-    flat displacements along it. ``room.nodes`` holds what :func:`motion.project` says of the end.
+    flat displacements along it. ``room.nodes`` holds what
+    :func:`fecontact.integrate.rodas5p.dynamics.project` says of the end.
     """
     out, inner = room.courses, room.inner
     n = shapes.shape[1] // 2

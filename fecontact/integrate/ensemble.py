@@ -74,7 +74,7 @@ def ensemble(
     systems: ContactSystem | Sequence[ContactSystem],
     times: ArrayLike,
     *,
-    initial: Initial | Sequence[Any] | Array = "rest",
+    initial: Initial | Sequence[Any] = "rest",
     rtol: float = 1e-6,
     max_step: float | None = None,
     chain: int = 1,
@@ -95,7 +95,7 @@ def ensemble(
         The start of each run and the times to keep states at, ascending [s]; the first column
         belongs to the initial states.
     initial : (E, size) array, sequence of E, or one for all
-        Initial states, or what :func:`fecontact.integrate.initial_state.initial_state` takes.
+        Initial states, or what :func:`fecontact.integrate.initial_state` takes.
     rtol : float
         Relative tolerance.
     max_step : float, optional

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import as_floats, is_numeric
 from fecontact.core.errors import InputError, choices, nearest, shown
@@ -45,7 +46,7 @@ class RigidStart:
             object.__setattr__(self, name, tuple(values.tolist()))
 
 
-Initial = Literal["rest", "sliding"] | RigidStart | Trajectory | Array
+Initial = TypeAliasType("Initial", Literal["rest", "sliding"] | RigidStart | Trajectory | Array)
 
 
 def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array:

@@ -53,7 +53,7 @@ def simulate(
     t_start : float, optional
         Its start [s]; default the end of the run that it continues, else zero.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
-        Where it starts; see :func:`fecontact.integrate.initial_state.initial_state`.
+        Where it starts; see :func:`fecontact.integrate.initial_state`.
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or the times themselves,
         ascending, the first ``t_start``, the last ``t_end``.

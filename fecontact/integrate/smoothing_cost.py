@@ -63,7 +63,7 @@ def smoothing_cost(
     t_end : float
         End of both runs [s]; some periods of the motion.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m,) array
-        Where both start; see :func:`fecontact.integrate.initial_state.initial_state`.
+        Where both start; see :func:`fecontact.integrate.initial_state`.
     outputs : int
         Number of times at which the runs are compared, at least 20.
     rtol : float

@@ -18,7 +18,7 @@ from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .normal.measured_surface import MeasuredSurface
-from .normal.power import PowerContact, PowerLawContact, RestitutionContact
+from .normal.power import BackBurdekinContact, PowerContact, RestitutionContact
 from .normal.rough_surface import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .normal.statistical import ExponentialContact, GreenwoodWilliamson
 from .registry import law_names
@@ -28,6 +28,7 @@ from .signals.transient import Pulse, Step, Tabulated
 from .signatures import friction_law, ground_profile, memory_friction_law, normal_law, signal
 
 __all__ = [
+    "BackBurdekinContact",
     "BoucWenFriction",
     "Bound",
     "Constant",
@@ -60,7 +61,6 @@ __all__ = [
     "PerNode",
     "Positive",
     "PowerContact",
-    "PowerLawContact",
     "PrescribedForce",
     "ProductFriction",
     "Profile",

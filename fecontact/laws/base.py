@@ -159,7 +159,7 @@ class NodeLaw:
 
 @dataclass(frozen=True)
 class NormalLaw(NodeLaw):
-    """A normal law; ``kernel`` is a :func:`normal_law`."""
+    """A normal law; ``kernel`` is a :func:`fecontact.laws.normal_law`."""
 
     @property
     def penetration_scale(self) -> float:
@@ -184,7 +184,11 @@ class NormalLaw(NodeLaw):
 
 @dataclass(frozen=True)
 class FrictionLaw(NodeLaw):
-    """A friction law; ``kernel`` is a :func:`friction_law` or a :func:`memory_friction_law`."""
+    """A friction law.
+
+    Its ``kernel`` is a :func:`fecontact.laws.friction_law` or a
+    :func:`fecontact.laws.memory_friction_law`.
+    """
 
     @property
     def memory(self) -> int:

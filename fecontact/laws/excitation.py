@@ -63,14 +63,14 @@ class Drive:
             angular_frequency=self.angular_frequency,
         )
         require_finite("Drive", amplitude_x=self.amplitude_x, amplitude_y=self.amplitude_y)
-        for axis, motion, amplitude in (("x", self.motion_x, self.amplitude_x),
-                                        ("y", self.motion_y, self.amplitude_y)):
+        for component, motion, amplitude in (
+                ("x", self.motion_x, self.amplitude_x), ("y", self.motion_y, self.amplitude_y)):
             if motion is None:
                 continue
-            _require_signal("Drive", f"motion_{axis}", motion)
+            _require_signal("Drive", f"motion_{component}", motion)
             if amplitude != 0.0:
-                raise InputError(f"Drive: amplitude_{axis} = {amplitude!r} cannot stand beside "
-                                 f"motion_{axis}; give one of them.")
+                raise InputError(f"Drive: amplitude_{component} = {amplitude!r} cannot stand "
+                                 f"beside motion_{component}; give one of them.")
         if self.motion_x is not None and self.motion_y is not None and self.angular_frequency:
             raise InputError(f"Drive: angular_frequency = {self.angular_frequency!r} has no "
                              f"effect beside motion_x and motion_y; leave it out.")

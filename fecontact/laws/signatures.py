@@ -27,7 +27,8 @@ signal       ``f(t, p)``                 value and rate of what is given in time
 it is that of the contact node. A parameter given as one number holds for every node; an extensive
 one (stiffness, damping) is then the total of the contact face and is shared by tributary length.
 A parameter given as a sequence has one value per node and is not shared. A parameter that is a
-name out of a few holds for every node; ``p`` has its index among :attr:`NodeLaw.choices`.
+name out of a few holds for every node; ``p`` has its index among
+:attr:`fecontact.laws.base.NodeLaw.choices`.
 
 Internal variables of friction with memory are states of the system, integrated with it. Their
 rates must be continuous where R depends on them; at F = 0, where it does not, they fall back to

@@ -1,5 +1,5 @@
+"""Modal bases: mode shapes, convergence, reports, rows of given degrees of freedom."""
 
+from fecontact.core.namespace import namespace
 
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

@@ -37,20 +37,21 @@ class Rayleigh:
 
 @dataclass(frozen=True)
 class LossFactor:
-    """Damping ratios from the loss factor of the material: ``D = value / 2`` in every mode.
+    """Damping ratios ``D = loss_factor / 2`` of all modes from the loss factor of the material.
 
-    At resonance, the energy lost per cycle is ``2 pi value`` times the largest elastic energy.
+    At resonance, the energy lost per cycle is ``2 pi loss_factor`` times the largest elastic
+    energy.
 
     Parameters
     ----------
-    value : float
-        Zero or above.
+    loss_factor : float
+        Twice the damping ratio of all modes, zero or above.
     """
 
-    value: float
+    loss_factor: float
 
     def __post_init__(self) -> None:
-        require_not_negative("LossFactor", value=self.value)
+        require_not_negative("LossFactor", loss_factor=self.loss_factor)
 
 
 Damping = float | Rayleigh | LossFactor | Sequence[float] | Array
@@ -80,7 +81,7 @@ def modal_damping(
         return np.diag(damping.mass_factor
                        + damping.stiffness_factor * angular_frequencies**2)
     if isinstance(damping, LossFactor):
-        damping = 0.5 * damping.value
+        damping = 0.5 * damping.loss_factor
     values = as_floats(damping, "The damping of a modal basis")
     if not np.isfinite(values).all():
         raise InputError(f"Damping {damping!r} is not finite.")

@@ -73,7 +73,7 @@ def basis_from_matrices(
         contact groups a mapping of their names to such rows. ``B``, ``C``
         and further named points: dense or sparse (3, d); B and C are zero when left out.
         Two rows, x and y, in the place of three mean no rotation.
-        :func:`fecontact.reduction.restriction.rows_from_dofs` makes them from numbers.
+        :func:`fecontact.reduction.rows_from_dofs` makes them from numbers.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
         Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
         given degrees of freedom, dense, sparse or AssembledMatrix [N s/m].

@@ -102,7 +102,7 @@ def basis_from_modes(
     shapes : (d, m) array
         Real mode shapes, one a column.
     rows : mapping
-        As for :func:`~fecontact.reduction.from_matrices.basis_from_matrices`.
+        As for :func:`~fecontact.basis_from_matrices`.
     frequencies_hz, angular_frequencies : (m,) array
         One of the two [Hz, rad/s]; exactly zero for rigid modes.
     mass : dense or sparse (d, d) array, or AssembledMatrix
@@ -115,7 +115,7 @@ def basis_from_modes(
     orthogonality : float
         Largest product ``|s_i^T M s_j|`` of two mass-normalised shapes that is accepted.
     contact_x, tributary : (n,) arrays, optional
-        As for :func:`~fecontact.reduction.from_matrices.basis_from_matrices`.
+        As for :func:`~fecontact.basis_from_matrices`.
 
     Raises
     ------

@@ -50,7 +50,7 @@ def modal_basis(
         boundary.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, (x, y), or
-        :class:`~fecontact.fem.points.Patch`. Default: the mesh's point of that name; without
+        :class:`~fecontact.Patch`. Default: the mesh's point of that name; without
         one, the rows are zero.
     points : mapping of name to place, optional
         Further points to observe.

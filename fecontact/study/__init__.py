@@ -1,5 +1,5 @@
+"""Sections of study files as objects, for sweeps and bases from Python."""
 
+from fecontact.core.namespace import namespace
 
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

@@ -15,7 +15,7 @@ SHAPES: Mapping[str, type] = {"beam": Beam, "pendulum": Pendulum, "block": Block
 
 @dataclass(frozen=True)
 class MeshFile:
-    """``[geometry]`` with the file of a mesh; see :func:`fecontact.fem.mesh_files.read_mesh`.
+    """``[geometry]`` with the file of a mesh; see :func:`fecontact.read_mesh`.
 
     Parameters
     ----------

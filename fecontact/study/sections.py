@@ -10,7 +10,6 @@ from fecontact.core.errors import (
     InputError,
     choices,
     require_finite,
-    require_not_negative,
     require_positive,
 )
 from fecontact.core.tables import located
@@ -21,7 +20,7 @@ from fecontact.fem.points import Patch
 from fecontact.integrate.initial_state import RigidStart
 from fecontact.integrate.solvers import Solver, solver_by_name
 from fecontact.laws.base import FrictionLaw, NormalLaw
-from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
+from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
 
@@ -32,7 +31,7 @@ Support = Literal["x", "y", "xy", "hinge"]
 @dataclass(frozen=True)
 class BodySettings:
     """``[body]``: material, thickness and supports; see
-    :class:`fecontact.fem.elastic_body.ElasticBody`.
+    :class:`fecontact.ElasticBody`.
 
     Parameters
     ----------
@@ -84,22 +83,6 @@ class BodySettings:
 
 
 @dataclass(frozen=True)
-class Loss:
-    """``damping = { loss_factor = value }``; see :class:`fecontact.reduction.damping.LossFactor`.
-
-    Parameters
-    ----------
-    loss_factor : float
-        Twice the damping ratio of all modes, zero or above.
-    """
-
-    loss_factor: float
-
-    def __post_init__(self) -> None:
-        require_not_negative("Loss", loss_factor=self.loss_factor)
-
-
-@dataclass(frozen=True)
 class ContactLaws:
     """``[contact.NAME]``: laws of the contact group NAME.
 
@@ -117,7 +100,7 @@ class ContactLaws:
 @dataclass(frozen=True)
 class BasisSettings:
     """``[basis]``: modes and points; see
-    :meth:`fecontact.fem.elastic_body.ElasticBody.modal_basis`.
+    :func:`fecontact.modal_basis`.
 
     Parameters
     ----------
@@ -133,7 +116,7 @@ class BasisSettings:
         ``{at = name or [x, y], radius = r}``.
     points : mapping of name to place
         Further points to observe.
-    damping : float, list, Rayleigh or Loss
+    damping : float, list, Rayleigh or LossFactor
         One damping ratio, one per mode, ``{mass_factor, stiffness_factor}`` or
         ``{loss_factor}``.
     reduction : 'vibration', 'residual' or 'craig-bampton'
@@ -152,7 +135,7 @@ class BasisSettings:
     B: Place | None = None
     C: Place | None = None
     points: Mapping[str, Place] = field(default_factory=dict)
-    damping: float | tuple[float, ...] | Rayleigh | Loss = 0.0
+    damping: float | tuple[float, ...] | Rayleigh | LossFactor = 0.0
     reduction: Literal["vibration", "residual", "craig-bampton"] = "vibration"
     tolerance: float = 0.1
     dashpots: Annotated[Mapping[str, tuple[float, float]], Unit("N s/m")] = field(
@@ -174,12 +157,10 @@ class BasisSettings:
 
     def modal_basis(self, body: ElasticBody) -> ModalBasis:
         """The modal basis of a body."""
-        given = self.damping
-        damping: Damping = LossFactor(given.loss_factor) if isinstance(given, Loss) else given
         basis = modal_basis(
             body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
             C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
-            damping=damping)
+            damping=self.damping)
         if self.dashpots:
             basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
                                          for point, values in self.dashpots.items()})
@@ -188,7 +169,7 @@ class BasisSettings:
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """``[simulation]``: the run; see :func:`fecontact.integrate.simulate`.
+    """``[simulation]``: the run; see :func:`fecontact.simulate`.
 
     Parameters
     ----------
@@ -284,7 +265,7 @@ class OutputSettings:
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """``[render]``: the moving picture; see :func:`fecontact.output.render.movie.render`.
+    """``[render]``: the moving picture; see :func:`fecontact.render`.
 
     Parameters
     ----------

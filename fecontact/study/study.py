@@ -83,7 +83,7 @@ class Study(Summarised):
     normal, friction, ground, drive, load
         ``[normal]``, ... : laws, ground, drive and load (what is in contact needs a normal law,
         for which there is no default); see
-        :class:`~fecontact.system.contact_system.ContactSystem`.
+        :class:`~fecontact.ContactSystem`.
     contact : mapping of contact group to ContactLaws
         ``[contact.NAME.normal]``, ``[contact.NAME.friction]``: laws of single contact groups; the
         others have those of ``[normal]`` and ``[friction]``.

@@ -1,5 +1,5 @@
 """Many cases of one study: which ones, run by any executor, kept in a folder, as one table."""
 
-import lazy_loader
+from fecontact.core.namespace import namespace
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = namespace(__name__, __file__)

@@ -46,7 +46,7 @@ class Batch:
         those that are missing are computed by the worker.
     summaries : tuple of str
     t_start, wear_coefficient : float or None
-        See :class:`fecontact.study.sweep_section.SweepSettings`.
+        See :class:`fecontact.study.SweepSettings`.
     files : str or None
         Folder for a file of each case; None for no files.
     frames : int

@@ -78,7 +78,7 @@ def _periods(states: Array, once: Array, system: ContactSystem) -> float:
     """Number of periods after which the states repeat; 0 if they do not, NaN if too few are kept.
 
     By displacements and velocities of B and the contact nodes, as
-    :func:`fecontact.analysis.periodicity.periodicity`.
+    :func:`fecontact.analysis.periodicity`.
     """
     basis, m = system.basis, system.basis.modes
     rows = basis.T[[0, *range(2, 2 + basis.contact_nodes)], :2].reshape(-1, m).T

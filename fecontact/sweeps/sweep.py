@@ -61,8 +61,8 @@ def sweep(
         What all cases have in common.
     axes : mapping, optional
         Parameters that change, by dotted names, with a list of values, a
-        :class:`~fecontact.study.sweep_section.Span` or a
-        :class:`~fecontact.study.sweep_section.Distribution`; those of ``[sweep.axes]`` by default.
+        :class:`~fecontact.study.Span` or a
+        :class:`~fecontact.study.Distribution`; those of ``[sweep.axes]`` by default.
     executor : concurrent.futures.Executor, optional
         What runs the batches: the executor of a Dask client, of mpi4py.futures, of executorlib,
         threads; by default processes on this machine, which end with the sweep.
@@ -81,7 +81,7 @@ def sweep(
         numbers of cases that are done, that failed and of all.
     **settings
         Other values for the keys of ``[sweep]``; see
-        :class:`~fecontact.study.sweep_section.SweepSettings`.
+        :class:`~fecontact.study.SweepSettings`.
 
     Returns
     -------

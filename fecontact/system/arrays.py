@@ -26,7 +26,7 @@ def system_arrays(
     """Matrices, rows, parameters and addresses of the laws of a system.
 
     The groups are contact nodes that share a law: their place, each one's part of their face, and
-    the law; see :meth:`fecontact.system.contact_system.ContactSystem.law_groups`.
+    the law; see :meth:`fecontact.ContactSystem.law_groups`.
     """
     B, C = basis.T[0], basis.T[1]
     stiffness = np.diag(basis.angular_frequencies**2)

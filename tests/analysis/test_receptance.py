@@ -207,7 +207,7 @@ def test_what_has_no_response():
         receptance(system, 1.0, [("B", "x")], kind="mobilty")
     with pytest.raises(InputError, match="There is no point 'D'"):
         receptance(system, 1.0, [("D", "x")])
-    with pytest.raises(InputError, match="direction 'z' at 'B'"):
+    with pytest.raises(InputError, match="component 'z' at 'B'"):
         receptance(system, 1.0, [("B", "z")])
     with pytest.raises(InputError, match="zero or above"):
         receptance(system, -1.0, [("B", "x")])

@@ -118,11 +118,11 @@ def test_the_unstable_orbit_parts_sliding_from_stick_slip(study):
 
 def test_stick_slip_of_a_run(study):
     """Period and range at 1 mm/s are known from an independent calculation."""
-    settings = ["branch.kind=orbits", "branch.bounds=[1e-3, 1.1e-3]", "branch.start=1e-3",
+    options = ["branch.kind=orbits", "branch.bounds=[1e-3, 1.1e-3]", "branch.start=1e-3",
                 "branch.method=shooting", "branch.transient=10", "branch.longest_period=2",
                 "branch.segments=2", "branch.step=0.05", "branch.largest_step=0.5",
                 "branch.points=4"]
-    assert execute(["branch", str(study), *(f"--set={text}" for text in settings)]) == 0
+    assert execute(["branch", str(study), *(f"--set={text}" for text in options)]) == 0
     first = rows_of(study.parent / "results" / "block-branch.csv")[0]
     assert float(first["period"]) == pytest.approx(1.264348, abs=2e-5)
     assert float(first["minimum"]) == pytest.approx(0.796592e-3, abs=1e-8)

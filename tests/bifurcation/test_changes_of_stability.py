@@ -167,14 +167,14 @@ def test_orbits_of_two_masses(values, name, bounds, direction):
 
 @pytest.mark.parametrize(("start", "direction"), [(0.2, 1.0), (-0.3, -1.0)])
 def test_a_start_on_a_bound_that_heads_outwards_is_all(start, direction):
-    settings = ContinuationOptions(bounds=(-0.3, 0.2))
+    options = ContinuationOptions(bounds=(-0.3, 0.2))
     x = brentq(lambda x: start + x - x**3, -0.5, 0.5, xtol=1e-15)
     # On this sheet dx/dp is negative, and the direction is that of the parameter.
-    branch = continue_branch(CUBIC, np.array([x, start]), settings, direction=direction)
+    branch = continue_branch(CUBIC, np.array([x, start]), options, direction=direction)
     assert branch.status is BranchStatus.BOUND
     assert branch.parameter.tolist() == [start]
-    inwards = continue_branch(CUBIC, np.array([x, start]), settings, direction=-direction)
-    both = continue_branch(CUBIC, np.array([x, start]), settings, direction=direction, both=True)
+    inwards = continue_branch(CUBIC, np.array([x, start]), options, direction=-direction)
+    both = continue_branch(CUBIC, np.array([x, start]), options, direction=direction, both=True)
     assert len(both) == len(inwards) > 5
     assert sorted(both.parameter[[0, -1]]) == pytest.approx([-0.3, 0.2], abs=1e-15)
     assert (np.diff(both.parameter) * direction > 0.0).all()

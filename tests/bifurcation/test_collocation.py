@@ -207,8 +207,8 @@ def test_one_factorisation_an_orbit(landau, monkeypatch):
     monkeypatch.setattr(elimination, "condense", counted)
     problem, u = orbit_on(landau, np.linspace(0.0, 1.0, 21), 4)
     made.clear()
-    settings = ContinuationOptions(step=0.02, largest_step=0.02, points=30, locate=False)
-    points = list(continuation(problem, u, settings))
+    options = ContinuationOptions(step=0.02, largest_step=0.02, points=30, locate=False)
+    points = list(continuation(problem, u, options))
     assert len(points) == 30
     for point in points:
         radius = np.linalg.norm(problem.nodes(point.u), axis=1)

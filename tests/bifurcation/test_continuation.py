@@ -98,12 +98,12 @@ def test_turns_between_points_are_limited(turn):
 
 
 def test_both_directions_and_restart():
-    settings = ContinuationOptions(bounds=(-0.3, 0.2))
-    branch = continue_branch(CUBIC, np.array([0.0, 0.0]), settings, both=True)
+    options = ContinuationOptions(bounds=(-0.3, 0.2))
+    branch = continue_branch(CUBIC, np.array([0.0, 0.0]), options, both=True)
     assert branch.parameter[[0, -1]] == pytest.approx([-0.3, 0.2], rel=1e-12)
     assert (np.diff(branch.parameter) > 0.0).all()
     middle = branch.points[len(branch) // 2]
-    again = continue_branch(CUBIC, middle.u, settings, tangent=-middle.tangent)
+    again = continue_branch(CUBIC, middle.u, options, tangent=-middle.tangent)
     assert again.parameter[-1] == pytest.approx(-0.3, rel=1e-12)
     assert (again.points[0].u == pytest.approx(middle.u, abs=1e-12))
     turned = branch.reversed()
@@ -168,8 +168,8 @@ def test_end_of_existence_keeps_the_branch():
 def test_sharp_corner_is_not_jumped(step):
     """A hyperbola's two arms come within 0.02: the steps must not jump from one to the other."""
     near = Plane(lambda x, p: x * x - p * p - 1e-4, lambda x, p: (2.0 * x, -2.0 * p))
-    settings = ContinuationOptions(bounds=(-2.0, 1.0), step=step, largest_step=step)
-    branch = continue_branch(near, np.array([1.0, -1.0]), settings)
+    options = ContinuationOptions(bounds=(-2.0, 1.0), step=step, largest_step=step)
+    branch = continue_branch(near, np.array([1.0, -1.0]), options)
     assert (branch.column("x") > 0.0).all()
     assert branch.points[-1].u[0] == pytest.approx(np.sqrt(1.0001), rel=1e-12)
 
@@ -205,7 +205,7 @@ def test_no_solution_near_the_start():
     ({"step": 0.2}, "step = 0.2 must lie between"),
     ({"bounds": (1.0, 1.0)}, "the smaller one first"),
 ])
-def test_settings_are_checked(options, message):
+def test_options_are_checked(options, message):
     with pytest.raises(InputError, match=message):
         ContinuationOptions(**options)
 

@@ -69,19 +69,19 @@ def test_reactor():
 
 def test_predator_and_prey():
     field = vector_field(predator, {"p1": 0.0, "p2": 3.0, "p3": 5.0, "p4": 3.0}, 2)
-    settings = ContinuationOptions(bounds=(0.01, 1.0))
+    options = ContinuationOptions(bounds=(0.01, 1.0))
     trivial = equilibrium_branch(field, parameter="p1",
                                  options=ContinuationOptions(bounds=(0.0, 1.0)))
     assert parameters(trivial, "branch point") == pytest.approx([0.6], rel=1e-12)
     assert [point.kind for point in trivial.special] == ["branch point"]
-    prey = equilibrium_branch(field, trivial.special[0], options=settings)
+    prey = equilibrium_branch(field, trivial.special[0], options=options)
     assert prey.column("state")[:, 1] == pytest.approx(np.zeros(len(prey)), abs=1e-12)
     assert sorted(parameters(prey, "branch point")) == pytest.approx([0.6, 0.821904], abs=6e-7)
     fold, = prey.of_kind("fold")
     assert fold.parameter == pytest.approx(0.832929, abs=6e-7)
     assert fold.u[0] == pytest.approx(0.411162, abs=6e-7)
     crossing = max(prey.of_kind("branch point"), key=lambda point: point.parameter)
-    both = equilibrium_branch(field, crossing, options=settings)
+    both = equilibrium_branch(field, crossing, options=options)
     hopf, = both.of_kind("Hopf")
     assert hopf.parameter == pytest.approx(0.671594, abs=6e-7)
     assert hopf.u[:2] == pytest.approx([1.0 / 3.0, 0.365762], abs=6e-7)

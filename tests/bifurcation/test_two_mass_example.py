@@ -62,8 +62,8 @@ def test_doublings_at_which_the_new_branch_is_strongly_bent():
     second = over_speed["second branch"]
     close = second.of_kind("period doubling")[0]
     assert second.of_kind("fold")[0].parameter - close.parameter < 1e-3
-    settings = example.ContinuationOptions(step=0.005, largest_step=0.04, points=3)
-    doubled = example.orbit_branch(example.oscillator(B=20.0, v0=8.0), close, options=settings,
+    options = example.ContinuationOptions(step=0.005, largest_step=0.04, points=3)
+    doubled = example.orbit_branch(example.oscillator(B=20.0, v0=8.0), close, options=options,
                                    bounds=(1.2, 8.0))
     assert len(doubled) == 3
     assert doubled.points[0].values["period"] == pytest.approx(2.0 * close.values["period"],

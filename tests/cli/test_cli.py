@@ -412,7 +412,7 @@ def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
     assert files_below(tmp_path / "d") == {
         f"{name}{end}" for name in ("beam_on_wavy_ground", "pendulum_on_stop")
         for end in (".toml", ".msh", ".vtkhdf", ".mp4", "-modes.png", "-history.png",
-                    "-phase.png", "-contact.png", "-energies.png")}
+                    "-phase.png", "-contact_map.png", "-energies.png")}
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the script is for Linux")

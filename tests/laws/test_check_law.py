@@ -10,6 +10,7 @@ import pytest
 import fecontact as fc
 from fecontact.cli import execute
 from fecontact.laws import (
+    BackBurdekinContact,
     BoucWenFriction,
     CosineSurface,
     ExponentialContact,
@@ -23,7 +24,6 @@ from fecontact.laws import (
     NormalLaw,
     ParabolicSurface,
     PowerContact,
-    PowerLawContact,
     PrescribedForce,
     RestitutionContact,
     RoughSurface,
@@ -42,7 +42,7 @@ NEEDED = {
     MeasuredSurface: (1e6, 1e-5, 3.0),
     LinearContact: (1e6, 3.0), PowerContact: (1e9, 1.5, 2.0),
     RestitutionContact: (1e9, 0.5, 1.0), ExponentialContact: (10.0, 1e-6),
-    PowerLawContact: (1e-4, 1e-9), TwoSidedStop: (1e6, 1e-4, 1.5), PrescribedForce: (3.0,),
+    BackBurdekinContact: (1e-4, 1e-9), TwoSidedStop: (1e6, 1e-4, 1.5), PrescribedForce: (3.0,),
     GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6),
 }
 

@@ -221,7 +221,7 @@ def test_loads_at_points():
     (Drive, {"motion_y": 3.0}, r"Drive: motion_y = 3\.0 must be a Signal"),
     (Drive, {"motion_x": Constant(), "motion_y": Constant(), "angular_frequency": 2.0},
      r"angular_frequency = 2\.0 has no effect"),
-    (PointLoad, {"direction": "z", "signal": Constant()}, "direction = 'z' must be one of 'mom"),
+    (PointLoad, {"component": "z", "signal": Constant()}, "component = 'z' must be one of 'phi'"),
     (PointLoad, {"point": 1.5, "signal": Constant()}, r"point = 1\.5 must be the name"),
     (PointLoad, {"signal": 3.0}, r"PointLoad: signal = 3\.0 must be a Signal"),
     (Load, {"forces": (Constant(),)}, "Load: forces = .* must be a list of PointLoad"),

@@ -64,8 +64,8 @@ def instance(kind, name):
               if entry.default is MISSING and entry.default_factory is MISSING}
     if name == "measured-surface":
         needed["roughness_height"] = GIVEN["roughness_height"]
-    if name in ("trace", "tabulated"):
-        keys = {"trace": ("abscissa", "heights"), "tabulated": ("times", "values")}[name]
+    if name in ("measured-profile", "tabulated"):
+        keys = {"measured-profile": ("abscissa", "heights"), "tabulated": ("times", "values")}[name]
         needed |= {key: GIVEN[key] for key in keys if key in {e.name for e in fields(cls)}}
     return cls(**needed)
 
@@ -86,7 +86,7 @@ def test_every_law_is_documented(kind, name):
     if kind in (NormalLaw, FrictionLaw):
         assert "Raises" in text
         assert "References" in text or name in (
-            "linear", "prescribed", "two-sided-stop", "constant", "parabolic-surface",
+            "linear", "prescribed-force", "two-sided-stop", "constant", "parabolic-surface",
             "cosine-surface", "gaussian-surface", "measured-surface", "hyperbolic", "cubic")
 
 
@@ -96,7 +96,7 @@ def test_every_law_runs_from_a_study(kind, name, tmp_path):
     """Each in a system of a real body: derivative of the whole system, rest, a short run."""
     part = {NormalLaw: "normal", FrictionLaw: "friction"}[kind]
     law = instance(kind, name)
-    if name == "prescribed":
+    if name == "prescribed-force":
         pytest.skip("a free body has no equilibrium under a prescribed normal force")
     lines = "\n".join(f"{key} = {value!r}".replace("(", "[").replace(")", "]").replace("'", '"')
                       for key, value in to_table(law).items())
@@ -192,7 +192,7 @@ def test_parts_of_ground_and_drive_by_name(tmp_path):
 [ground]
 speed = 0.01
 [ground.profile]
-law = "trace"
+law = "measured-profile"
 file = "trace.csv"
 [ground.motion]
 law = "speed-ramp"
@@ -210,7 +210,7 @@ cut_off_wavelength = 1e-3
 [drive]
 stiffness_x = 1e4
 [drive.motion_x]
-law = "sweep"
+law = "swept-sine"
 amplitude = 1e-5
 start_frequency_hz = 10.0
 end_frequency_hz = 100.0

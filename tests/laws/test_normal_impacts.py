@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fecontact.laws import (
+    BackBurdekinContact,
     LinearContact,
     PowerContact,
-    PowerLawContact,
     RestitutionContact,
     RoughSurface,
     TwoSidedStop,
@@ -55,7 +55,7 @@ def deepest(law, mass, speed):
     (LinearContact(1e6), math.pi), (PowerContact(1e9, 1.5), 2.9432751843),
     (PowerContact(1e11, 2.0), 2.8043642107), (PowerContact(1e16, 3.0), 2.6220575543),
     (RoughSurface(1e6, 1e-2, 0.0), 2.8043642107), (TwoSidedStop(1e9, 1.0, 1.5), 2.9432751843),
-    (PowerLawContact(1e-3, 6e-9, 1.0 / 3.0), 2.6220575543),
+    (BackBurdekinContact(1e-3, 6e-9, 1.0 / 3.0), 2.6220575543),
 ])
 def test_duration_of_undamped_impacts(law, product):
     depth, duration, restitution = impact(law, 0.5, 0.2)

@@ -13,6 +13,7 @@ from scipy.integrate import quad
 
 from fecontact import InputError
 from fecontact.laws import (
+    BackBurdekinContact,
     CosineSurface,
     ExponentialContact,
     GaussianSurface,
@@ -23,7 +24,6 @@ from fecontact.laws import (
     ParabolicSurface,
     PerNode,
     PowerContact,
-    PowerLawContact,
     PrescribedForce,
     RestitutionContact,
     RoughSurface,
@@ -79,8 +79,8 @@ LAWS = {
     "power 2": (PowerContact(1e9, 2.0), IMPACT),
     "power 3.3": (PowerContact(1e12, 3.3, 2.0), IMPACT),
     "restitution": (RestitutionContact(1e9, 0.7, 0.2), IMPACT),
-    "back-burdekin": (PowerLawContact(1e-3, 6e-10, 0.5, 0.3), (-2e-5, 1e-5)),
-    "back-burdekin 0.4": (PowerLawContact(1e-3, 6e-9, 0.4), (-2e-5, 1e-5)),
+    "back-burdekin": (BackBurdekinContact(1e-3, 6e-10, 0.5, 0.3), (-2e-5, 1e-5)),
+    "back-burdekin 0.4": (BackBurdekinContact(1e-3, 6e-9, 0.4), (-2e-5, 1e-5)),
     "exponential": (ExponentialContact(10.0, 1e-6, 0.3), (-6e-5, 2.5e-5)),
     "greenwood": (GreenwoodWilliamson(1e4, 1e-4, 1e11, 1e-6, 3.0, 0.3), (-8e-6, 1.6e-5)),
     "prescribed": (PrescribedForce(14.0), MICRO),
@@ -172,7 +172,7 @@ def test_values_of_simple_laws_by_hand():
     # K u^1.5 = 1e9 * 1e-9 = 1 N at 1 um.
     assert force(PowerContact(1e9, 1.5, 2.0), 1e-6, 0.1) == pytest.approx((1.2, 1.8e6, 2.0))
     # 6e-10 * (1e8 Pa)^0.5 = 6 um.
-    law = PowerLawContact(1e-4, 6e-10, 0.5)
+    law = BackBurdekinContact(1e-4, 6e-10, 0.5)
     assert force(law, 6e-6)[:2] == pytest.approx((1e4, 2e4 / 6e-6), rel=1e-12)
     assert law.penetration_scale == pytest.approx(6e-7, rel=1e-12)
     law = ExponentialContact(3.0, 1e-6, 2.0)
@@ -266,8 +266,9 @@ def test_energy_of_a_body_far_above_the_surface():
      r"restitution = 1\.1 must be zero to 1"),
     (lambda: RestitutionContact(1.0, 0.5, 0.0), "reference_velocity"),
     (lambda: RestitutionContact(1.0, 0.5, 1.0, damping_model="floris"), "did you mean 'flores'"),
-    (lambda: PowerLawContact(1.0, 1.0, 1.5), r"exponent = 1\.5 must be above zero and at most 1"),
-    (lambda: PowerLawContact(-1.0, 1.0), "nominal_area"),
+    (lambda: BackBurdekinContact(1.0, 1.0, 1.5),
+     r"exponent = 1\.5 must be above zero and at most 1"),
+    (lambda: BackBurdekinContact(-1.0, 1.0), "nominal_area"),
     (lambda: ExponentialContact(1.0, 0.0), "decay_length"),
     (lambda: ExponentialContact(0.0, 1.0), "ExponentialContact: force"),
     (lambda: GreenwoodWilliamson(0.0, 1.0, 1.0, 1.0), "asperities"),

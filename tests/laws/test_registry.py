@@ -27,6 +27,14 @@ def test_every_law_of_the_package_has_a_name(kind):
     assert not nameless
 
 
+@pytest.mark.parametrize("kind", law_names(), ids=lambda kind: kind.__name__)
+def test_names_in_files_are_those_of_the_classes(kind):
+    """In small letters, without what all of a kind have in common."""
+    for name, law in law_names()[kind].items():
+        title = law.__name__.removesuffix("Contact").removesuffix("Friction")
+        assert name.replace("-", "") == title.lower()
+
+
 def below(kind):
     """All classes that are derived from one."""
     return {law for child in kind.__subclasses__() for law in (child, *below(child))}

@@ -147,7 +147,7 @@ def test_a_study_of_ones_own_names_its_law(stored, capsys):
     {"ground": {"profile": {"law": "hostile.py:Harm"}}},
     {"ground": {"motion": {"law": "hostile.py:Harm"}}},
     {"drive": {"motion_x": {"law": "hostile.py:Harm"}}},
-    {"load": {"forces": [{"point": "C", "direction": "x",
+    {"load": {"forces": [{"point": "C", "component": "x",
                           "signal": {"law": "hostile.py:Harm"}}]}},
     {"contact": {"contact": {"normal": {"law": "hostile.py:Harm"}}}},
 ])

@@ -217,12 +217,12 @@ ground.profile 3
 ground.profile {law="sine",amplitude=1e-6,wavelength=0} wavelength
 ground.profile {law="sin"} did_you_mean_'sine'
 ground.profile {}
-ground.profile {law="trace",file="none.csv"} none.csv
-ground.profile {law="trace",file="."}
-ground.profile {law="trace",file="text.csv"} text.csv
-ground.profile {law="trace",file="empty.csv"} empty.csv
-ground.profile {law="trace",file="nan.csv"} nan.csv|finite
-ground.profile {law="trace",file="binary.csv"} binary.csv
+ground.profile {law="measured-profile",file="none.csv"} none.csv
+ground.profile {law="measured-profile",file="."}
+ground.profile {law="measured-profile",file="text.csv"} text.csv
+ground.profile {law="measured-profile",file="empty.csv"} empty.csv
+ground.profile {law="measured-profile",file="nan.csv"} nan.csv|finite
+ground.profile {law="measured-profile",file="binary.csv"} binary.csv
 ground.profile {law="random-roughness"}
 ground.motion {law="speed-ramp"}
 ground.motion 3
@@ -232,7 +232,7 @@ drive.damping_x -1
 drive.angular_frequency nan
 drive.motion_x 3
 drive.motion_x {law="tabulated",times=[0,1],values=[1]}
-drive.motion_x {law="sweep"}
+drive.motion_x {law="swept-sine"}
 load.normal nan
 load.normal "a"
 load.normal 1e400
@@ -469,12 +469,12 @@ plot run.vtkhdf history --t-end nan | t_end
 plot run.vtkhdf history --t-start 7 | 7
 plot run.vtkhdf phase --t-end 0 | t_end
 plot run.vtkhdf spectrum --quantity x | quantity
-plot run.vtkhdf spectrum --highest 0 | highest
+plot run.vtkhdf spectrum --highest-hz 0 | highest_hz
 plot run.vtkhdf spectrum --t-end 1e-4 | at least 8
-plot run.vtkhdf spectrogram --highest -1 | highest
+plot run.vtkhdf spectrogram --highest-hz -1 | highest_hz
 plot run.vtkhdf poincare | period
 plot run.vtkhdf receptance --point 0,0 | receptance
-plot run.vtkhdf receptance --highest inf | highest
+plot run.vtkhdf receptance --highest-hz inf | highest_hz
 plot cut.vtkhdf history | cut.vtkhdf
 plot none.toml history | none.toml
 export run.vtkhdf --format xlsx | format

@@ -303,7 +303,7 @@ MISTAKES = [
      r"\[load\.forces\]: There is no point 'D'"),
     ({"gap": {"radius": 1e-3}}, r"s.toml: \[gap\]: radius = 0\.001 must be at least 0\.0"),
     ({"gap": [0, 0]}, r"s.toml: gap has 2 values for 4 contact nodes"),
-    ({"drive.motion_x": {"law": "sweep", "amplitude": 1, "start_frequency_hz": 0,
+    ({"drive.motion_x": {"law": "swept-sine", "amplitude": 1, "start_frequency_hz": 0,
                          "end_frequency_hz": 1, "duration": 1, "kind": "logarithmic"}},
      r"\[drive\.motion_x\]: start_frequency_hz = 0\.0 must be a finite number above zero"),
     ({"render.t_start": 0.2, "render.t_end": 0.1},

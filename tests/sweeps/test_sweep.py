@@ -80,7 +80,7 @@ def test_numbers_of_laws_change_as_they_do_in_the_study(study):
 
 
 def test_members_of_lists_and_kept_bodies(study):
-    force = {"point": "C", "direction": "y", "signal": {"law": "harmonic", "amplitude": 1.0,
+    force = {"point": "C", "component": "y", "signal": {"law": "harmonic", "amplitude": 1.0,
                                                         "angular_frequency": 5.0}}
     loaded = study.with_(**{"load.forces": [force, force]})
     moved = loaded.with_(**{"load.forces.1.signal.amplitude": 3.0})

@@ -61,7 +61,7 @@ def equilibrium_branch(
         Its rates must not depend on time.
     start : Equilibrium, BranchPoint or (d,) sequence, optional
         Where to begin: an equilibrium or a guess, see
-        :func:`fecontact.bifurcation.equilibria.equilibrium.find_equilibrium`; a 'branch point' of
+        :func:`fecontact.bifurcation.find_equilibrium`; a 'branch point' of
         a branch of equilibria, through which the other branch is followed; or another point of
         such a branch, also of one read from a file, from which it goes on.
     parameter : str, optional

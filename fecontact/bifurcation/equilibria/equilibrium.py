@@ -162,7 +162,7 @@ def find_equilibrium(
         Values that differ from the field's base values, by name.
     start : (d,) sequence, optional
         Where to begin; for contact systems that of
-        :func:`fecontact.system.statics.static_equilibrium` with friction (steady sliding) by
+        :func:`fecontact.static_equilibrium` with friction (steady sliding) by
         default, else zero.
     tolerance : float
         Size of the last Newton step, relative to the state.

@@ -79,7 +79,7 @@ def hopf(
         - 2 B(q, J^{-1} B(q, \bar q)) + B(\bar q, (2 i w - J)^{-1} B(q, q)) \big]
 
     with the second and third derivatives B and C from
-    :func:`fecontact.bifurcation.fields.multilinear_forms. bend`, for the pair nearest to the
+    :func:`fecontact.bifurcation.fields.multilinear_forms.bend`, for the pair nearest to the
     imaginary axis or to ``near``.
 
     It describes a neighbourhood in which the friction law is close to its Taylor polynomial. For

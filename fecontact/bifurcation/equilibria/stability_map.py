@@ -84,7 +84,7 @@ def stability_map(
         Two names of parameters, and the values of each.
     start : Equilibrium or (d,) sequence, optional
         An equilibrium near that of the first values; see
-        :func:`fecontact.bifurcation.equilibria.equilibrium.find_equilibrium`.
+        :func:`fecontact.bifurcation.find_equilibrium`.
     progress : bool or callable, optional
         True for a progress bar on a terminal or in a notebook; a function is told the part of the
         map that is done, 0 to 1.

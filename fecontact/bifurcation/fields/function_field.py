@@ -156,7 +156,7 @@ def vector_field(
         min or max of states, no powers of negative numbers). It is compared with differences
         wherever it is used, and refused where it is wrong by more than 1e-7. 'automatic' is
         complex if that is right at samples of either sign around zero, up to twice the
-        scales, else differences; see :attr:`differentiation` of the result. Where it turns
+        scales, else differences; see ``differentiation`` of the result. Where it turns
         out wrong later, as functions do that overflow, differences take its place there, with
         a warning.
     scales : sequence, optional

@@ -25,7 +25,7 @@ def quantity_range(point: BranchPoint, row: ArrayLike) -> tuple[float, float]:
     """Smallest and largest value of a linear quantity ``row @ x`` over an orbit or equilibrium.
 
     ``row`` (d,) is a row of the states, such as that of a displacement
-    (:meth:`fecontact.bifurcation.fields.contact_field.ContactField.displacement_row`).
+    (:meth:`fecontact.bifurcation.ContactField.displacement_row`).
     """
     require_kind("quantity_range", BranchPoint, point=point)
     weights = as_floats(row, "row")

@@ -52,8 +52,8 @@ def render(
 def plot(
     file: RunFile,
     kind: Annotated[str, Parameter(
-        help="history, phase, contact, energies, modes, spectrum, density, spectrogram, poincare, "
-        "friction_work or receptance.")],
+        help="history, phase, contact_map, energies, modes, spectrum, density, spectrogram, "
+        "poincare, friction_work or receptance.")],
     /,
     *,
     point: Annotated[list[str] | None, Parameter(
@@ -61,10 +61,10 @@ def plot(
         help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
         "takes several.")] = None,
     component: Annotated[Literal["x", "y", "phi"] | None, Parameter(
-        help="Direction of the motion; that of the drive by default.")] = None,
+        help="Of the motion; that of the drive by default.")] = None,
     quantity: Annotated[str, Parameter(
         help="Of spectra: velocity, displacement, normal_force, ...")] = "velocity",
-    highest: Annotated[float | None, Parameter(help="End of the frequencies [Hz].")] = None,
+    highest_hz: Annotated[float | None, Parameter(help="End of the frequencies [Hz].")] = None,
     t_start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
     t_end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
     output: Annotated[Path | None, Parameter(
@@ -80,7 +80,7 @@ def plot(
     from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw
 
     choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
-                         highest)
+                         highest_hz)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"):
         redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)

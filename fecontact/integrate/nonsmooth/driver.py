@@ -79,7 +79,7 @@ def integrate_set_valued(
     ------
     InputError
         For friction that cannot be unsmoothed, or a scheme that cannot run the system; ranges are
-        checked by :class:`fecontact.integrate.solvers.SetValued`.
+        checked by :class:`fecontact.integrate.SetValued`.
 
     References
     ----------

@@ -32,7 +32,7 @@ def set_solver(G, reduced, v):
 
 @helper
 def _products(a, b, out):
-    """As :func:`stage_solver.products`; by BLAS where that is worth its call."""
+    """As :func:`fecontact.integrate.rodas5p.stage_solver.products`; by BLAS where it pays."""
     if len(a) * len(b) * a.shape[1] > _LARGE:
         np.dot(a, b.T, out)
     else:

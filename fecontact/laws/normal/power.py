@@ -175,7 +175,7 @@ def _hunt_crossley(e: float) -> float:
 
 
 @dataclass(frozen=True)
-class PowerLawContact(_Power):
+class BackBurdekinContact(_Power):
     r"""Machined surfaces pressed together: approach as a power of the pressure (Back-Burdekin).
 
     .. math:: u = C p^m \quad\Rightarrow\quad F = A (u / C)^{1/m} \max(0,\ 1 + \chi v)

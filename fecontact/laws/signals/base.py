@@ -21,7 +21,7 @@ def _history(address, t, p, out):
 
 @dataclass(frozen=True)
 class Signal:
-    """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.signatures.signal`.
+    """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.signal`.
 
     A signal of one's own sets ``kernel``, and overrides what else is not as here.
     """

@@ -25,7 +25,7 @@ def export_pvd(
     """Write frames of a run into a folder of VTU files, and a PVD file that lists them.
 
     Each frame holds ``displacement`` [m], ``von_mises`` [Pa] and ``contact_force`` [N] at the
-    nodes of the undeformed body, as in :func:`fecontact.output.files.case.write_case`.
+    nodes of the undeformed body, as in :func:`fecontact.write_case`.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def export_pvd(
     frames : int
         Number of frames, evenly spaced, never more than there are output times.
     trust : bool
-        Whether to run code that a file names; see :func:`fecontact.output.files.case.read_case`.
+        Whether to run code that a file names; see :func:`fecontact.read_case`.
 
     Returns
     -------

@@ -125,7 +125,7 @@ def recorded_system(
     basis : ModalBasis
         That of the run.
     tables : mapping
-        As of :func:`fecontact.core.tables.system_tables`.
+        As of :func:`fecontact.system.tables.system_tables`.
     where : str
         The file, for messages.
     state : mapping
@@ -133,7 +133,7 @@ def recorded_system(
     contact : (N, n, 6) array
         See :meth:`ContactSystem.contact_history`.
     contact_state : (N, n) integer array
-        Values of :class:`fecontact.integrate.trajectory.ContactState`.
+        Values of :class:`fecontact.ContactState`.
     energy : (N,) array
         Energy in the contact [J].
     needs : str

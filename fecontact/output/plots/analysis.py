@@ -50,9 +50,9 @@ def plot_spectrum(
     Parameters
     ----------
     trajectory : Trajectory
-        The run, transients cut off by :func:`fecontact.analysis.window.window`.
+        The run, transients cut off by :meth:`fecontact.Trajectory.between`.
     quantity, point, component
-        As for :func:`fecontact.analysis.histories.history`.
+        As for :func:`fecontact.analysis.history`.
     density : bool
         Power spectral density by Welch's method in the place of amplitudes.
     highest_hz : float, optional
@@ -171,7 +171,7 @@ def plot_poincare(
     component : "x" or "y"
         Direction of the motion.
     period, phase
-        As for :func:`fecontact.analysis.periodicity.strobed_states`.
+        As for :func:`fecontact.analysis.strobed_states`.
 
     Raises
     ------
@@ -260,7 +260,7 @@ def plot_receptance(
     Parameters
     ----------
     responses : Receptance or sequence of them
-        What :func:`fecontact.analysis.receptance.receptance` found, all of one
+        What :func:`fecontact.analysis.receptance` found, all of one
         kind.
     labels : sequence of str
         A name for each.
@@ -280,7 +280,7 @@ def plot_receptance(
     if not any(response.values.any() for response in responses):
         raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
                          f"{_place(responses[0].excitations[0])}; choose another point or "
-                         f"direction.")
+                         f"component.")
     with new_figure(9.0, 6.0, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
         number = 0

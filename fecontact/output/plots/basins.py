@@ -32,7 +32,7 @@ def plot_basins(
         Labels of the axes, with units.
     rows : (2, size) array, optional
         Rows that give the two quantities of the plane from a state
-        (:meth:`fecontact.bifurcation.attractors.basins.Axis.row`); with them the sections of the
+        (:meth:`fecontact.bifurcation.Axis.row`); with them the sections of the
         motions are marked.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.

@@ -51,8 +51,8 @@ def plot_branches(
         Each gets its own colour, those of one name the same.
     y, x : str, int or callable
         What to draw: 'parameter', the name of a stored number, the number of a state counted from
-        0, or a function of a :class:`fecontact.bifurcation.continuation.branch.BranchPoint`. For y
-        also 'observed_section' of :func:`fecontact.bifurcation.orbits.samples.observe`, one curve
+        0, or a function of a :class:`fecontact.bifurcation.BranchPoint`. For y
+        also 'observed_section' of :func:`fecontact.bifurcation.observe`, one curve
         for each period of the excitation.
     x_label, y_label : str, optional
         Labels of the axes, with units.
@@ -62,12 +62,12 @@ def plot_branches(
     beneath : PoincareScan, optional
         Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
         should be 'observed_section'.
-    observe : (point, axis)
+    observe : (point, component)
         The displacement of the runs that is drawn; see
-        :meth:`fecontact.bifurcation.attractors.poincare_scan.PoincareScan.observed`.
+        :meth:`fecontact.bifurcation.PoincareScan.observed`.
     insets : sequence of Inset
         Phase planes of chosen points, drawn above the diagram; see
-        :func:`fecontact.output.plots.diagram_insets.phase_inset`. A line joins each to its point.
+        :func:`fecontact.plot.phase_inset`. A line joins each to its point.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 

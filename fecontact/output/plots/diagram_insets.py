@@ -57,9 +57,9 @@ def phase_inset(
     point : BranchPoint
         A point of a branch of orbits, by collocation or shooting. The inset is joined to its place
         in the diagram of :func:`fecontact.plot.plot_branches`.
-    observe : (point, axis)
+    observe : (point, component)
         Displacement u that is drawn: 'B', 'C', a named point or the number of a contact node; 'x',
-        'y' or 'rotation'.
+        'y' or 'phi'.
     title : str, optional
         By default parameter and value.
 
@@ -133,8 +133,8 @@ def draw_beneath(
         return []
     from matplotlib.lines import Line2D
 
-    point, direction = observe
-    up, down = runs.observed(point, direction)  # type: ignore[arg-type]
+    point, component = observe
+    up, down = runs.observed(point, component)  # type: ignore[arg-type]
     handles = []
     for name, values, size in (("up", up, 2.6), ("down", down, 1.3)):
         if not values.size:

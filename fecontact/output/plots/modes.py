@@ -74,7 +74,7 @@ def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None)
     Parameters
     ----------
     result : ModeConvergence
-        What :func:`fecontact.reduction.convergence.mode_convergence` found.
+        What :func:`fecontact.reduction.mode_convergence` found.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
