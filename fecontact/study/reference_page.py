@@ -64,7 +64,7 @@ def _parts() -> Iterator[tuple[str, str]]:
 
 
 def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:
-    """A section, described by one of several classes, and the subsections of its laws and tables."""
+    """A section, described by one of several classes, and its subsections."""
     known = tuple(classes)
     if known in printed:
         yield name, _section(name, f"As `[{printed[known]}]`.")

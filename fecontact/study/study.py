@@ -162,7 +162,7 @@ class Study(Summarised):
 
     @classmethod
     def from_toml(cls, text: str, path: str | Path | None = None) -> "Study":
-        """Read a study from TOML text; ``path`` is the file that it stands for, see :meth:`read`."""
+        """Read a study from TOML text; ``path`` is the file it stands for, see :meth:`read`."""
         path = None if path is None else as_path(path, "a study")
         require_kind(_title(path), str, text=text)
         return cls.from_tables(parsed(text, _title(path)), path)

@@ -14,7 +14,7 @@ from fecontact.core.units import Unit
 _SUMMARIES = ("largest_displacement", "stick_fraction", "mean_normal_force", "peak_normal_force",
               "friction_power")
 
-_MOST_PERIODS = 100_000  # that are kept of a case
+_MOST_PERIODS = 100_000  # kept for each case
 
 _PARAMETERS: Mapping[str, tuple[str, ...]] = {
     "normal": ("mean", "std"),

@@ -9,7 +9,7 @@ from fecontact.cli.console import echo, show
 
 
 def doctor() -> int:
-    """Check that all libraries are there and work; echo what to install."""
+    """Check that all libraries are installed and work; print how to install missing ones."""
     from fecontact.cli.console import waiting
     from fecontact.cli.doctor import examine
     from fecontact.cli.tables import table
@@ -59,7 +59,7 @@ def keys(
 def demo(
     folder: Annotated[Path, Parameter(help="Where the results go.")] = Path("demo-output"), /,
 ) -> int:
-    """Make two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
+    """Run two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
     from fecontact.cli.demo import run_demo
 
     return run_demo(folder)

@@ -28,9 +28,10 @@ def branch(
 ) -> int:
     """Follow steady sliding or periodic orbits over a parameter: folds, Hopf points, doublings.
 
-    The section [branch] of the study says what; without it, steady sliding. Writes all branches
-    (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, frequencies and growth rates of the
-    modes in steady sliding. Ctrl-C stops it; what was computed until then is written.
+    The section [branch] of the study selects the solutions; without it, steady sliding is
+    followed. Writes all branches (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, and
+    frequencies and growth rates of the modes in steady sliding. Ctrl-C stops it; the points
+    computed so far are written.
     """
     from fecontact.cli.console import INTERRUPTED, waiting
     from fecontact.cli.run_files import read_study
@@ -74,7 +75,7 @@ def _wanted(
     given: "BranchSettings", parameter: str | None, bounds: tuple[float, float] | None,
     start: float | None,
 ) -> "BranchSettings":
-    """The section with what the command line says in its place."""
+    """The section [branch] with the options of the command line."""
     changed = given if parameter is None else replace(given, parameter=parameter)
     if bounds is not None:
         changed = replace(changed, bounds=bounds, start=None)

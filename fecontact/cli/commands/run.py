@@ -28,7 +28,7 @@ def render(
     t_end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
     trust: Trust = False,
 ) -> None:
-    """Draw a run as a movie or as numbered pictures; [render] of the study holds the defaults."""
+    """Render a run as a movie or as numbered pictures; defaults come from [render] of the study."""
     from dataclasses import replace
 
     from fecontact.cli.run_files import movie, stored_run
@@ -71,7 +71,7 @@ def plot(
         name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
     trust: Trust = False,
 ) -> None:
-    """Draw a plot of a run, again or of another kind."""
+    """Plot a stored run."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import stored_run
     from fecontact.core.files.atomic_write import output_folder
@@ -100,7 +100,7 @@ def export(
     frames: Annotated[int, Parameter(help="Number of fields over the body, for pvd.")] = 200,
     trust: Trust = False,
 ) -> None:
-    """Write a run in another format."""
+    """Export a run to another format."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import stored_run
     from fecontact.core.files.atomic_write import output_folder

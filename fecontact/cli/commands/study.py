@@ -25,7 +25,7 @@ def init(
 
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
-    # Resolved, because none/../study.toml is there once the folder of the new file is made.
+    # Resolve the path: none/../study.toml exists as soon as the folder of the new file is made.
     if file.resolve().exists() and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
@@ -33,7 +33,7 @@ def init(
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
-    """Make the mesh of a study, and print its size and its groups."""
+    """Generate or read the mesh of a study; print its size and groups."""
     from fecontact.cli.run_files import read_study
     from fecontact.cli.tables import mesh_table
     from fecontact.core.files.atomic_write import output_folder
@@ -61,7 +61,7 @@ def modes(
         "Refine the mesh, and take more modes: what changes, as a table and a plot."))]
     = False,
 ) -> None:
-    """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
+    """Print frequency, damping, kind and effective mass of the modes; plot their shapes."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import convergence_of, read_study
     from fecontact.core.files.atomic_write import output_folder
@@ -96,8 +96,8 @@ def run(
 ) -> int:
     """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
 
-    Ctrl-C stops the run, and so do SIGTERM and SIGHUP; what was computed until then is written, and
-    --resume goes on from there.
+    Ctrl-C, SIGTERM and SIGHUP stop the run; the part computed so far is written, and --resume
+    continues it.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_run
