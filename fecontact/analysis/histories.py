@@ -1,4 +1,4 @@
-"""Histories of a run by name: displacement x of B, friction force of node 3, total normal force."""
+"""Histories of a run by name, such as the displacement x of B or the friction force of node 3."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ class History(NamedTuple):
 
     values : (N,)
     unit : SI unit
-    title : for people, ``velocity x of B``
+    title : display text, such as ``velocity x of B``
     """
 
     values: Array
@@ -48,17 +48,18 @@ def history(
     quantity : str
         'displacement' or 'velocity' of any point; 'normal_force', 'friction_force',
         'penetration', 'penetration_rate', 'slip_velocity', 'pressure' or 'friction_work' of a
-        contact node; 'total_normal_force', 'total_friction_force' or 'total_friction_work' of all.
+        contact node; 'total_normal_force', 'total_friction_force' or 'total_friction_work' of the
+        whole face.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
     component : 'x', 'y' or 'phi'
-        Of displacements and velocities: along the ground, away from it, or the rotation.
+        Component of displacements and velocities: tangential, normal, or rotation.
 
     Raises
     ------
     InputError
-        For a quantity, a point or a component that does not exist, and for a quantity of contact
-        nodes at a point that is none.
+        For a quantity, point or component that does not exist, and for a contact quantity at a
+        point that is not a contact node.
     """
     require_kind("history", Trajectory, trajectory=trajectory)
     if quantity not in QUANTITIES:
@@ -87,13 +88,13 @@ def history(
 
 
 def usual_axis(system: ContactSystem) -> str:
-    """Axis in which a system moves most: y where only this is driven, else x."""
+    """Default axis for display: y if only y is driven, else x."""
     drive = system.drive
     return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"
 
 
 def point_name(point: Point) -> str:
-    """A point for people: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
+    """Display name of a point: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
     if isinstance(point, str):
         return point
     if isinstance(point, int | np.integer):

@@ -50,7 +50,7 @@ Geometry = Beam | Pendulum | Block | MeshFile
 
 
 def geometry_from_table(table: Any, where: str) -> Geometry:
-    """Geometry of the table ``[geometry]``; errors as in :func:`~fecontact.core.tables.from_table`."""
+    """Geometry described by ``[geometry]``; raises as :func:`~fecontact.core.tables.from_table`."""
     if not isinstance(table, Mapping) or ("shape" in table) == ("file" in table):
         raise InputError(f"{where} must have either a shape ({choices(SHAPES)}) or the file of a "
                          f"mesh.")

@@ -53,7 +53,7 @@ class Bases:
         return jobs + self._released()
 
     def made(self, batch: Batch, result: bytes | str | LostError) -> list[Job]:
-        """Store a basis made by a worker; returns the batches that were waiting for it."""
+        """Store a basis made by a worker; returns the jobs that can now start."""
         key = batch.cases[0].basis
         if isinstance(result, bytes):
             self._put(key, pickle.loads(result), batch)

@@ -165,7 +165,7 @@ class _Work:
             for key, basis, row in zip(keys, bases, cases.rows, strict=True)))
 
     def batches(self, store: Store) -> Iterator[Batch]:
-        """All cases in batches, which do not depend on resuming."""
+        """All cases in batches, independent of which are already finished."""
         different = list({case.key: case for case in self.cases}.values())
         first: dict[str, int] = {}
         for case in different:

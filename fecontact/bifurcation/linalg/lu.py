@@ -1,7 +1,7 @@
-"""Elimination with row interchanges of one small matrix, or of eight of the same size at once.
+"""LU elimination with row interchanges of one small matrix, or of eight of equal size at once.
 
-A matrix a (rows, columns) is more wide than high; of it the first ``count`` columns are
-eliminated. In place of these stand the factors of the rows, and on the diagonal the inverse pivots.
+A matrix a (rows, columns) has more columns than rows; its first ``count`` columns are eliminated.
+They are overwritten by the multipliers of the rows, with inverse pivots on the diagonal.
 """
 
 from fecontact.core.compiled import helper
@@ -45,7 +45,7 @@ def factorise(a, count, pivots):
 
 @helper
 def forward(a, count, pivots, r):
-    """Apply to a right side r (rows,) what :func:`factorise` did to the rows."""
+    """Apply the row operations of :func:`factorise` to a right-hand side r (rows,)."""
     for k in range(count):
         row = pivots[k]
         r[k], r[row] = r[row], r[k]
@@ -58,7 +58,7 @@ def forward(a, count, pivots, r):
 
 @helper
 def _with_pivot(a, k, order, room):
-    """Bring the largest entry of column k to row k in each lane; its inverse, kept there."""
+    """Move the largest entry of column k to row k in each lane; returns and stores its inverse."""
     rows, columns, _ = a.shape
     largest, place = magnitude(read(a[k, k])), spread(float(k))
     for i in range(k + 1, rows):
@@ -90,7 +90,7 @@ def _with_pivot(a, k, order, room):
 def eliminate_lanes(a, count, order, room):
     """As :func:`factorise` for a (rows, columns, 8); ``order`` (rows, 8) is filled.
 
-    Four columns are eliminated from the rows below at once: less is read and written.
+    Four columns are eliminated from the rows below at once to reduce memory traffic.
     """
     rows, columns, _ = a.shape
     for i in range(rows):
@@ -133,7 +133,7 @@ def eliminate_lanes(a, count, order, room):
 
 @helper
 def reduce_row(a, count, row, weights):
-    """Eliminate the first entries of a further row (columns,); ``weights`` (count,) says how."""
+    """Eliminate the first entries of a border row (columns,); fills its ``weights`` (count,)."""
     columns = len(row)
     for k in range(count):
         factor = row[k] * a[k, k]
@@ -155,7 +155,7 @@ def reduce_row_lanes(a, count, row, weights):
 
 @helper
 def forward_lanes(a, count, r):
-    """As :func:`forward`, for r (rows, 8) whose rows are in their order already."""
+    """As :func:`forward`, for r (rows, 8) with rows already permuted."""
     rows = len(r)
     for k in range(count):
         known = read(r[k])
@@ -165,7 +165,7 @@ def forward_lanes(a, count, r):
 
 @helper
 def back_lanes(a, count, r, known):
-    """Fill known[:count] (.., 8), the rest given, from the reduced right side r (count, 8)."""
+    """Back-substitution of r (count, 8): fill known[:count] (.., 8) from its other entries."""
     width = len(known)
     for i in range(count):
         total, other = read(r[i]), spread(0.0)

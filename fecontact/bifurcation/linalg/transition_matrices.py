@@ -1,4 +1,4 @@
-"""Transitions of an orbit from one interval to the next."""
+"""Transition matrices of an orbit from one interval to the next."""
 
 import math
 
@@ -11,7 +11,7 @@ from fecontact.core.compiled import block, borrowed, helper, kernel
 
 @helper
 def _solve(a, b, size):
-    """Replace b by a^-1 b, with row interchanges; a is used up."""
+    """Replace b by a^-1 b, with row interchanges; overwrites a."""
     for k in range(size):
         row = k
         for i in range(k + 1, size):
@@ -39,7 +39,7 @@ def _solve(a, b, size):
 
 @kernel(types.void(FACTORS, block))
 def transitions(factors, out):
-    """Fill out (N, d, d) with M_j, x_(j+1) = M_j x_j, of the condensed intervals."""
+    """Fill out (N, d, d) with the M_j of the condensed intervals, x_(j+1) = M_j x_j."""
     factors, out = borrowed(factors), borrowed(out)
     local = factors.local
     N, d, _ = out.shape
@@ -56,7 +56,7 @@ def transitions(factors, out):
 def condense_products(M):
     """Multiply neighbours of M (N, d, d) in place as long as no digits are lost.
 
-    A product is closed before the bound of its condition number passes 100. Returns the number of
+    A product ends before the bound of its condition number exceeds 100. Returns the number of
     products.
     """
     M = borrowed(M)
