@@ -25,7 +25,7 @@ class LostError(FecontactError):
     """A single case crashed its worker repeatedly."""
 
     def __init__(self) -> None:
-        super().__init__("The process that computed it ended without a word; it may have needed "
+        super().__init__("The process that computed it ended without a message; it may have needed "
                          "more memory than there is.")
 
 

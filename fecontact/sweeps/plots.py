@@ -66,7 +66,7 @@ def plot_sweep(
                 else _map(table, name, over[0], over[1], path))
     names = [key for key, values in table.parameters.items() if len(set(values)) > 1]
     if not names:
-        raise InputError("The sweep has one case only; there is nothing to plot.")
+        raise InputError("The sweep has only one case; there is nothing to plot.")
     numeric = [is_numeric(table.parameters[key]) for key in names]
     if table.shape is not None and len(names) == 2 and all(numeric) and min(
             len(set(table.parameters[key])) for key in names) > _MOST_LINES:

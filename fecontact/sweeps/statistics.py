@@ -71,7 +71,7 @@ def statistics(
     x = as_floats(values, "The values of statistics").ravel()
     x = x[np.isfinite(x)]
     if len(x) < 3:
-        raise InputError(f"Statistics need at least 3 cases that went well, not {len(x)}.")
+        raise InputError(f"Statistics need at least 3 successful cases, not {len(x)}.")
     _require_confidence(confidence)
     mean, std = float(x.mean()), float(x.std(ddof=1))
     half = std / np.sqrt(len(x)) * float(stats.t.ppf(0.5 + 0.5 * confidence, len(x) - 1))
@@ -142,7 +142,7 @@ def indices_of(
     f = f[:, np.isfinite(f).all(axis=0)]
     samples = f.shape[1]
     if samples < 8:
-        raise InputError(f"Sobol indices need at least 8 base samples that went well, not "
+        raise InputError(f"Sobol indices need at least 8 successful base samples, not "
                          f"{samples}.")
     found = _indices(f)
     rng = np.random.default_rng(seed)

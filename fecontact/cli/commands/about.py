@@ -30,7 +30,7 @@ def doctor() -> int:
 
 def laws(
     name: Annotated[str | None, Parameter(help=(
-        "A law, for its formula and parameters; one of your own, FILE.py:CLASS, is checked too."))]
+        "A law to explain; your own law, FILE.py:CLASS, is also checked."))]
     = None,
     /,
 ) -> None:
@@ -46,7 +46,7 @@ def laws(
 
 
 def keys(
-    section: Annotated[str | None, Parameter(help="A section, like ground.profile.")] = None, /,
+    section: Annotated[str | None, Parameter(help="A section, such as ground.profile.")] = None, /,
 ) -> None:
     """Print the sections and keys of study files: types, defaults, units and meaning."""
     from fecontact.cli.console import loading
@@ -57,7 +57,7 @@ def keys(
 
 
 def demo(
-    folder: Annotated[Path, Parameter(help="Where the results go.")] = Path("demo-output"), /,
+    folder: Annotated[Path, Parameter(help="Folder of the results.")] = Path("demo-output"), /,
 ) -> int:
     """Run two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
     from fecontact.cli.demo import run_demo

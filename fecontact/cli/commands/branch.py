@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 def branch(
     study: StudyFile,
     parameter: Annotated[str | None, Parameter(
-        help="Dotted name of a number, `ground.speed`, in place of that of `[branch]`.")] = None,
+        help="Continuation parameter, such as `ground.speed`; overrides `[branch]`.")] = None,
     /,
     *,
     bounds: Annotated[tuple[float, float] | None, Parameter(
-        help="Least and largest value of the parameter, in place of those of `[branch]`.")] = None,
+        help="Lower and upper bound of the parameter; overrides `[branch]`.")] = None,
     start: Annotated[float | None, Parameter(
-        help="Value at which it begins; the least by default.")] = None,
+        help="Starting value; the lower bound by default.")] = None,
     set_: Changes = None,
     output: Folder = None,
 ) -> int:

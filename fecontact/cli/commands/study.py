@@ -11,12 +11,12 @@ from fecontact.core.errors import InputError
 
 
 def init(
-    file: Annotated[Path, Parameter(help="The file to write.")] = Path("study.toml"),
+    file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
     shape: Annotated[Literal["beam", "pendulum", "block"], Parameter(
         help="Beam on wavy ground, pendulum on a stop, or block on a moving belt.")] = "beam",
-    force: Annotated[bool, Parameter(negative=(), help="Replace the file if there is one.")]
+    force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
     """Write a commented study file to start from."""
@@ -58,7 +58,7 @@ def modes(
     set_: Changes = None,
     output: Folder = None,
     converge: Annotated[bool, Parameter(negative=(), help=(
-        "Refine the mesh, and take more modes: what changes, as a table and a plot."))]
+        "Show convergence with mesh refinement and number of modes, as a table and a plot."))]
     = False,
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes."""
@@ -92,7 +92,7 @@ def run(
     set_: Changes = None,
     output: Folder = None,
     resume: Annotated[bool, Parameter(
-        negative=(), help="Go on with a run that was interrupted.")] = False,
+        negative=(), help="Resume an interrupted run.")] = False,
 ) -> int:
     """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
 

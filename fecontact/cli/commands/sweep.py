@@ -28,15 +28,15 @@ def sweep(
         name=["--output", "-o"], help="Folder of the sweep, instead of NAME-sweep among the "
                                       "results of the study.")] = None,
     resume: Annotated[bool, Parameter(
-        negative=(), help="Go on with a sweep; what is finished is not computed again.")] = False,
+        negative=(), help="Resume a sweep; finished cases are not repeated.")] = False,
     retry: Annotated[bool, Parameter(
-        negative=(), help="With --resume: compute failed cases again.")] = False,
+        negative=(), help="With --resume: repeat failed cases.")] = False,
     overwrite: Annotated[bool, Parameter(
-        negative=(), help="Remove the sweep that is there and begin anew.")] = False,
+        negative=(), help="Remove an existing sweep and start again.")] = False,
     workers: Annotated[int | None, Parameter(
-        help="Processes on this machine; one a core by default.")] = None,
+        help="Processes on this machine; one per core by default.")] = None,
     dask: Annotated[str | None, Parameter(
-        help="Address of a running Dask scheduler, `tcp://node1:8786`, whose workers compute.")]
+        help="Address of a running Dask scheduler, such as `tcp://node1:8786`.")]
     = None,
 ) -> int:
     """Run many cases of a study on all cores or a cluster; write a table (index.csv) and plots.
