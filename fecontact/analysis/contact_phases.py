@@ -18,7 +18,7 @@ Nodes = int | str | None
 
 
 def chosen_nodes(system: ContactSystem, nodes: Nodes) -> Integers:
-    """Numbers of the nodes meant: one node, those of a contact group, or all (None).
+    """Indices of selected nodes: one node, those of a contact group, or all (None).
 
     Raises
     ------
@@ -40,7 +40,7 @@ def chosen_nodes(system: ContactSystem, nodes: Nodes) -> Integers:
 
 
 class Ends(NamedTuple):
-    """Two ends of p pieces of a motion: times (p,), penetrations and rates (p, k) at each."""
+    """End points of p motion segments: times (p,), penetrations and rates (p, k)."""
 
     t0: Array
     u0: Array
@@ -50,7 +50,7 @@ class Ends(NamedTuple):
     v1: Array
 
     def between(self, part: Array) -> Array:
-        """Penetrations and rates (2, p, j, k) at parts (p, j), 0 to 1, of the pieces."""
+        """Penetrations and rates (2, p, j, k) at fractions (p, j), 0 to 1, of the segments."""
         step, s = (self.t1 - self.t0)[:, None, None], part[:, :, None]
         u0, u1, v0, v1 = (value[:, None] for value in (self.u0, self.u1, self.v0, self.v1))
         rise = (u1 - u0) / step
@@ -60,10 +60,10 @@ class Ends(NamedTuple):
 
 
 class Switches(NamedTuple):
-    """Moments at which a face touches or touches no longer.
+    """Times of touch-down and lift-off of a face.
 
-    interval : (j,), output intervals in which they lie
-    down : (j,), whether it touches from then on
+    interval : (j,), output intervals that contain them
+    down : (j,), True for touch-down, False for lift-off
     time : (j,) [s]
     penetration, rate : (j, k) [m, m/s]
     """
@@ -77,15 +77,15 @@ class Switches(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ContactMotion:
-    """Motion of some contact nodes of a run, with what their normal laws make of it.
+    """Motion of contact nodes of a run and the resulting normal forces.
 
     Attributes
     ----------
     trajectory : Trajectory
     nodes : (k,) array
-        Numbers of the nodes.
+        Indices of the nodes.
     weights : (k,) array
-        Part of these nodes' contact face that belongs to each.
+        Fraction of the contact face of these nodes that belongs to each node.
     """
 
     trajectory: Trajectory
@@ -99,8 +99,8 @@ class ContactMotion:
         Raises
         ------
         InputError
-            For nodes that do not exist, and for runs with rigid stops, whose impacts take no
-            time.
+            For nodes that do not exist, and for runs with rigid stops, where impacts are
+            instantaneous.
         """
         held = trajectory.held_normal_force
         if held is not None:
@@ -127,7 +127,7 @@ class ContactMotion:
 
     @cached_property
     def rate(self) -> Array:
-        """Their rates (N, k) [m/s]."""
+        """Penetration rates (N, k) at the output times [m/s]."""
         return self.trajectory.penetration_rate[:, self.nodes]
 
     @cached_property
@@ -147,10 +147,10 @@ class ContactMotion:
 
     @cached_property
     def switches(self) -> Switches:
-        """Where the force of the first node begins and that of the last one ends.
+        """Touch-downs and lift-offs: the first node gains, or the last node loses, its force.
 
-        From the output time on the side without contact the motion is carried on by its
-        acceleration, which the contact has not changed there yet.
+        The motion is extrapolated from the output time on the side without contact, with the
+        acceleration there, which contact does not affect.
         """
         touching = (self.force != 0.0).any(axis=1)
         interval = np.flatnonzero(touching[1:] != touching[:-1])
@@ -177,7 +177,7 @@ class ContactMotion:
         rates = np.array([system.rhs(*at) for at in zip(t, states, strict=True)])
         if not len(index):
             return np.empty((0, len(self.nodes)))
-        # Of the motion alone: the state is carried on straight, and the ground moves below.
+        # Central difference of the rates, with the state extrapolated linearly over moving ground.
         tiny = 1e-3 * float(np.diff(self.time).min())
         before, after = (
             system.contact_history(t + h, states + h * rates)[:, self.nodes,
@@ -186,7 +186,7 @@ class ContactMotion:
         return np.asarray((after - before) / (2.0 * tiny))
 
     def pieces(self) -> tuple[Integers, Ends]:
-        """Output intervals with contact, cut at the switches; and the phase of each, from 0."""
+        """Output intervals with contact, split at the switches, and their phase numbers from 0."""
         touching = (self.force != 0.0).any(axis=1)
         with_contact = touching[1:] | touching[:-1]
         u, v, t = self.penetration, self.rate, self.time
@@ -198,6 +198,6 @@ class ContactMotion:
                                     (found.time, found.penetration, found.rate), strict=True):
                 part[found.interval[chosen]] = values[chosen]
         begins = np.concatenate([[touching[0] * 1], ~touching[:-1] & touching[1:]])
-        # A switch at an output time leaves nothing of its interval.
+        # A switch at an output time leaves an interval of zero length.
         kept = with_contact & (ends.t1 > ends.t0)
         return (np.cumsum(begins) - 1)[1:][kept], Ends(*(part[kept] for part in ends))

@@ -1,4 +1,4 @@
-"""Histories of a run by name: displacement x of B, friction force of node 3, total normal force."""
+"""Histories of a run by name, such as the displacement x of B or the friction force of node 3."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ class History(NamedTuple):
 
     values : (N,)
     unit : SI unit
-    title : for people, ``velocity x of B``
+    title : display text, such as ``velocity x of B``
     """
 
     values: Array
@@ -48,17 +48,18 @@ def history(
     quantity : str
         'displacement' or 'velocity' of any point; 'normal_force', 'friction_force',
         'penetration', 'penetration_rate', 'slip_velocity', 'pressure' or 'friction_work' of a
-        contact node; 'total_normal_force', 'total_friction_force' or 'total_friction_work' of all.
+        contact node; 'total_normal_force', 'total_friction_force' or 'total_friction_work' of the
+        whole face.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
     component : 'x', 'y' or 'phi'
-        Of displacements and velocities: along the ground, away from it, or the rotation.
+        Component of displacements and velocities: tangential, normal, or rotation.
 
     Raises
     ------
     InputError
-        For a quantity, a point or a component that does not exist, and for a quantity of contact
-        nodes at a point that is none.
+        For a quantity, point or component that does not exist, and for a contact quantity at a
+        point that is not a contact node.
     """
     require_kind("history", Trajectory, trajectory=trajectory)
     if quantity not in QUANTITIES:
@@ -93,7 +94,7 @@ def usual_component(system: ContactSystem) -> str:
 
 
 def point_name(point: Point) -> str:
-    """A point for people: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
+    """Display name of a point: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
     if isinstance(point, str):
         return point
     if isinstance(point, int | np.integer):

@@ -1,4 +1,4 @@
-"""Impacts: contact phases with velocities, restitution and forces; rests at the end of chatter."""
+"""Impacts: contact phases with velocities, restitution and forces; rest after chatter."""
 
 import math
 from dataclasses import dataclass, fields
@@ -14,7 +14,7 @@ from fecontact.core.errors import AnalysisError, InputError, require_not_negativ
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 
-# Gauss-Lobatto points and weights on [0, 1]: the ends count for the largest force.
+# Gauss-Lobatto points and weights on [0, 1]; they include the ends, needed for the peak force.
 _PARTS = 0.5 + 0.5 * np.array([-1.0, -math.sqrt(3.0 / 7.0), 0.0, math.sqrt(3.0 / 7.0), 1.0])
 _WEIGHTS = np.array([0.05, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 0.05])
 
@@ -23,16 +23,16 @@ _WEIGHTS = np.array([0.05, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 0.05])
 class Impacts:
     """Contact phases in the order of their touch-down, each (k,).
 
-    A phase that was under way when the run began has no touch-down, one that went on at its end
-    no lift-off: the values there are NaN.
+    Values at touch-down are NaN for a phase that began before the run, values at lift-off for one
+    that continues beyond its end.
 
     Attributes
     ----------
     touch_down, lift_off : (k,) arrays
-        When the normal force begins and when it first returns to zero [s].
+        Times at which the normal force begins and first returns to zero [s].
     impact_velocity, separation_velocity : (k,) arrays
-        Velocity of the nodes towards the ground at touch-down and away from it at lift-off, the
-        mean over the face for several nodes [m/s].
+        Approach velocity at touch-down and separation velocity at lift-off [m/s]; the mean over
+        the face for several nodes.
     peak_force : (k,) array
         Largest total normal force [N].
     impulse : (k,) array
@@ -54,14 +54,14 @@ class Impacts:
 
     @property
     def duration(self) -> Array:
-        """Length (k,) of the contact [s]."""
+        """Duration (k,) of the contact [s]."""
         return self.lift_off - self.touch_down
 
     @property
     def restitution(self) -> Array:
         """Separation velocity over impact velocity (k,): 1 for an elastic impact of one mass.
 
-        A body whose vibrations give back what earlier impacts put into them may have more.
+        It may exceed 1 for a body that returns vibration energy from earlier impacts.
         """
         return self.separation_velocity / self.impact_velocity
 
@@ -77,13 +77,13 @@ class Impacts:
 
 
 class Rest(NamedTuple):
-    """A chatter that came to rest.
+    """Rest after chatter: a lasting contact with vanishing velocity.
 
-    touch_down : [s], of the contact that stays
-    at_rest : [s], from when on the velocity stays small
-    lift_off : [s], NaN if the run ends before
-    impacts : number of touch-downs since the rest before, or since the run's start, the last one
-        included
+    touch_down : touch-down of the lasting contact [s]
+    at_rest : time from which the velocity stays small [s]
+    lift_off : end of the contact [s]; NaN if the run ends before
+    impacts : number of touch-downs since the previous rest or the start of the run, including
+        that of the lasting contact
     """
 
     touch_down: float
@@ -97,25 +97,25 @@ def find_impacts(
 ) -> Impacts:
     """Contact phases of a run.
 
-    Touch-down and lift-off are found between output times by the law's normal force; their errors
-    are of the third order in the time between outputs.
+    Touch-down and lift-off are located between output times by the normal force of the law, with
+    errors of third order in the output interval.
 
     Parameters
     ----------
     trajectory : Trajectory
         A run with several output times in each contact.
     nodes : int, str or None
-        A contact node by its number, a contact group, or all nodes as one face, which is in
-        contact as long as any of its nodes.
+        Number of a contact node, name of a contact group, or None for all nodes. A face is in
+        contact while any of its nodes is.
     shortest_flight : float
-        Phases with less time between them count as one [s].
+        Phases separated by less than this time are merged [s].
 
     Raises
     ------
     InputError
         For nodes that do not exist, a negative time, or a run with rigid stops.
     AnalysisError
-        If a contact took place between two output times; more of them are needed.
+        If a whole contact lies between two output times; more outputs are needed.
     """
     require_kind("find_impacts", Trajectory, trajectory=trajectory)
     require_not_negative("find_impacts", shortest_flight=shortest_flight)
@@ -124,7 +124,7 @@ def find_impacts(
     _require_resolved(motion, touching)
     found = motion.switches
     rate, down = found.rate @ motion.weights, found.down
-    # A phase under way at either end of the run has NaN there.
+    # A phase cut by an end of the run is NaN there.
     head = [np.nan] if touching[0] else []
     tail = [np.nan] if touching[-1] else []
     begins, ends = np.append(head, found.time[down]), np.append(found.time[~down], tail)
@@ -150,7 +150,7 @@ def find_rests(
     slower_than: float = 0.1,
     shortest_flight: float = 0.0,
 ) -> list[Rest]:
-    """Where a run comes to rest on the ground or a stop, as chatter does after many rebounds.
+    """Find where a run comes to rest on the ground or a stop, as after chatter.
 
     Parameters
     ----------
@@ -159,16 +159,16 @@ def find_rests(
     nodes : int, str or None
         As for :func:`find_impacts`.
     longer_than : float, optional
-        Least time of the contact [s]; a tenth of the drive's period by default.
+        Minimum duration of the contact [s]; a tenth of the drive period by default.
     slower_than : float
-        At rest the velocity stays below this part of the run's largest impact velocity.
+        Velocity limit at rest, as a fraction of the largest impact velocity of the run.
     shortest_flight : float
         As for :func:`find_impacts`.
 
     Raises
     ------
     InputError, AnalysisError
-        As :func:`find_impacts`; and without a drive if ``longer_than`` is left out.
+        As :func:`find_impacts`, and for a run without a drive if ``longer_than`` is not given.
     """
     require_kind("find_rests", Trajectory, trajectory=trajectory)
     require_positive("find_rests", slower_than=slower_than)
@@ -185,7 +185,7 @@ def find_rests(
         first = motion.time[0] if np.isnan(begin) else begin
         last = motion.time[-1] if np.isnan(end) else end
         inside = np.flatnonzero((motion.time >= first) & (motion.time <= last))
-        # What lifts off again has a velocity in the end; that of the first half counts.
+        # A contact that ends in lift-off has a velocity at its end: use the first half only.
         half = inside[motion.time[inside] <= 0.5 * (first + last)]
         moving = half[speed[half] > fast]
         if last - first <= longer_than or (len(moving) and moving[-1] == half[-1]):
@@ -199,8 +199,8 @@ def find_rests(
 def _require_resolved(motion: ContactMotion, touching: NDArray[np.bool_]) -> None:
     """Raise if a node must have been in contact between two output times without contact.
 
-    It then comes towards the ground and leaves it, with a change of velocity that is not that of
-    a flight, whose continuation would have ended in the ground.
+    Its velocity reverses from approach to separation by a change that the accelerations at both
+    outputs do not explain, and free flight from the first output would reach the ground.
     """
     free = ~(touching[1:] | touching[:-1])[:, None]
     turns = free & (motion.rate[:-1] > 0.0) & (motion.rate[1:] < 0.0)
@@ -222,7 +222,7 @@ def _require_resolved(motion: ContactMotion, touching: NDArray[np.bool_]) -> Non
 
 
 def _joined(impacts: Impacts, shortest_flight: float) -> Impacts:
-    """Phases with less time between them as one."""
+    """Merge phases separated by less than ``shortest_flight``."""
     if len(impacts) < 2 or shortest_flight <= 0.0:
         return impacts
     apart = impacts.touch_down[1:] - impacts.lift_off[:-1] >= shortest_flight

@@ -1,4 +1,4 @@
-"""Periodicity: states once per drive period, and the number of periods after which they repeat."""
+"""Periodicity: strobed states and the number of drive periods after which they repeat."""
 
 from dataclasses import dataclass
 from numbers import Integral
@@ -44,18 +44,18 @@ class Strobe:
 
 @dataclass(frozen=True)
 class Periodicity:
-    """What :func:`count_periods` found.
+    """Result of :func:`count_periods`.
 
     Attributes
     ----------
     periods : int or None
         Number of drive periods after which the motion repeats; None if it does not.
     misfit : float
-        Largest difference between points that many periods apart (those of the best number
-        tried, if none fits), relative to the size of the attractor.
+        Largest difference between points ``periods`` periods apart (the best number tried if the
+        motion does not repeat), relative to the size of the attractor.
     settled : bool
-        False if the motion is still approaching, or leaving, one of fewer periods: then
-        ``periods`` is None, and a longer run will tell.
+        False if the motion still approaches or leaves an orbit of fewer periods; ``periods`` is
+        then None, and a longer run is needed.
     """
 
     periods: int | None
@@ -72,25 +72,25 @@ def strobed_states(
 ) -> Strobe:
     """States of a run once per period, at the times ``(k + phase) period``.
 
-    Between output times they are those of the cubic that has the states and their rates at both
-    ends; a run whose outputs hit these times gives its states as they are.
+    Between output times states are interpolated by cubic Hermite polynomials; states at output
+    times are returned unchanged.
 
     Parameters
     ----------
     trajectory : Trajectory
         The run.
     period : float, optional
-        [s]; that of the drive by default.
+        Period [s]; that of the drive by default.
     phase : float
-        Part of the period, 0 to 1, counted from t = 0.
+        Phase as a fraction of the period, 0 to 1, counted from t = 0.
     t_start : float, optional
-        Transients before this time are left out [s]; the middle of the run by default.
+        Start of the evaluation, after the transient [s]; the middle of the run by default.
 
     Raises
     ------
     InputError
         If the system has no drive and no period is given, for values out of range, or if the run
-        ends before.
+        ends before ``t_start``.
     """
     require_kind("strobed_states", Trajectory, trajectory=trajectory)
     system, t = trajectory.system, trajectory.time
@@ -129,22 +129,22 @@ def count_periods(
 ) -> Periodicity:
     """Number of steps after which a sequence of points repeats.
 
-    The smallest k for which ``|x_(i+k) - x_i| <= tolerance scale`` holds in every component for
-    the last returns, at least 8 and at least 2 k of them. If the difference at a divisor of k
-    still shrinks or grows from return to return, the sequence is on its way: slowly to an orbit
-    of fewer steps, or away from it.
+    This is the smallest k for which ``|x_(i+k) - x_i| <= tolerance scale`` holds in every
+    component for the last returns, at least 8 and at least 2 k of them. If the difference at a
+    divisor of k still shrinks or grows from return to return, the sequence has not settled: it
+    slowly approaches or leaves an orbit of fewer steps.
 
     Parameters
     ----------
     points : (N, d) array
-        States once per period, transients cut off; or (N,) of one quantity.
+        States once per period after the transient; or (N,) of one quantity.
     scale : float or (d,) array
-        Size of the attractor in each component: of the whole motion, not of these points alone,
-        which coincide for a motion of one period.
+        Size of the attractor in each component. Take it from the whole motion: the strobed points
+        of a period-one motion coincide.
     largest : int
         Largest number of periods tried; ``2 largest + largest`` points are needed.
     tolerance : float
-        Relative to the scale.
+        Tolerance relative to the scale.
 
     Raises
     ------
@@ -186,14 +186,14 @@ def periodicity(
 ) -> Periodicity:
     """Number of drive periods after which a run repeats, or None.
 
-    Compares displacements and velocities of B and the contact nodes once per period; each
-    tolerance is relative to the range that the quantity has in the run after ``t_start``.
+    Compares displacements and velocities of B and the contact nodes once per period. The
+    tolerance of each is relative to its range in the run after ``t_start``.
 
     Parameters
     ----------
     trajectory : Trajectory
-        A run over at least ``3 largest`` periods after ``t_start``, with at least eight outputs per
-        period, from which the size of the attractor is taken.
+        A run over at least ``3 largest`` periods after ``t_start``, with at least eight outputs
+        per period to measure the size of the attractor.
     period, t_start
         As for :func:`strobed_states`.
     largest, tolerance
@@ -220,7 +220,7 @@ def periodicity(
         return np.hstack([states[:, :m] @ rows.T, states[:, m : 2 * m] @ rows.T])
 
     size = np.ptp(observed(trajectory.states[late]), axis=0)
-    # What does not move, or only by a billionth of what does, has no size to be compared with.
+    # Ignore quantities that do not move, or by less than a billionth of the others.
     halves = np.split(size, 2)
     moves = np.concatenate([half > 1e-9 * half.max(initial=0.0) for half in halves])
     if not moves.any():
@@ -248,8 +248,8 @@ def _returns(x: Array, k: int) -> Array:
 def _drifts(x: Array, divisor: int, periods: int, misfit: float, tolerance: float) -> bool:
     """Whether the differences of points ``divisor`` apart shrink or grow steadily.
 
-    Those below the tolerance by a factor of twenty do not count: errors of the integrator, which
-    orbits that all but graze the ground amplify.
+    Differences below a twentieth of the tolerance are ignored: they are integration errors,
+    amplified by orbits close to grazing.
     """
     window = max(2 * max(2 * periods, _LEAST_CHECKS), len(x) // 2)
     distance = np.abs(x[divisor:] - x[:-divisor]).max(axis=1)[-window:]
@@ -258,7 +258,7 @@ def _drifts(x: Array, divisor: int, periods: int, misfit: float, tolerance: floa
     if max(early, late) < 0.05 * tolerance:
         return False
     if divisor == periods:
-        # Below the tolerance, only growth shows that the motion is not the one it seems to be.
+        # Below the tolerance only growth counts: the motion leaves the orbit it is close to.
         return late > 2.0 * early
-    # Those of an orbit of more periods vary by no more than the orbit misses itself.
+    # For an orbit of more periods they vary by no more than the misfit of the orbit.
     return abs(late - early) > 0.02 * max(early, late) + 2.0 * misfit

@@ -21,7 +21,7 @@ _POWERS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 _COMPONENTS = {"x": 0, "y": 1, "phi": 2}
 _UNITS = {"x": "m", "y": "m", "phi": "rad"}
 _RATES = ("", "/s", "/s^2")
-_CHUNK = 2_000_000  # entries of dynamic stiffness matrices at a time
+_CHUNK = 2_000_000  # matrix entries processed at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +35,12 @@ class Receptance:
     values : (F, R, E) complex array
         Response r to excitation e; see :meth:`unit`.
     responses, excitations : tuples of (point, component)
-        Components x, y, and phi: a rotation as response, a moment as excitation.
+        Components x, y and phi; phi is a rotation as response and a moment as excitation.
     kind : 'receptance', 'mobility' or 'accelerance'
         Displacement, velocity or acceleration per force.
     growing : (k,) complex array
-        Eigenvalues of the system, linearised where it was, with positive real parts [1/s], those
-        with positive or no imaginary part, the largest real part first. If there are any, free
-        vibrations grow over the response to the force, which is then not to be seen.
+        Unstable eigenvalues [1/s] of the linearised system, one of each complex pair, by falling
+        real part. If there are any, growing free vibrations mask the forced response.
     """
 
     frequency_hz: Array
@@ -53,12 +52,12 @@ class Receptance:
 
     @property
     def stable(self) -> bool:
-        """Whether free vibrations die away, or at least do not grow."""
+        """Whether no free vibration grows."""
         return len(self.growing) == 0
 
     @property
     def growth_in_words(self) -> str:
-        """The vibration that grows fastest, for people; empty if none does."""
+        """Description of the fastest-growing vibration; empty if none grows."""
         if self.stable:
             return ""
         fastest = self.growing[0]
@@ -67,7 +66,7 @@ class Receptance:
             f"deviations grow by {fastest.real:.3g} 1/s")
 
     def unit(self, response: int = 0, excitation: int = 0) -> str:
-        """Unit of one of the responses, like m/N."""
+        """Unit of a response, such as m/N."""
         moved = _UNITS[self.responses[response][1]] + _RATES[_POWERS[self.kind]]
         push = "N m" if self.excitations[excitation][1] == "phi" else "N"
         return f"{moved}/({push})" if " " in push else f"{moved}/{push}"
@@ -79,7 +78,7 @@ class Receptance:
 
     @property
     def phase(self) -> Array:
-        """Phases (F, R, E) by which the responses lead the forces, from -pi to pi [rad]."""
+        """Phase lead (F, R, E) of the responses over the forces, from -pi to pi [rad]."""
         return np.angle(self.values)
 
 
@@ -98,25 +97,25 @@ def receptance(
         \big[\operatorname{diag}(w_i^2) + c\, T_B^T T_B + i \omega (D + b\, T_B^T T_B)
         - \omega^2 I\big]^{-1} T_e^T
 
-    with the springs c and dashpots b of the drive, whose far ends rest, and p = 0, 1, 2 for
-    receptance, mobility, accelerance. Linearised at a state, the contact's stiffness and damping
-    come in by the Jacobian there; a node that sticks is held by its friction's slope
-    dR/dv, as by a dashpot. An unstable state, of which the result says so, never answers a force
-    in this way: what grows from it ends somewhere else.
+    with the springs c and dashpots b of the drive, whose far ends are fixed, and p = 0, 1, 2 for
+    receptance, mobility, accelerance. Linearisation at a state adds the stiffness and damping of
+    the contact by the Jacobian; a sticking node acts as a dashpot with the friction slope dR/dv.
+    The result says if the state is unstable; the response is then that of the linear equations
+    only and cannot be observed.
 
     Parameters
     ----------
     body : ModalBasis or ContactSystem
-        A basis is the body alone; a system has the springs and dashpots of its drive.
+        A basis stands for the body alone; a system includes springs and dashpots of its drive.
     frequency_hz : (F,) array
-        [Hz], zero or above.
+        Frequencies [Hz], zero or positive.
     excitations, responses : sequences of (point, component)
-        Points by name, contact nodes by number; 'x', 'y' or 'phi'. Responses where the
-        excitations are by default.
+        Points by name, contact nodes by number; components 'x', 'y' or 'phi'. By default the
+        responses are those at the excitations.
     kind : 'receptance', 'mobility' or 'accelerance'
         Displacement, velocity or acceleration per force.
     linearised_at : 'rest', 'sliding' or (2 m + n s,) array, optional
-        Equilibrium about which a system moves, with its contact; see
+        Equilibrium at which a system is linearised, including contact; see
         :func:`fecontact.integrate.initial_state`.
 
     Raises
@@ -125,8 +124,8 @@ def receptance(
         For points, components or a kind that do not exist, negative frequencies, or a
         linearisation of a basis.
     AnalysisError
-        Where the response is infinite: at frequency zero of a body that nothing holds, or at an
-        undamped eigenfrequency; and if there is no equilibrium.
+        If the response is infinite (at frequency zero of an unsupported body, or at an undamped
+        eigenfrequency), or if there is no equilibrium.
     """
     require_kind("receptance", (ModalBasis, ContactSystem), body=body)
     basis = body.basis if isinstance(body, ContactSystem) else body
@@ -164,10 +163,10 @@ def receptance(
 
 
 def _growing(matrix: Array) -> NDArray[np.complex128]:
-    """Eigenvalues of the state matrix with positive real parts; those of a pair once."""
+    """Eigenvalues of the state matrix with positive real part, one of each complex pair."""
     found = np.linalg.eigvals(matrix).astype(complex)
     size = np.abs(found)
-    # Less is round-off, of undamped modes and of rigid ones.
+    # Smaller real parts are round-off of undamped and rigid modes.
     zero = 1e-10 * size + 1e-13 * size.max()
     found = found[(found.real > zero) & (found.imag >= 0.0)]
     return np.asarray(found[np.argsort(-found.real)])

@@ -1,8 +1,7 @@
-"""Runs refined between their outputs until they are dense enough to plot, peaks included.
+"""Refinement of runs between their outputs, so that plotted curves and peaks are resolved.
 
-Outputs may miss an impact between two of them, and draw a circle of seven points as a heptagon. The
-state at an output determines the motion after it: where outputs are too far apart, the run is
-computed again from there with more of them, until the curves are resolved.
+Sparse outputs may miss an impact or distort a closed curve. As the state at an output determines
+the motion after it, the run is repeated from there with more outputs until curves are resolved.
 """
 
 import math
@@ -22,33 +21,34 @@ from fecontact.integrate.trajectory import Status, Trajectory
 
 Flags = NDArray[np.bool_]
 
-# Largest distance of a curve from its straight pieces, of the range of what is drawn.
+# Largest distance of a curve from its chords, relative to its range.
 _ERROR = 1.0 / 400.0
-# Ranges of displacements and velocities below these parts of the largest are noise, and so are
-# changes of forces below this part of the largest.
+# Ranges of displacements and velocities below these fractions of the largest one are noise, as are
+# changes of forces below this fraction of the largest.
 _SMALL, _SMALL_RATE, _SMALL_FORCE = 1e-5, 1e-4, 1e-6
-# Distance of a repeated motion from the outputs, of the range: beyond, it is another motion.
+# Largest distance of a repeated motion from the outputs, relative to the range; beyond it, the
+# motions differ.
 _SAME = 0.01
 _LEVELS = 4
-_FEWEST, _MORE, _MOST = 8, 16, 64  # parts of an interval
-_WINDOW, _GAP = 256, 16  # intervals that are run at once; those passed on the way to the next
-_NUMBERS = 20_000_000  # kept of a run
-_STEPS = 1_000_000  # computed again
-_FAILURES = 8  # one after the other, before the run is taken as one that cannot be repeated
-_TOLD = 2e-3  # part of the time
-_NODES = 8  # contact nodes whose motion is looked at, beside the named points
+_FEWEST, _MORE, _MOST = 8, 16, 64  # subdivisions of an interval
+_WINDOW, _GAP = 256, 16  # intervals repeated in one run; largest gap skipped within it
+_NUMBERS = 20_000_000  # stored per run
+_STEPS = 1_000_000  # repeated per run
+_FAILURES = 8  # consecutive failures before the run is considered not repeatable
+_TOLD = 2e-3  # fraction of the time
+_NODES = 8  # contact nodes monitored besides the named points
 
-_COUNTED = ("work", "node_friction_work")  # from the first time of a run
+_COUNTED = ("work", "node_friction_work")  # relative to the first time of a run
 _STATE = ("modal_coordinates", "modal_velocities", "memory", "held_normal_force",
           "held_friction_force")
 
 
 class Resolved(NamedTuple):
-    """What :func:`resolved` gives.
+    """Result of :func:`resolved`.
 
-    trajectory : the run with further times between its outputs, or the run itself
-    coarse : part of the time in which straight pieces between its times may cut peaks
-    reason : why, for people
+    trajectory : the run with additional output times, or the run itself
+    coarse : fraction of the time in which chords between outputs may cut off peaks
+    reason : why it stayed coarse, as text
     """
 
     trajectory: Trajectory
@@ -57,7 +57,7 @@ class Resolved(NamedTuple):
 
     @property
     def note(self) -> str:
-        """For pictures; empty if nothing is wrong."""
+        """Note for plots; empty if everything is resolved."""
         if self.coarse <= _TOLD:
             return ""
         return (f"straight lines between outputs in {max(self.coarse, 0.01):.0%} of the time, "
@@ -68,23 +68,23 @@ _KNOWN: "WeakKeyDictionary[Trajectory, Resolved]" = WeakKeyDictionary()
 
 
 def resolved(trajectory: Trajectory) -> Resolved:
-    """The run with further times wherever its outputs are too far apart to be joined by lines.
+    """Add output times wherever outputs are too far apart to be joined by straight lines.
 
-    Straight pieces between the times are no further than 1/400 of its range from displacements
-    and velocities of the named points, and from normal and friction forces; so much may peaks be
-    cut. Outputs stay as they are. The motion between them is that of ``simulate`` with the
-    tolerance of the run. It stays coarse beyond a million steps, and where it does not lead from
-    output to output, as in histories that were not computed by ``simulate``.
+    The chords then deviate by at most 1/400 of the range from displacements and velocities of the
+    named points and from normal and friction forces. Existing outputs do not change. The motion
+    between them is computed by ``simulate`` with the tolerance of the run. It stays coarse beyond
+    a million steps, and where the repeated motion does not meet the next output, as for histories
+    that were not computed by ``simulate``.
 
     Parameters
     ----------
     trajectory : Trajectory
-        A run, or a part of one.
+        A run or a part of one.
     """
     if trajectory not in _KNOWN:
         found = _resolved(trajectory)
         if found.trajectory is trajectory:
-            # What is remembered must not keep alive what it is remembered by.
+            # A cached value must not hold a reference to its key.
             return found
         _KNOWN[trajectory] = found
     return _KNOWN[trajectory]
@@ -115,7 +115,7 @@ def _resolved(run: Trajectory) -> Resolved:
         left -= steps
         lost += float(np.diff(time)[flags & ~refined].sum())
         reason = why or reason
-        # What was fine, and what cannot be repeated, is not looked at again.
+        # Skip intervals that are resolved or cannot be repeated.
         between = np.searchsorted(time, run.time[:-1], side="right") - 1
         flags = _coarse(run) & refined[between]
     lost += float(np.diff(run.time)[flags].sum())
@@ -123,13 +123,13 @@ def _resolved(run: Trajectory) -> Resolved:
 
 
 def _room(run: Trajectory) -> int:
-    """How many times more may be kept."""
+    """Number of output times that can still be added."""
     size = run.states.shape[1] + 8 * (run.system.basis.contact_nodes + 1)
     return max(0, _NUMBERS // size - len(run.time))
 
 
 def _coarse(run: Trajectory) -> Flags:
-    """Which intervals (N - 1,) between the times are too long to be drawn as straight lines."""
+    """Flags (N - 1,) of the intervals that are too long for a straight line."""
     moved, rates = _motion(run)
     sizes, rate_sizes = _ranges(moved, rates)
     normal, friction = run.normal_force, run.friction_force
@@ -141,7 +141,7 @@ def _coarse(run: Trajectory) -> Flags:
     for values, scale in ((moved, sizes), (rates, rate_sizes), (forces, spread),
                           (normal, np.full(normal.shape[1], each))):
         flags |= _bent(run.time, values[:, scale > 0.0] / scale[scale > 0.0])
-    # Outputs once a period look like rest, but for their velocities.
+    # Outputs once per period look like rest; only their velocities reveal motion.
     h = np.diff(run.time)[:, None]
     used = sizes > 0.0
     gone = np.diff(moved, axis=0) - 0.5 * h * (rates[1:] + rates[:-1])
@@ -150,14 +150,14 @@ def _coarse(run: Trajectory) -> Flags:
 
 
 def _bent(time: Array, values: Array) -> Flags:
-    """Intervals in which values (N, k), in units of their ranges, leave their chord too far."""
+    """Intervals in which values (N, k), scaled by their ranges, deviate too far from the chord."""
     flags = np.zeros(len(time) - 1, dtype=bool)
     if len(time) > 2 and values.shape[1]:
         h = np.diff(time)
         part = (h[:-1] / (h[:-1] + h[1:]))[:, None]
         middle = (1.0 - part) * values[:-2] + part * values[2:]
-        # A parabola leaves the chord of one of two equal intervals by a fourth of what it leaves
-        # that of both.
+        # A parabola deviates from the chord of half an interval by a quarter of its deviation from
+        # the chord of the whole interval.
         off = 0.25 * np.abs(values[1:-1] - middle).max(axis=1)
         flags[:-1] |= off * np.minimum(h[:-1] / h[1:], 1.0) > _ERROR
         flags[1:] |= off * np.minimum(h[1:] / h[:-1], 1.0) > _ERROR
@@ -165,7 +165,7 @@ def _bent(time: Array, values: Array) -> Flags:
 
 
 def _motion(run: Trajectory) -> tuple[Array, Array]:
-    """Displacements and velocities (N, k) of the named points and of some contact nodes."""
+    """Displacements and velocities (N, k) of the named points and selected contact nodes."""
     basis = run.system.basis
     n = basis.contact_nodes
     nodes = 2 + np.unique(np.linspace(0, n - 1, min(n, _NODES)).astype(int))
@@ -175,7 +175,7 @@ def _motion(run: Trajectory) -> tuple[Array, Array]:
 
 
 def _ranges(moved: Array, rates: Array) -> tuple[Array, Array]:
-    """Ranges (k,) by which displacements and velocities count."""
+    """Ranges (k,) that scale displacements and velocities."""
     ranges, speeds = np.ptp(moved, axis=0), np.ptp(rates, axis=0)
     return (np.maximum(ranges, _SMALL * ranges.max(initial=0.0)),
             np.maximum(speeds, _SMALL_RATE * speeds.max(initial=0.0)))
@@ -184,8 +184,8 @@ def _ranges(moved: Array, rates: Array) -> tuple[Array, Array]:
 def _repeated(
     run: Trajectory, flags: Flags, parts: int, most: int
 ) -> tuple[Trajectory, Flags, int, str]:
-    """Flagged intervals in so many parts each; the run with them, those that could be repeated,
-    the steps that it took, and why not all could.
+    """Subdivide the flagged intervals; returns the refined run, the intervals that could be
+    repeated, the steps taken, and the reason if some could not.
     """
     refined = np.zeros_like(flags)
     pieces: list[dict[str, Any]] = []
@@ -222,14 +222,14 @@ def _repeated(
 
 
 def _end(flags: Flags, first: int, length: int) -> int:
-    """End of the intervals that are run at once from a flagged one on."""
+    """End of the intervals repeated in one run from a flagged one."""
     chosen = first + np.flatnonzero(flags[first : first + length])
     gaps = np.flatnonzero(np.diff(chosen) > _GAP)
     return int(chosen[gaps[0]] if len(gaps) else chosen[-1]) + 1
 
 
 def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
-    """The run once more from an output on, or None where it does not come to the end."""
+    """Repeat the run from an output; None if it does not reach the end."""
     rows = slice(first, first + 1)
     start = replace(run, time=run.time[rows], work=run.work[rows], node_friction_work=None,
                     events=None, **_cut(run, rows, _STATE))
@@ -240,7 +240,7 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
             options["solver"] = SetValued(used.get("restitution"), used.get("static_coefficient"),
                                           used.get("scheme", "auto"))
         with warnings.catch_warnings():
-            # Whatever there is to be said was said of the run itself.
+            # The original run has already issued these warnings.
             warnings.simplefilter("ignore")
             again = simulate(run.system, float(times[-1]), t_start=float(times[0]), initial=start,
                              outputs=times, **options)
@@ -256,14 +256,14 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
 def _agreeing(
     run: Trajectory, again: Trajectory, first: int, end: int, sizes: tuple[Array, Array]
 ) -> int:
-    """Number of intervals until a repeated run is no longer at an output where it should be."""
+    """Number of intervals over which a repeated run agrees with the outputs."""
     there = np.searchsorted(again.time, run.time[first : end + 1])
     part = replace(run, **_cut(run, slice(first, end + 1), ("time", "work", *_STATE)))
     off = np.zeros(end - first, dtype=bool)
     found = _motion(again)
     for values, others, outer, inner in zip(_motion(part), found, sizes, _ranges(*found),
                                             strict=True):
-        # Outputs may show next to nothing of the motion.
+        # Outputs alone may underestimate the range of the motion.
         scale = np.maximum(outer, inner)
         off |= (np.abs(values[1:] - others[there[1:]]) > _SAME * scale).any(axis=1)
     return int(np.argmax(off)) if off.any() else end - first
@@ -274,7 +274,7 @@ def _cut(run: Trajectory, rows: slice, names: tuple[str, ...]) -> dict[str, Any]
 
 
 def _new_rows(run: Trajectory, again: Trajectory, first: int, end: int) -> dict[str, Any]:
-    """Columns of a repeated run at the times between two outputs that are none themselves."""
+    """Columns of a repeated run at the times strictly between two outputs."""
     kept = (again.time < run.time[end]) & ~np.isin(again.time, run.time[first:end])
     rows = {"time": again.time[kept]}
     for name in (*_STATE, *_COUNTED):
@@ -286,7 +286,7 @@ def _new_rows(run: Trajectory, again: Trajectory, first: int, end: int) -> dict[
 
 
 def _joined(run: Trajectory, pieces: list[dict[str, Any]]) -> Trajectory:
-    """The run with the rows of pieces between its own."""
+    """Insert the rows of repeated pieces into the run."""
     time = np.concatenate([run.time, *(piece["time"] for piece in pieces)])
     order = np.argsort(time, kind="stable")
     columns: dict[str, Any] = {

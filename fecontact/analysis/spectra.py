@@ -9,7 +9,7 @@ from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 
-_EVEN = 1e-6  # part of the spacing by which times may be off
+_EVEN = 1e-6  # largest deviation of times from even spacing, relative to the spacing
 
 
 class Peak(NamedTuple):
@@ -35,7 +35,7 @@ class Spectrum:
         Amplitudes in the unit u of the history, or power spectral density in u^2/Hz.
     kind : 'amplitude' or 'density'
     resolution_hz : float
-        One over the time that one transform sees [Hz]; frequencies may lie closer.
+        Inverse of the length of one transform [Hz]; frequencies may be spaced more closely.
     """
 
     frequency_hz: Array
@@ -44,16 +44,16 @@ class Spectrum:
     resolution_hz: float
 
     def peaks(self, count: int = 5, *, least: float = 0.01) -> list[Peak]:
-        """The highest local maxima, between frequencies by a parabola through logarithms.
+        """Highest local maxima, interpolated by a parabola through the logarithms.
 
         Parameters
         ----------
         count : int
             Largest number of peaks.
         least : float
-            Peaks below this part of the highest one are left out, and so are those closer than
-            four resolutions to a higher one: side lobes of the window 'hann' stay below a
-            hundredth from there on.
+            Peaks below this fraction of the highest one are omitted, as are those within four
+            resolutions of a higher one; beyond, side lobes of the window 'hann' are below a
+            hundredth.
         """
         f, y = self.frequency_hz, self.values
         tops = np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:])) + 1
@@ -74,18 +74,18 @@ class Spectrum:
 
 @dataclass(frozen=True, eq=False)
 class Spectrogram:
-    """Amplitude spectra of pieces of a history, one after the other.
+    """Amplitude spectra of successive segments of a history.
 
     Attributes
     ----------
     time : (P,) array
-        Middles of the pieces [s].
+        Centres of the segments [s].
     frequency_hz : (F,) array
         [Hz].
     values : (F, P) array
         Amplitudes in the unit of the history.
     resolution_hz : float
-        One over the length of a piece [Hz].
+        Inverse of the length of a segment [Hz].
     """
 
     time: Array
@@ -97,21 +97,21 @@ class Spectrogram:
 def evenly_sampled(
     time: ArrayLike, values: ArrayLike, *, resample: bool = False
 ) -> tuple[Array, Array]:
-    """A history at evenly spaced times.
+    """Check or resample a history to evenly spaced times.
 
     Parameters
     ----------
     time, values : (N,) arrays
         Ascending times [s] and values.
     resample : bool
-        Whether values at uneven times are put, by cubic splines, at as many even ones from the
-        first to the last. Motion faster than the widest spacing is lost then.
+        Whether to interpolate unevenly spaced values by cubic splines at as many even times over
+        the same interval. Motion faster than the widest spacing is then lost.
 
     Raises
     ------
     InputError
-        For fewer than eight values, values that are not finite, times that do not ascend, and
-        uneven times without ``resample``.
+        For fewer than eight values, non-finite values, times that do not ascend, and uneven times
+        without ``resample``.
     """
     t, x = as_floats(time, "The times of a spectrum"), as_floats(values, "Its values")
     if t.ndim != 1 or t.shape != x.shape or len(t) < 8:
@@ -123,7 +123,7 @@ def evenly_sampled(
     if not (step > 0.0).all():
         raise InputError("A spectrum needs times that ascend; these do not.")
     even = np.linspace(t[0], t[-1], len(t))
-    # Each time may be off by rounding, and their sum by no more.
+    # Each time may deviate by rounding, without accumulation.
     if np.abs(t - even).max() <= _EVEN * step.mean() + 4.0 * np.spacing(np.abs(t).max()):
         return even, x
     if not resample:
@@ -143,21 +143,21 @@ def amplitude_spectrum(
     padding: int = 8,
     resample: bool = False,
 ) -> Spectrum:
-    r"""Amplitudes of the sines that a history consists of.
+    r"""Amplitude spectrum of a history.
 
     .. math:: A_k = \frac{2}{\sum_n w_n} \Big| \sum_n w_n (x_n - \bar x) e^{-2 \pi i f_k t_n} \Big|
 
-    A sine of amplitude A shows as a peak of height A; the mean is taken off.
+    A sine of amplitude A gives a peak of height A; the mean is subtracted.
 
     Parameters
     ----------
     time, values, resample
         As for :func:`evenly_sampled`.
     window : str
-        Of :func:`scipy.signal.get_window`: 'hann', 'flattop' for exact heights, 'boxcar' for
-        histories that hold whole periods.
+        Window of :func:`scipy.signal.get_window`: 'hann', 'flattop' for exact heights, 'boxcar'
+        for histories of whole periods.
     padding : int
-        Frequencies lie this much closer than the resolution, by zeros put behind the history.
+        Zero-padding factor: frequencies are spaced this much more closely than the resolution.
     """
     from scipy.signal import get_window
 
@@ -169,7 +169,7 @@ def amplitude_spectrum(
     weights = get_window(window, n)
     transform = np.fft.rfft(weights * (x - x.mean()), padding * n)
     amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform), dtype=np.float64)
-    # The mean and the frequency of half the sampling rate have no twin at the other side.
+    # Zero and the Nyquist frequency have no counterpart at negative frequencies.
     amplitude[0] *= 0.5
     if (padding * n) % 2 == 0:
         amplitude[-1] *= 0.5
@@ -188,22 +188,22 @@ def power_spectral_density(
 
     .. math:: \int_0^\infty S(f) df = \overline{(x - \bar x)^2}
 
-    in the square of the history's unit per Hz: the mean of the spectra of half-overlapping pieces,
-    for noise and chaos.
+    in the squared unit of the history per Hz: the mean over half-overlapping segments, suited to
+    noise and chaos.
 
     Parameters
     ----------
     time, values, resample
         As for :func:`evenly_sampled`.
     piece : float, optional
-        Length of the pieces [s]; an eighth of the history by default.
+        Length of the segments [s]; an eighth of the history by default.
     window : str
         Of :func:`scipy.signal.get_window`.
 
     Raises
     ------
     InputError
-        For a piece that is longer than the history or shorter than eight of its times.
+        For a segment longer than the history or shorter than eight of its times.
     """
     from scipy.signal import welch
 
@@ -224,18 +224,18 @@ def spectrogram(
     window: str = "hann",
     resample: bool = False,
 ) -> Spectrogram:
-    """Amplitude spectra of overlapping pieces of a history.
+    """Amplitude spectra of overlapping segments of a history.
 
-    Each is scaled as by :func:`amplitude_spectrum`, about the piece's own mean.
+    Each is scaled as by :func:`amplitude_spectrum`, after subtracting the mean of the segment.
 
     Parameters
     ----------
     time, values, resample
         As for :func:`evenly_sampled`.
     piece : float, optional
-        Length of the pieces [s]; a thirty-second of the history by default.
+        Length of the segments [s]; 1/32 of the history by default.
     overlap : float
-        Part of a piece that the next one shares, from 0 to below 1.
+        Fraction by which adjacent segments overlap, at least 0 and below 1.
     window : str
         Of :func:`scipy.signal.get_window`.
 
@@ -269,7 +269,7 @@ def _frequencies(count: int, step: float) -> Array:
 
 
 def _piece(length: float, times: int, step: float, *, given: bool) -> int:
-    """Number of times in a piece of some length."""
+    """Number of samples in a segment of given length."""
     require_positive("A spectrum", piece=length)
     count = round(length / step)
     if not given:

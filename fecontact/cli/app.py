@@ -1,6 +1,6 @@
 """The commands of ``fecontact``, in the order of their use.
 
-Libraries that take time to load are imported inside the commands, so that help comes at once.
+Slow libraries are imported inside the commands, so that help appears at once.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ def completion(
         help="The shell to write for.")],
     /,
 ) -> None:
-    """Print a script that completes commands and options; let your shell read it at its start."""
+    """Print a shell script that completes commands and options, to be loaded by your shell."""
     try:
         script = app.generate_completion(shell=shell)
     except ValueError as error:

@@ -28,7 +28,7 @@ def write_branch_results(
     result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
     beneath: "PoincareScan | None" = None,
 ) -> list[Path]:
-    """Write branches as HDF5 and CSV, and draw them; the files."""
+    """Write branches as HDF5 and CSV and plot them; returns the files."""
     from fecontact.output.plots.bifurcation_diagram import plot_branches
     from fecontact.output.plots.stability import plot_eigenvalues
 
@@ -54,7 +54,7 @@ def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any
     Raises
     ------
     InputError
-        If nothing excites the system with one period.
+        If the system has no periodic excitation.
     """
     import numpy as np
 
@@ -65,7 +65,7 @@ def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any
 
 
 def branches_csv(branches: Mapping[str, Branch]) -> str:
-    """All points of branches as CSV, the special ones with their kind."""
+    """All points of branches as CSV, special points with their kind."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
@@ -84,7 +84,7 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
 
 
 def special_table(branch: Branch) -> Any:
-    """Ends and special points of a branch: where, which frequency, what changes there."""
+    """Table of ends and special points of a branch: parameter, frequency, change of stability."""
     from fecontact.cli.tables import table
 
     rows = []
@@ -98,7 +98,7 @@ def special_table(branch: Branch) -> Any:
 
 
 def _period(point: BranchPoint) -> float | None:
-    """Period of an orbit, or of what is born at a Hopf point [s]."""
+    """Period of an orbit, or of the orbits that emerge at a Hopf point [s]."""
     if isinstance(point, HopfPoint):
         return point.period
     return float(point.values["period"]) if point.is_orbit else None
@@ -116,7 +116,7 @@ def _remark(point: BranchPoint) -> str:
 
 
 def _what_changes(point: BranchPoint) -> str:
-    """What begins at a special point, or by how many the unstable directions change."""
+    """The solutions that emerge at a special point, or the change in unstable directions."""
     if isinstance(point, UnresolvedPoint):
         if point.instead_of is not None:
             return f"{point.instead_of} on this mesh, not on finer ones: take more intervals"
@@ -126,7 +126,7 @@ def _what_changes(point: BranchPoint) -> str:
 
 
 def _how_sure(point: BranchPoint) -> str:
-    """By how much the parameter may be off, where that is more than the table shows."""
+    """Error bound of the parameter, if it exceeds the digits shown in the table."""
     error = point.parameter_error  # NaN compares as smaller
     return f"known to {error:.1g} only" if error > 5e-7 * abs(point.parameter) else ""
 

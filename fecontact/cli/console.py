@@ -15,12 +15,12 @@ from fecontact.core.progress import PATIENCE
 
 INTERRUPTED = 130  # exit code after Ctrl-C
 _ENDING = ("SIGTERM", "SIGHUP")
-_ended_by: list[int] = []  # the first of these signals that came
+_ended_by: list[int] = []  # first signal received
 
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """Show on a terminal, from two seconds on, that work is going on that cannot be measured."""
+    """Show a spinner on a terminal, after two seconds, for work of unknown duration."""
     if not sys.stderr.isatty():
         yield
         return
@@ -40,9 +40,9 @@ def waiting(what: str) -> Iterator[None]:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Load and compile the package: as :func:`waiting`, and Ctrl-C ends the process at once.
+    """Like :func:`waiting`, for loading and compiling: Ctrl-C ends the process at once.
 
-    An exception would be lost in the callbacks of the compiler. Nothing is written meanwhile.
+    An exception would be lost in the callbacks of the compiler. No files are written meanwhile.
     """
     def leave(*_: object) -> None:
         os.write(sys.stderr.fileno(), b"error: interrupted.\n")
@@ -60,16 +60,16 @@ def loading() -> Iterator[None]:
 
 
 def interrupted_code() -> int:
-    """Exit code of a command that was interrupted: 130 after Ctrl-C, else 128 and the signal."""
+    """Exit code of an interrupted command: 130 after Ctrl-C, else 128 plus the signal number."""
     return 128 + _ended_by[0] if _ended_by else INTERRUPTED
 
 
 @contextmanager
 def ending_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP do what Ctrl-C does, whatever that is at the time.
+    """Let SIGTERM and SIGHUP do what Ctrl-C does at the time.
 
-    Batch systems and closing terminals send them, more than once: the first counts, so that what
-    is then written is not interrupted in turn. Signals that are ignored, as by nohup, stay so.
+    Batch systems and closing terminals may send them repeatedly. Only the first counts, so that
+    writing the results is not interrupted. Signals already ignored, as under nohup, stay ignored.
     """
     def end(number: int, frame: FrameType | None) -> None:
         if _ended_by:
@@ -80,7 +80,7 @@ def ending_signals() -> Iterator[None]:
         interrupt = signal.getsignal(signal.SIGINT)
         if callable(interrupt):
             interrupt(number, frame)
-        else:  # Ctrl-C is ignored by what a shell runs in the background
+        else:  # background jobs of a shell ignore Ctrl-C
             raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
@@ -102,7 +102,7 @@ def ending_signals() -> Iterator[None]:
 
 
 def _leave_terminal(descriptors: list[int]) -> None:
-    """Write no longer to a terminal that has been closed, which would be an error."""
+    """Redirect output away from a closed terminal, where writing would fail."""
     with suppress(OSError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         for descriptor in descriptors:
@@ -125,7 +125,7 @@ def echo(text: str) -> None:
 
 
 def echo_written(*files: Path) -> None:
-    """Print which files were written, and their sizes."""
+    """Print the files written and their sizes."""
     from fecontact.cli.tables import file_size
 
     for file in files:
@@ -134,22 +134,22 @@ def echo_written(*files: Path) -> None:
 
 
 def warn_if_stale(file: Path, current: bool) -> None:
-    """Note that a study was changed after its run."""
+    """Warn if the study was changed after its run."""
     if not current:
         print(f"note: the run was computed with other values than {file} has now; run it again to "
               f"see these.", file=sys.stderr)
 
 
 def fail(message: str, code: int) -> int:
-    """Print an error in one line; the exit code that goes with it."""
+    """Print an error in one line; returns its exit code."""
     print(f"error: {_one_line(message)}", file=sys.stderr)
     return code
 
 
 def _one_line(message: str) -> str:
-    """A message without line breaks and without what a terminal would take for commands.
+    """Remove line breaks and terminal control characters from a message.
 
-    Names of files and keys, which stand in it, may hold either.
+    Both may come from the names of files and keys that it quotes.
     """
     text = " ".join(line.strip() for line in message.splitlines())
     text = re.sub(rf"(\S{{{_LONGEST}}})\S+", r"\1...", text)

@@ -1,4 +1,4 @@
-"""The demonstration: two studies from the geometry to the movie."""
+"""The demonstration: two studies from geometry to movie."""
 
 import sys
 import time
@@ -17,7 +17,7 @@ SHOWN = ("beam", "pendulum")
 
 @dataclass
 class Log:
-    """What was done, how long it took, and what was made."""
+    """Steps of the demonstration, their durations and the files written."""
 
     steps: list[tuple[str, str, float]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
@@ -33,9 +33,9 @@ class Log:
 
 
 def run_demo(folder: Path) -> int:
-    """Make the demonstration in a folder, print what was made; the exit code.
+    """Run the demonstration in a folder and print the files written; returns the exit code.
 
-    Everything but the movies is also made where pictures of bodies cannot be rendered.
+    Without a working renderer only the movies are skipped.
     """
     log, reasons = Log(), dict[str, None]()
     with output_folder(folder):

@@ -1,7 +1,7 @@
 """Check of the installation: Python packages, system libraries, rendering; remedies.
 
-Libraries that may be missing or broken are tried in processes of their own: where graphics
-libraries are missing, VTK ends its process instead of raising.
+Optional libraries are tried in separate processes: VTK ends its process instead of raising an
+exception if graphics libraries are missing.
 """
 
 import re
@@ -37,18 +37,18 @@ sys.exit(reason)
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """Result of one check.
 
     Attributes
     ----------
     what : str
-        Its name.
+        Name of the component.
     works : bool
-        Whether it is there and works.
+        Whether it is installed and works.
     detail : str
-        Its version, or why it does not work.
+        Version, or the reason why it does not work.
     remedy : str
-        What to run or do; empty if it works.
+        Remedy; empty if it works.
     """
 
     what: str
@@ -58,12 +58,12 @@ class Finding:
 
 
 def examine(report: Callable[[str], None] = lambda what: None) -> list[Finding]:
-    """Look at Python, the packages, the system's libraries and what they are needed for.
+    """Check Python, the packages, the system libraries and the features that need them.
 
     Parameters
     ----------
     report : callable
-        Called with the name of each thing before it is looked at.
+        Called with the name of each component before its check.
     """
     found = [Finding("Python", True, sys.version.split()[0])]
     found += _packages()
@@ -76,7 +76,7 @@ def examine(report: Callable[[str], None] = lambda what: None) -> list[Finding]:
         if reason is not None:
             remedy = system_libraries.remedy(absent) if absent else _reinstall(found)
         found.append(Finding(what, reason is None, reason or "works", remedy))
-    # Libraries of the system matter only where something that needs them fails.
+    # System libraries matter only if a package that needs them fails.
     needed = not all(finding.works for finding in found)
     for library, package in system_libraries.PACKAGES.items():
         there = library not in absent
@@ -108,7 +108,7 @@ def _reinstall(found: list[Finding]) -> str:
 
 
 def _attempt(code: str) -> str | None:
-    """Run Python code in a process of its own; why it fails, or None."""
+    """Run Python code in a separate process; returns the reason of a failure, or None."""
     try:
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
                               timeout=180, check=False, stdin=subprocess.DEVNULL)

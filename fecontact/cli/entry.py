@@ -12,16 +12,16 @@ from fecontact.core.errors import FecontactError, ModelWarning
 
 
 def main() -> None:
-    """Run the command line and leave Python with its exit code."""
+    """Run the command line and exit Python with its exit code."""
     sys.exit(execute(sys.argv[1:]))
 
 
 def execute(tokens: list[str]) -> int:
-    """Run one command line; the exit code.
+    """Run one command line; returns the exit code.
 
-    0 when all went well, 1 for an error, 2 for a command line that cannot be understood, 130
-    after Ctrl-C, 143 after SIGTERM and 129 after SIGHUP. Errors are one sentence on stderr;
-    ``--debug`` shows where they come from.
+    0 for success, 1 for an error, 2 for an invalid command line, 130 after Ctrl-C, 143 after
+    SIGTERM and 129 after SIGHUP. Errors are one sentence on stderr; ``--debug`` adds the
+    traceback.
     """
     with ending_signals(), warnings.catch_warnings():
         warnings.simplefilter("default", ModelWarning)
@@ -31,7 +31,7 @@ def execute(tokens: list[str]) -> int:
 
 
 def _show_warning(otherwise: Any) -> Any:
-    """Warnings of limits as lines for people, without the place in the code."""
+    """Print a warning as one line, without its place in the code."""
 
     def show(message: Any, category: Any, *rest: Any, **more: Any) -> None:
         if issubclass(category, ModelWarning):
@@ -56,7 +56,7 @@ def _execute(tokens: list[str]) -> int:
     except KeyboardInterrupt:
         return fail("interrupted.", INTERRUPTED)
     except BrokenPipeError:
-        # The reader of our output has gone; there is nobody to tell.
+        # The reader of the output pipe has ended: no message can reach it.
         sys.stdout = None
         return 1
     except OSError as error:
@@ -74,7 +74,7 @@ def _execute(tokens: list[str]) -> int:
 
 
 def _was_interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: libraries hide it if it comes while they are loaded."""
+    """Whether Ctrl-C caused an error; libraries interrupted while loading hide it."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None

@@ -14,7 +14,7 @@ from fecontact.laws.registry import law_names, own_law
 
 
 def laws_table() -> Any:
-    """Every law: its kind, its name in study files, and what it is."""
+    """Table of all laws: kind, name in study files, short description."""
     from rich.markup import escape
 
     return table("kind", "law", "", left=3, rows=[
@@ -23,7 +23,7 @@ def laws_table() -> Any:
 
 
 def law_help(name: str) -> str:
-    """The documentation of the laws of a name, and how they stand in a study file.
+    """Documentation of the laws of a given name, with an example for a study file.
 
     The name is that in study files or that of the class; capitals do not matter. A law of one's
     own, ``FILE.py:CLASS``, is checked too, see :func:`fecontact.laws.check_law`.
@@ -31,7 +31,8 @@ def law_help(name: str) -> str:
     Raises
     ------
     InputError
-        If there is no such law, with those that there are; if a law of one's own is wrong.
+        If the law does not exist (the message lists those that do), or if a user-defined law
+        fails its check.
     """
     if ".py:" in name:
         return _own(name)
@@ -74,7 +75,7 @@ def _example(kind: type, name: str, cls: type) -> str:
 
 
 def _hint(kind: Any) -> str:
-    """What the value of an optional key looks like."""
+    """Placeholder for the value of an optional key."""
     kind = getattr(kind, "__value__", kind)
     options = {get_origin(option) or option for option in (kind, *get_args(kind))}
     return "[...]" if tuple in options else '"..."' if str in options else "..."

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands take."""
+"""Arguments and options shared by several commands."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,11 +6,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 StudyFile = Annotated[Path, Parameter(help="Study file; `fecontact init` writes one.")]
-RunFile = Annotated[Path, Parameter(help="What `fecontact run` wrote, or the study it ran.")]
+RunFile = Annotated[Path, Parameter(help="A file written by `fecontact run`, or its study.")]
 Trust = Annotated[bool, Parameter(
-    negative=(), help="Run the code of laws in files of Python that the run names.")]
+    negative=(), help="Execute user-defined laws in Python files that the run names.")]
 Changes = Annotated[list[str] | None, Parameter(
     name="--set", negative=(), show_default=False,
-    help="A key of the study and its value, `ground.speed=0.1`; may be given several times.")]
+    help="Override a key of the study, `ground.speed=0.1`; may be repeated.")]
 Folder = Annotated[Path | None, Parameter(
-    name=["--output", "-o"], help="Folder for the results, instead of that of the study.")]
+    name=["--output", "-o"], help="Folder of the results; by default that of the study.")]

@@ -1,4 +1,4 @@
-"""Plots of stored runs by name, as ``fecontact plot`` draws them."""
+"""Plots of stored runs by name, for ``fecontact plot``."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -22,17 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlotRequest:
-    """What is to be drawn of a run.
+    """Selection of the quantities and points to plot.
 
     Attributes
     ----------
     quantity, component : str
         As for :func:`fecontact.analysis.history`; the component by default that of the drive.
     points : tuple of points
-        Named points and contact nodes; all that a history shows, of which the other plots show
-        the first.
+        Named points and contact nodes; a history shows all of them, other plots only the first.
     highest_hz : float or None
-        End of the frequencies.
+        Highest frequency to plot [Hz].
     """
 
     quantity: str = "velocity"
@@ -68,7 +67,7 @@ def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
     place: list[Place] = [(c.point, c.shown_component)]
     found = [receptance(run.system, f, place)]
     labels = ["apart from the ground"]
-    # Without steady sliding, as on waves, there is nothing to linearise about.
+    # Without steady sliding, as on waves, there is no equilibrium for the linearisation.
     with suppress(AnalysisError):
         found.append(receptance(run.system, f, place, linearised_at="sliding"))
         labels.append("steadily sliding")
@@ -104,7 +103,7 @@ def redraw(
     t_end: float | None = None,
     path: Path | None = None,
 ) -> "Figure":
-    """Draw a stored run once more.
+    """Plot a stored run.
 
     Parameters
     ----------
@@ -113,16 +112,16 @@ def redraw(
     kind : str
         One of :data:`KINDS`.
     choice : PlotRequest, optional
-        What to draw.
+        Quantities and points to plot.
     t_start, t_end : float, optional
-        The part of the run [s].
+        Time interval to plot [s].
     path : Path, optional
         A .png, .pdf or .svg file to write too.
 
     Raises
     ------
     InputError
-        For another kind, and as the plots themselves.
+        For an unknown kind, and as raised by the plot.
     """
     if kind not in KINDS:
         raise InputError(f"There is no plot '{kind}'{nearest(kind, KINDS)}; there are: "

@@ -1,4 +1,4 @@
-"""Reading studies and runs, writing results: shared by several commands."""
+"""Reading of studies and runs and writing of results, shared by several commands."""
 
 import tomllib
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
-    """A study, with other values for some of its keys: texts ``ground.speed=0.1``."""
+    """Read a study and override keys by assignments such as ``ground.speed=0.1``."""
     with loading():
         from fecontact.core.tables import parsed
         from fecontact.study.study import Study
@@ -31,7 +31,7 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
         try:
             values[name] = tomllib.loads(f"value = {text}")["value"]
         except tomllib.TOMLDecodeError:
-            # Texts come without quotes from a shell.
+            # Strings from a shell come without quotes.
             values[name] = text
         except (RecursionError, ValueError):
             parsed(f"value = {text}", f"--set {name}")
@@ -39,7 +39,7 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
 
 
 def write_run(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
-    """Write a run and its plots into a folder; the files."""
+    """Write a run and its plots into a folder; returns the files."""
     from fecontact.output.files.case import write_case
 
     case = write_case(folder / f"{study.name}.vtkhdf", trajectory, frames=study.output.frames,
@@ -67,18 +67,18 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A run as found on disk.
+    """A run read from disk.
 
     Attributes
     ----------
     path : Path
-        Its file.
+        File of the run.
     trajectory : Trajectory
         The run.
     settings : RenderSettings
-        How its study wants it drawn.
+        Render settings of its study.
     current : bool
-        Whether the study file still says what the run was computed from.
+        Whether the study file is unchanged since the run.
     """
 
     path: Path
@@ -88,15 +88,15 @@ class StoredRun:
 
 
 def stored_run(file: Path, trust: bool = False) -> StoredRun:
-    """A run from its own file, or found by the file of its study.
+    """Read a run from its own file, or find it by the file of its study.
 
-    ``trust`` says whether to run code that the file of the run names; that of laws which the
-    study names is run.
+    ``trust`` allows code named by the file of the run to be executed. Laws named by the study are
+    always executed.
 
     Raises
     ------
     InputError
-        If there is no such file, or the study was not run yet.
+        If the file does not exist, or the study has not been run yet.
     """
     with loading():
         from fecontact.core.tables import from_table
@@ -121,7 +121,7 @@ def stored_run(file: Path, trust: bool = False) -> StoredRun:
         settings = from_table(RenderSettings, tomllib.loads(case.study or "").get("render", {}),
                               "[render]")
     except FecontactError:
-        # A run with a study that this version does not know can still be drawn.
+        # The run can be drawn even if this version cannot read its study.
         settings = RenderSettings()
     warn_of_limits(case.trajectory.limits_exceeded, "In this run")
     return StoredRun(file, case.trajectory, settings)
@@ -141,7 +141,7 @@ def _same_run(study: "Study", stored: str | None, trust: bool | set[Path]) -> bo
 
 
 def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") -> Path:
-    """Draw a run with a progress bar; the file or folder."""
+    """Render a run with a progress bar; returns the file or folder."""
     from fecontact.output.render.movie import render
 
     return render(trajectory, target, frames=settings.frames, fps=settings.fps,
@@ -151,7 +151,7 @@ def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") ->
 
 
 def convergence_of(study: "Study") -> "ModeConvergence":
-    """Frequencies and contact compliance of a study as its mesh is refined and modes are added."""
+    """Convergence of frequencies and contact compliance with mesh refinement and modes."""
     from fecontact.reduction.convergence import mode_convergence
 
     settings = replace(study.basis, select=None)

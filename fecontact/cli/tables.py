@@ -1,4 +1,4 @@
-"""Tables that commands print about meshes and runs."""
+"""Tables of meshes and runs printed by commands."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,7 +15,7 @@ ROUGH_SLOPE = 0.3  # of the ground, above which a vertical normal force is a rou
 
 
 def table(*headings: str, rows: Iterable[Iterable[str]], left: int = 1) -> Any:
-    """A table for the terminal; all columns but the first ``left`` ones are set flush right."""
+    """Table for the terminal; the first ``left`` columns are left-aligned, the others right."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -76,7 +76,7 @@ def largest_displacement(trajectory: "Trajectory") -> tuple[float, str]:
 
 
 def contact_shares(trajectory: "Trajectory") -> dict[str, float]:
-    """Parts of the run and of the contact face that are open, stick and slip."""
+    """Fractions of time and contact length that are open, in stick and in slip."""
     from fecontact.integrate.trajectory import ContactState
 
     weight = trajectory.system.share
@@ -85,7 +85,7 @@ def contact_shares(trajectory: "Trajectory") -> dict[str, float]:
 
 
 def notes(trajectory: "Trajectory") -> list[str]:
-    """Sentences on what limits the result."""
+    """Sentences on limitations of the result."""
     from fecontact.integrate.trajectory import Status
 
     found = []
@@ -100,7 +100,7 @@ def notes(trajectory: "Trajectory") -> list[str]:
 
 
 def file_size(path: Path) -> str:
-    """Size of a file for people."""
+    """Readable size of a file."""
     size = float(path.stat().st_size)
     for unit in ("B", "kB", "MB"):
         if size < 1000.0:

@@ -50,7 +50,7 @@ Geometry = Beam | Pendulum | Block | MeshFile
 
 
 def geometry_from_table(table: Any, where: str) -> Geometry:
-    """Geometry of the table ``[geometry]``; raises as :func:`~fecontact.core.tables.from_table`."""
+    """Geometry described by ``[geometry]``; raises as :func:`~fecontact.core.tables.from_table`."""
     if not isinstance(table, Mapping) or ("shape" in table) == ("file" in table):
         raise InputError(f"{where} must have either a shape ({choices(SHAPES)}) or the file of a "
                          f"mesh.")
@@ -65,7 +65,7 @@ def geometry_from_table(table: Any, where: str) -> Geometry:
 
 
 def geometry_table(geometry: Geometry, *, defaults: bool = True) -> dict[str, Any]:
-    """The reverse, as :func:`fecontact.core.tables.to_table`."""
+    """Table of a geometry; the inverse of :func:`geometry_from_table`."""
     shape = {kind: name for name, kind in SHAPES.items()}.get(type(geometry))
     table = to_table(geometry, defaults=defaults)
     return table if shape is None else {"shape": shape, **table}

@@ -23,17 +23,17 @@ prints one section. A key without a default has to be given.
 
 
 def study_keys(section: str | None = None) -> str:
-    """The sections of study files and their keys, as Markdown.
+    """List the sections of study files and their keys as Markdown.
 
     Parameters
     ----------
     section : str, optional
-        One section, ``ground`` or ``ground.profile``; all when left out.
+        A single section, such as ``ground`` or ``ground.profile``; all by default.
 
     Raises
     ------
     InputError
-        If there is no such section, with those that there are.
+        If the section does not exist; the message lists those that do.
     """
     parts = dict(_parts())
     if section is None:
@@ -64,7 +64,7 @@ def _parts() -> Iterator[tuple[str, str]]:
 
 
 def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:
-    """A section, of one of some classes, and those of the laws and tables within it."""
+    """A section, described by one of several classes, and its subsections."""
     known = tuple(classes)
     if known in printed:
         yield name, _section(name, f"As `[{printed[known]}]`.")
@@ -82,7 +82,7 @@ def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterato
 
 
 def _inner(hint: Any) -> list[Any]:
-    """The dataclasses in a type."""
+    """Dataclasses that occur in a type annotation."""
     if is_dataclass(hint):
         return [hint]
     return [cls for part in get_args(hint) for cls in _inner(part)]
@@ -138,7 +138,7 @@ def _summary(cls: Any) -> str:
 
 
 def _cell(text: str) -> str:
-    """Text of a docstring in a cell of a table: roles as code, bars escaped."""
+    """Docstring text for a table cell: roles become code, vertical bars are escaped."""
     text = re.sub(r":\w+:`~?([^`]*)`", lambda match: f"`{match[1].rpartition('.')[2]}`", text)
     text = re.sub(r"``([^`]*)``", r"`\1`", text)
     return re.sub(r"\\?\|", r"\\|", text)

@@ -1,4 +1,4 @@
-"""Sections of a study file that have no class of their own elsewhere in the package."""
+"""Sections of a study file that are not described by a class of another module."""
 
 import math
 from collections.abc import Mapping
@@ -36,8 +36,8 @@ class BodySettings:
     Parameters
     ----------
     material : str, optional
-        'steel' or 'aluminium'; its values may be replaced one by one. Steel when no material
-        value is given at all.
+        'steel' or 'aluminium'; the keys below override single values. Steel if no material value
+        is given at all.
     youngs_modulus, poisson_ratio, density : float, optional
         [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
     thickness : float
@@ -45,7 +45,7 @@ class BodySettings:
     plane : 'stress' or 'strain'
         Plane stress for thin bodies, plane strain for long ones.
     degree : 1 or 2
-        Of the finite elements.
+        Polynomial degree of the finite elements.
     fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
         Supports on boundaries and points of the mesh: the directions that are held, or a hole
         that turns about its centre.
@@ -67,7 +67,7 @@ class BodySettings:
 
     @property
     def elastic_material(self) -> Material:
-        """The material that the four keys describe."""
+        """Material described by the four material keys."""
         values = {"youngs_modulus": self.youngs_modulus, "poisson_ratio": self.poisson_ratio,
                   "density": self.density}
         given: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
@@ -77,20 +77,20 @@ class BodySettings:
         return replace(Material.named(self.material or "steel"), **given)
 
     def elastic_body(self, mesh: Mesh) -> ElasticBody:
-        """The elastic body on a mesh."""
+        """Elastic body on a mesh."""
         return ElasticBody(mesh, self.elastic_material, thickness=self.thickness,
                            plane=self.plane, degree=self.degree, fixed=self.fixed)
 
 
 @dataclass(frozen=True)
 class ContactLaws:
-    """``[contact.NAME]``: laws of the contact group NAME.
+    """``[contact.NAME]``: contact laws of the group NAME.
 
     Parameters
     ----------
     normal, friction : law, optional
-        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``; totals in them are those of the
-        group.
+        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``; total values refer to the face of
+        the group.
     """
 
     normal: NormalLaw | None = None
@@ -107,10 +107,10 @@ class BasisSettings:
     modes : int
         Number of modes, the rigid ones included.
     contact : str or list of str
-        Boundary that touches the ground, or several, each a contact group of that name.
+        Boundary in contact with the ground, or several; each becomes a contact group of its name.
     contact_nodes : int or 'all', or list
-        Number of contact nodes, or every node of the mesh there; a list has one of them for each
-        boundary.
+        Number of contact nodes, or 'all' for every mesh node of the boundary; a list has one entry
+        for each boundary.
     B, C : place, optional
         Excitation and load point: name of a point or boundary, [x, y], or a patch
         ``{at = name or [x, y], radius = r}``.
@@ -120,13 +120,14 @@ class BasisSettings:
         One damping ratio, one per mode, ``{mass_factor, stiffness_factor}`` or
         ``{loss_factor}``.
     reduction : 'vibration', 'residual' or 'craig-bampton'
-        What completes the vibration modes.
+        Static shapes added to the vibration modes.
     tolerance : float
-        For 'residual': part of the static compliance at the points that may be missing.
+        For 'residual': fraction of the static compliance at the points that may be neglected.
     dashpots : mapping of point to [b_x, b_y]
-        Between points, or contact nodes by number, and the inertial frame [N s/m].
+        Viscous dampers between points, or contact nodes by number, and the inertial frame
+        [N s/m].
     select : list, optional
-        Numbers of the modes to keep, from 0; all by default.
+        Indices of the modes to keep, counted from 0; all by default.
     """
 
     modes: int = 20
@@ -174,7 +175,7 @@ class SimulationSettings:
     Parameters
     ----------
     t_end : float, optional
-        End of the run [s]; needed for running only.
+        End of the run [s]; required only to run the study.
     t_start : float
         Start of the run [s].
     outputs : int
@@ -185,7 +186,8 @@ class SimulationSettings:
     rtol : float
         Relative tolerance.
     max_step : float, optional
-        Longest step [s]; by default as long as the tolerance and what is given in time allow.
+        Longest step [s]; by default limited only by the tolerance and by the periods and
+        breakpoints of the excitation.
     restitution : float, optional
         For 'set-valued': rigid stops with this coefficient in place of the normal law.
     static_coefficient : float, optional
@@ -193,12 +195,12 @@ class SimulationSettings:
     scheme : str, optional
         For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
     events : bool
-        For 'rodas5p': whether to locate touch-down, lift-off, stick and slip of every contact
-        node, and keep them with the result.
+        For 'rodas5p': locate touch-down, lift-off, stick and slip of every contact node and store
+        them with the run.
     stop : list of str
-        Events at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
+        Events that end the run when they first occur: 'touch-down', 'lift-off', 'stick', 'slip'.
     initial : 'rest', 'sliding' or RigidStart
-        Where it starts; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid
+        Initial state; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid-body
         motion.
     """
 
@@ -233,7 +235,7 @@ class SimulationSettings:
                              f"alone, not '{self.solver}'; leave them out.")
 
     def chosen_solver(self) -> Solver:
-        """The solver with its options."""
+        """The solver object with its options."""
         return solver_by_name(self.solver, {
             "restitution": self.restitution, "static_coefficient": self.static_coefficient,
             "scheme": self.scheme})
@@ -241,17 +243,17 @@ class SimulationSettings:
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """``[output]``: what a run writes.
+    """``[output]``: files written by a run.
 
     Parameters
     ----------
     folder : str
-        Where, relative to the study file.
+        Folder of the results, relative to the study file.
     frames : int
-        Number of full displacement fields in the file, for ParaView; zero for none.
+        Number of displacement fields stored for ParaView; zero for none.
     points : list
-        Points whose motion is plotted: 'B', 'C', further named points, contact nodes by their
-        number. Empty for B and C.
+        Points whose motion is plotted: 'B', 'C', other named points, or contact nodes by number.
+        B and C if empty.
     """
 
     folder: str = "results"
@@ -270,19 +272,19 @@ class RenderSettings:
     Parameters
     ----------
     frames : int
-        Number of pictures.
+        Number of frames.
     fps : float
-        Pictures a second.
+        Frames per second.
     size : (int, int)
-        Width and height, even, at least 320 x 180 [pixels].
+        Width and height [pixels], even numbers, at least 320 x 180.
     colour : 'displacement' or 'von_mises'
         Quantity that colours the body.
     scale : float, optional
-        Factor by which displacements are drawn larger; by default the largest is well visible.
+        Magnification of displacements; by default chosen so that the largest is clearly visible.
     title : str, optional
-        Shown at the top.
+        Title shown at the top of the picture.
     t_start, t_end : float, optional
-        Part of the run to draw [s].
+        Time interval to draw [s].
     """
 
     frames: int = 200

@@ -1,4 +1,4 @@
-"""Studies: TOML files that describe everything from the geometry to the run and its plots."""
+"""Studies: TOML files that describe a model from its geometry to the run and its plots."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -60,7 +60,7 @@ _SECTIONS: Mapping[str, type] = {
     "simulation": SimulationSettings, "branch": BranchSettings, "output": OutputSettings,
     "render": RenderSettings,
 }
-# What a study has made once, and the sections that it depends on.
+# Cached objects of a study, and the sections on which each depends.
 _MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body"),
               "_basis": ("geometry", "body", "basis")}
 
@@ -81,15 +81,15 @@ class Study(Summarised):
     basis : BasisSettings
         ``[basis]``
     normal, friction, ground, drive, load
-        ``[normal]``, ... : laws, ground, drive and load (what is in contact needs a normal law,
-        for which there is no default); see
+        ``[normal]``, ... : laws, ground, drive and load (contact requires a normal law, which has
+        no default); see
         :class:`~fecontact.ContactSystem`.
     contact : mapping of contact group to ContactLaws
-        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``: laws of single contact groups; the
-        others have those of ``[normal]`` and ``[friction]``.
+        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``: laws of single contact groups; all
+        others use ``[normal]`` and ``[friction]``.
     gap : float, (n,) tuple or Crown
-        Initial distance of the contact nodes from flat ground [m], ``{radius, centre}`` for a
-        face that is an arc; stands above all sections.
+        Initial distance of the contact nodes from flat ground [m], or ``{radius, centre}`` for a
+        face in the shape of an arc; written above all sections.
     simulation : SimulationSettings
         ``[simulation]``
     branch : BranchSettings
@@ -101,7 +101,7 @@ class Study(Summarised):
     sweep : SweepSettings or None
         ``[sweep]``: many cases of this study; see :func:`fecontact.sweep`.
     path : Path or None
-        The file; other files are named relative to it.
+        The study file; paths of other files are relative to it.
     """
 
     geometry: Geometry
@@ -122,7 +122,7 @@ class Study(Summarised):
     path: Path | None = field(default=None, compare=False)
 
     def summary(self) -> list[tuple[str, str]]:
-        """File, geometry, modes, laws and length of the run."""
+        """Short description: file, geometry, modes, laws and duration of the run."""
         groups = [f"own laws for {listed(list(self.contact))}"] if self.contact else []
         end = self.simulation.t_end
         laws = [type(law).__name__ for law in (self.normal, self.friction) if law is not None]
@@ -144,14 +144,14 @@ class Study(Summarised):
         Raises
         ------
         InputError
-            If there is no such file, it is not TOML, or it has unknown sections or keys, values
-            of the wrong type or out of range.
+            If the file does not exist, is not TOML, has unknown sections or keys, or values of
+            the wrong type or out of range.
         """
         path = as_path(path, "a study")
         try:
             text = path.read_text(encoding="utf-8")
         except FileNotFoundError:
-            # Endings are alike, so that only the names before them tell what was meant.
+            # Compare names without suffix: equal suffixes would make all file names look similar.
             others = [other.stem for other in path.parent.glob("*.toml")]
             hint = nearest(path.stem, others).replace("'?", ".toml'?")
             raise InputError(f"{path} does not exist{hint}.") from None
@@ -162,14 +162,14 @@ class Study(Summarised):
 
     @classmethod
     def from_toml(cls, text: str, path: str | Path | None = None) -> "Study":
-        """A study from TOML text; ``path`` says where it stands, see :meth:`read`."""
+        """Read a study from TOML text; ``path`` is the file it stands for, see :meth:`read`."""
         path = None if path is None else as_path(path, "a study")
         require_kind(_title(path), str, text=text)
         return cls.from_tables(parsed(text, _title(path)), path)
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
-        """A study from the tables of a TOML file; see :meth:`read`."""
+        """Read a study from the parsed tables of a TOML file; see :meth:`read`."""
         title = _title(path)
         folder = Path() if path is None else path.parent
         if not isinstance(tables, Mapping):
@@ -203,7 +203,7 @@ class Study(Summarised):
 
     @property
     def folder(self) -> Path:
-        """Folder of the file, from which other files are named."""
+        """Folder of the study file, to which other paths are relative."""
         return Path() if self.path is None else self.path.parent
 
     @property
@@ -213,7 +213,7 @@ class Study(Summarised):
 
     @property
     def t_end(self) -> float:
-        """End of the run [s]; InputError if the study does not say."""
+        """End of the run [s]; InputError if the study does not give it."""
         if self.simulation.t_end is None:
             raise InputError(f"{_title(self.path)}: [simulation] lacks the key 't_end', the end "
                              f"of the run in s.")
@@ -233,7 +233,7 @@ class Study(Summarised):
                 **{name: table for name, table in sections.items() if table or defaults}}
 
     def to_toml(self) -> str:
-        """The resolved study as TOML text: every key, also where it has its default value.
+        """The resolved study as TOML text, with every key, including default values.
 
         ``Study.from_toml(study.to_toml(), study.path) == study``.
         """
@@ -242,17 +242,17 @@ class Study(Summarised):
         return tomli_w.dumps(self.tables())
 
     def with_(self, **changes: Any) -> "Study":
-        """A copy with other values, by the dotted names of the file.
+        """Copy of the study with other values, given by dotted keys of the file.
 
-        ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``; members of lists go by
-        number, ``load.forces.0.signal.amplitude``. Mesh, body and modal basis are kept where
-        nothing that they depend on changes.
+        ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``; list entries are
+        numbered, ``load.forces.0.signal.amplitude``. Mesh, body and modal basis are reused if
+        nothing they depend on changes.
 
         Raises
         ------
         InputError
-            If there is no such key (with the nearest), or the value is of the wrong type or out
-            of range.
+            If a key does not exist (the message suggests the nearest), or a value is of the wrong
+            type or out of range.
         """
         tables = self.tables(defaults=False)
         for name, value in changes.items():
@@ -277,7 +277,7 @@ class Study(Summarised):
         return study
 
     def mesh(self) -> Mesh:
-        """The mesh, generated or read; the same object at every call, as in all of these."""
+        """The mesh, generated or read; cached, as are body, modal basis and system."""
         return self._mesh
 
     def elastic_body(self) -> ElasticBody:
@@ -294,7 +294,7 @@ class Study(Summarised):
         Raises
         ------
         FecontactError
-            With the file and the section before the message, like all of these methods.
+            With file and section in front of the message, as for the other methods.
         """
         return contact_system(self, self.modal_basis(), _title(self.path))
 
@@ -304,15 +304,15 @@ class Study(Summarised):
     ) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
 
-        The checkpoint is left out for solvers that have none. It stays when the run has ended:
-        remove it once the run is written.
+        Solvers without checkpoints ignore ``checkpoint``. The file is kept after the run: remove
+        it once the run is written.
         """
         settings, t_end, system = self.simulation, self.t_end, self.system()
         solver = settings.chosen_solver()
         if isinstance(solver, Rodas5P):
             solver = replace(solver, checkpoint=checkpoint, keep_checkpoint=True)
         with located(f"{_title(self.path)}: [output]:"):
-            # Found out after a long run, a wrong name would be found out too late.
+            # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
         with located(f"{_title(self.path)}: [simulation]:"):
@@ -368,12 +368,12 @@ LAWS = ("normal", "friction")
 
 
 def contact_system(study: "Study", basis: ModalBasis, title: str) -> ContactSystem:
-    """The contact system of a study on its basis; ``title`` names the study in messages.
+    """Contact system of a study on a modal basis; ``title`` names the study in messages.
 
     Raises
     ------
     InputError
-        For laws, loads or a gap that do not go with the basis, with their section.
+        For laws, loads or a gap that do not fit the basis; the message names the section.
     """
     groups = dict(basis.groups)
     for name in study.contact:
@@ -405,13 +405,13 @@ def contact_system(study: "Study", basis: ModalBasis, title: str) -> ContactSyst
 
 
 def _own(study: "Study", part: str) -> dict[str, Any]:
-    """Laws of the contact groups that have one of their own."""
+    """Laws given for single contact groups."""
     return {group: law for group, laws in study.contact.items()
             if (law := getattr(laws, part)) is not None}
 
 
 def _laws(study: "Study", groups: Mapping[str, int]) -> Iterator[tuple[str, Any, int]]:
-    """Section of each law, the law, and the number of nodes that have it."""
+    """Section of each law, the law, and the number of nodes that use it."""
     for part in LAWS:
         own = _own(study, part)
         for group, law in own.items():

@@ -1,4 +1,4 @@
-"""``[sweep]`` of a study file: which parameters take which values, and what is kept of a case."""
+"""``[sweep]`` of a study file: parameters, their values, and the results stored for each case."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from fecontact.core.units import Unit
 _SUMMARIES = ("largest_displacement", "stick_fraction", "mean_normal_force", "peak_normal_force",
               "friction_power")
 
-_MOST_PERIODS = 100_000  # that are kept of a case
+_MOST_PERIODS = 100_000  # kept for each case
 
 _PARAMETERS: Mapping[str, tuple[str, ...]] = {
     "normal": ("mean", "std"),
@@ -38,7 +38,7 @@ class Span:
     start, end : float
         In the unit of the parameter.
     count : int, optional
-        Number of values, for grids and lists; drawn samples fill the range evenly.
+        Number of values, for grids and lists; random samples are uniform over the range.
     spacing : 'linear' or 'log'
         Equal differences or equal ratios.
     """
@@ -74,15 +74,15 @@ class Distribution:
         high; 'uniform', 'loguniform' with low, high; 'triangular' with low, mode, high; 'beta'
         with a, b, low, high; 'weibull' with shape, scale.
     mean, std : float, optional
-        Of the parameter itself, not of its logarithm; before it is cut off.
+        Of the parameter itself, not of its logarithm, and before truncation.
     low, high : float, optional
-        Ends.
+        Bounds.
     mode : float, optional
-        Most frequent value.
+        Most probable value.
     a, b, shape : float, optional
-        Dimensionless shapes.
+        Dimensionless shape parameters.
     scale : float, optional
-        In the unit of the parameter, as are all but the shapes.
+        In the unit of the parameter, as are all but the shape parameters.
     """
 
     distribution: str
@@ -125,24 +125,24 @@ class Distribution:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The parameters that are given, by name."""
+        """Given parameters by name."""
         names = dict.fromkeys(name for needed in _PARAMETERS.values() for name in needed)
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True)
 class Strobing:
-    """Runs of which only the states once per period of the excitation are kept.
+    """Stroboscopic runs: only the states once per period of the excitation are kept.
 
     Parameters
     ----------
     transient_periods : int
-        Periods that are left out.
+        Periods discarded as transient.
     keep : int
-        Periods after them.
+        Periods kept after the transient.
     point : str or int
-        Whose displacement is kept once per period: 'B', 'C', a named point, a contact node by its
-        number.
+        Point whose displacement is kept once per period: 'B', 'C', a named point, or the number of
+        a contact node.
     component : 'x' or 'y'
     """
 
@@ -171,32 +171,32 @@ class SweepSettings:
     Parameters
     ----------
     axes : mapping of dotted name to Span, Distribution or list of values
-        ``[sweep.axes]``: the parameters that change, by the names of the study file:
+        ``[sweep.axes]``: the varied parameters, by their dotted keys in the study file, such as
         ``ground.speed = [0.1, 0.2]``.
     method : str
-        'grid': all combinations; 'list': the first values of all axes, the second ones, ...;
-        drawn: 'random', 'latin-hypercube', 'sobol' (a low-discrepancy sequence); 'sensitivity':
-        drawn so that Sobol indices follow.
+        'grid': all combinations; 'list': the first values of all axes, then the second ones, ...;
+        sampling: 'random', 'latin-hypercube', 'sobol' (a low-discrepancy sequence);
+        'sensitivity': samples for Sobol indices.
     samples : int, optional
-        Number of drawn cases. For 'sensitivity' a power of two: there are (d + 2) times as many
-        cases for d parameters.
+        Number of samples. For 'sensitivity' a power of two; d parameters take (d + 2) times as
+        many cases.
     seed : int
-        Of the drawn cases; the same seed draws the same.
+        Seed of the random samples; equal seeds give equal samples.
     summaries : list
-        Numbers to keep of each case, by name: see :mod:`fecontact.sweeps.summaries`;
+        Names of the numbers stored for each case, see :mod:`fecontact.sweeps.summaries`;
         'FILE.py:FUNCTION' for a function of your own.
     t_start : float, optional
-        Summaries count from this time on [s]; the whole run by default.
+        Start of the interval that summaries evaluate [s]; the whole run by default.
     wear_coefficient : float, optional
-        Volume worn away per friction work [m^3/J], for the summaries of wear.
+        Volume worn away per friction work [m^3/J], for the wear summaries.
     keep : 'none', 'histories' or 'fields'
-        Whether each case has a file of its own, with its motion alone or with fields for ParaView.
+        Whether to write a file for each case, with its motion alone or with fields for ParaView.
     batch : int, optional
-        Cases computed in one go; by default up to 64, fewer when there are few.
+        Number of cases in a batch; by default up to 64, fewer in small sweeps.
     strobe : Strobing, optional
-        ``strobe = { transient_periods = 100, keep = 64 }``: faster runs without histories, over so
-        many periods of the excitation in the place of ``t_end``; the only summary is then
-        'periods'.
+        ``strobe = { transient_periods = 100, keep = 64 }``: faster runs without histories, over
+        this number of excitation periods instead of up to ``t_end``; 'periods' is then the only
+        summary.
     """
 
     axes: Mapping[str, Axis] = field(default_factory=dict)
@@ -230,7 +230,7 @@ class SweepSettings:
 
 
 def flat_axes(table: Any) -> Any:
-    """``[sweep]`` with axes by dotted names, also where TOML reads them as tables in tables."""
+    """``[sweep]`` with axes by dotted names, which TOML may have read as nested tables."""
     if not isinstance(table, Mapping) or not isinstance(table.get("axes"), Mapping):
         return table
     return {**table, "axes": dict(_leaves(table["axes"], ""))}
@@ -239,7 +239,7 @@ def flat_axes(table: Any) -> Any:
 def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = []
     for key, value in table.items():
-        # An axis that is a table holds numbers and texts alone.
+        # A table that describes an axis holds only numbers and strings.
         if isinstance(value, Mapping) and any(isinstance(item, Mapping | list)
                                               for item in value.values()):
             found += _leaves(value, f"{prefix}{key}.")

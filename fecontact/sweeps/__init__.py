@@ -1,4 +1,4 @@
-"""Many cases of one study: which ones, run by any executor, kept in a folder, as one table."""
+"""Parameter sweeps of a study: cases, execution on many cores, storage, results as a table."""
 
 from fecontact.core.namespace import namespace
 

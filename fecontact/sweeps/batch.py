@@ -1,7 +1,7 @@
 """Batches, the unit of work of a worker: cases go in, rows of numbers come out.
 
-A batch is all that goes to a worker and rows are all that come back, so that any executor will
-do. Workers import neither Gmsh nor VTK nor matplotlib, unless they are to make meshes.
+Workers exchange nothing else with the parent process, so any executor can run them. They import
+neither Gmsh (unless they generate meshes) nor VTK nor matplotlib.
 """
 
 import pickle
@@ -32,27 +32,27 @@ _BASES_KEPT = 4  # in a worker
 
 @dataclass(frozen=True)
 class Batch:
-    """Cases that a worker computes in one go.
+    """Cases that a worker computes together.
 
     Attributes
     ----------
     study : mapping
-        Tables of the study that the cases change.
+        Tables of the study before the changes of the cases.
     path : str or None
-        Its file.
+        File of the study.
     cases : tuple of SweepCase
     bases : mapping of key to bytes, Path or str
-        Modal bases as :func:`packed` gives them, files of them, or the reason why there is none;
-        those that are missing are computed by the worker.
+        Modal bases from :func:`packed`, paths of their files, or the reason why a basis cannot be
+        computed; the worker computes missing ones.
     summaries : tuple of str
     t_start, wear_coefficient : float or None
         See :class:`fecontact.study.SweepSettings`.
     files : str or None
-        Folder for a file of each case; None for no files.
+        Folder for the files of the cases; None to write none.
     frames : int
         Number of fields in each of them.
     strobe : Strobing or None
-        Runs of which only the states once per period are kept.
+        Settings of stroboscopic runs, which keep only the states once per period.
     """
 
     study: Mapping[str, Any]
@@ -68,13 +68,13 @@ class Batch:
 
 
 class UnwritableError(FecontactError):
-    """A case could not be written; the cases after it could not be either."""
+    """A case cannot be written to disk; neither can the cases after it."""
 
 
 def run_batch(batch: Batch) -> list[Row]:
     """Compute all cases of a batch.
 
-    A case that fails has a reason in its row, and does not stop the others.
+    The row of a failed case holds the reason; the other cases still run.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def run_batch(batch: Batch) -> list[Row]:
 
 
 def make_basis(batch: Batch) -> bytes | str:
-    """The modal basis of the first case of a batch, packed, or the reason why there is none."""
+    """Modal basis of the first case of a batch, packed, or the reason why it failed."""
     path = None if batch.path is None else Path(batch.path)
     try:
         study = Study.from_tables(batch.study, path).with_(**batch.cases[0].basis_changes)
@@ -102,7 +102,7 @@ def make_basis(batch: Batch) -> bytes | str:
 
 
 def packed(basis: ModalBasis, *, shapes: bool) -> bytes:
-    """A modal basis as bytes, without shapes over the body unless they are wanted."""
+    """Serialise a modal basis; shapes over the body are included only on request."""
     return pickle.dumps(basis if shapes else replace(basis, mode_shapes=None, quality=None))
 
 
@@ -121,7 +121,7 @@ def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[float, Func
         return Row(case=case.key, values={}, reason=str(error))
     except (MemoryError, OSError):
         raise
-    except Exception as error:  # a law or a summary of the user's may raise anything
+    except Exception as error:  # user-defined laws and summaries may raise any exception
         return Row(case=case.key, values={}, reason=f"{type(error).__name__}: {error}")
     if batch.files is not None:
         _write(batch, case, study, trajectory)
@@ -146,7 +146,7 @@ def _run(batch: Batch, base: Study, case: SweepCase) -> tuple[Trajectory, Study]
 
 
 def changed(study: Study, changes: Mapping[str, Any]) -> Study:
-    """As ``study.with_(**changes)``, and ten times faster where numbers of laws change alone."""
+    """As ``study.with_(**changes)``, but ten times faster if only parameters of laws change."""
     values = {}
     for name, value in changes.items():
         present = _present(study, name)
@@ -157,7 +157,7 @@ def changed(study: Study, changes: Mapping[str, Any]) -> Study:
     try:
         return cast(Study, with_parameters(study, values))
     except FecontactError:
-        return study.with_(**changes)  # whose message says where in the study it is
+        return study.with_(**changes)  # its message names the place in the study
 
 
 def _present(study: Study, name: str) -> Any:
@@ -171,9 +171,9 @@ def _present(study: Study, name: str) -> Any:
 
 
 def prepared(batch: Batch, base: Study, case: SweepCase) -> Study:
-    """The study of a case, with its modal basis."""
+    """Study of a case, with its modal basis."""
     study = changed(base, case.changes)
-    # Not by with_: the basis may come from another process.
+    # with_ cannot be used: the basis may come from another process.
     vars(study)["_basis"] = _basis(batch, study, case.basis)
     return study
 
@@ -182,7 +182,7 @@ _bases: OrderedDict[tuple[str, bool], ModalBasis] = OrderedDict()
 
 
 def _basis(batch: Batch, study: Study, key: str) -> ModalBasis:
-    """The basis of a key: kept in this process, sent along, read from a file or computed."""
+    """Basis of a key: cached in this process, sent with the batch, read from a file or computed."""
     mark = key, batch.frames > 0
     basis = _bases.get(mark)
     if basis is None:
@@ -198,7 +198,7 @@ def _basis(batch: Batch, study: Study, key: str) -> ModalBasis:
 
 
 def case_file(folder: Path, key: str) -> Path:
-    """The file of a case."""
+    """Path of the file of a case."""
     return folder / f"{key}.vtkhdf"
 
 
@@ -207,7 +207,7 @@ def _write(batch: Batch, case: SweepCase, study: Study, trajectory: Trajectory) 
 
     assert batch.files is not None
     target = case_file(Path(batch.files), case.key)
-    # How long it took differs from run to run, all else is the same to the last bit.
+    # Drop the computing time, the only part that is not reproducible to the last bit.
     statistics = {key: value for key, value in trajectory.statistics.items() if key != "seconds"}
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -8,18 +8,18 @@ BASIS_SECTIONS = ("geometry", "body", "basis")
 
 
 class Row(TypedDict):
-    """What is kept of a case: its summaries, or the reason why there are none."""
+    """Stored result of a case: its summaries, or the reason of its failure."""
 
     case: str
     values: dict[str, float]
     reason: str
     points: NotRequired[list[float]]  # displacements once per period
-    warning: NotRequired[str]  # where the run leaves the limits of the model
+    warning: NotRequired[str]  # where the run exceeds the limits of the model
 
 
 @dataclass(frozen=True)
 class SweepCase:
-    """A case of a sweep: its key, that of its modal basis, what it changes in the study."""
+    """A case of a sweep: its key, the key of its modal basis, its changes to the study."""
 
     key: str
     basis: str
@@ -27,6 +27,6 @@ class SweepCase:
 
     @property
     def basis_changes(self) -> dict[str, Any]:
-        """What of the changes the modal basis depends on."""
+        """Changes that affect the modal basis."""
         return {name: value for name, value in self.changes.items()
                 if name.partition(".")[0] in BASIS_SECTIONS}

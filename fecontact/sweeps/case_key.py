@@ -1,4 +1,4 @@
-"""Keys of cases: hashes of everything that their results depend on."""
+"""Keys of cases: hashes of everything on which their results depend."""
 
 import hashlib
 import json
@@ -12,23 +12,23 @@ from fecontact.core.tables import shown
 from fecontact.study.study import Study
 from fecontact.sweeps.case import BASIS_SECTIONS
 
-_DIGITS = 24  # of a hash that are kept: 96 bits
+_DIGITS = 24  # of a hash: 96 bits
 _NOT_OF_THE_RUN = ("output", "render", "sweep")
 
 
 def case_keys(
     study: Study, names: Sequence[str], rows: Sequence[Sequence[Any]], request: Mapping[str, Any]
 ) -> tuple[list[str], list[str]]:
-    """Keys of all cases, and those of their modal bases.
+    """Keys of all cases and of their modal bases.
 
-    A key is the hash of the resolved study with the case's values, of the files that it names, of
-    ``request`` (what is kept of a case) and of the version of the package: equal cases of
-    different sweeps have equal keys.
+    A key is the hash of the resolved study with the values of the case, the files that it names,
+    ``request`` (the results to store) and the package version. Equal cases of different sweeps
+    have equal keys.
 
     Raises
     ------
     InputError
-        If there is no such parameter, or a value of the first case cannot be used.
+        If a parameter does not exist, or a value of the first case is invalid.
     """
     digest = _digester(study.folder)
     base = flat(study)
@@ -45,7 +45,7 @@ def case_keys(
             try:
                 resolved = flat(study.with_(**dict(zip(names, row, strict=True))))
             except InputError:
-                # This case will fail; it is known by what was asked for.
+                # This case will fail; hash the values as given.
                 resolved = base | dict(zip(names, row, strict=True))
         body = {name: value for name, value in resolved.items()
                 if name.partition(".")[0] in BASIS_SECTIONS}
@@ -58,7 +58,7 @@ def case_keys(
 
 
 def flat(study: Study) -> dict[str, Any]:
-    """The resolved study without what a run does not depend on, by dotted names."""
+    """Resolved study by dotted names, without keys that do not affect the run."""
     return dict(_leaves({section: table for section, table in study.tables().items()
                          if section not in _NOT_OF_THE_RUN}, ""))
 
@@ -76,7 +76,7 @@ def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
 def _converter(
     name: str, values: Sequence[Any], base: Mapping[str, Any]
 ) -> Callable[[Any], Any] | None:
-    """What turns numbers of an axis into those of the resolved study; None if that takes more."""
+    """Conversion of axis numbers to values of the resolved study; None if there is none."""
     present = base.get(name)
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool)
                   for value in values)
@@ -93,7 +93,7 @@ def _digester(folder: Path) -> Callable[[Mapping[str, Any]], str]:
     contents: dict[str, str] = {}
 
     def stand_in(value: Any) -> Any:
-        """The content of a file in the place of its name."""
+        """Replace the name of a file by its content."""
         if isinstance(value, str):
             if value not in contents:
                 contents[value] = _with_content(value, folder)

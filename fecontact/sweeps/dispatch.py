@@ -1,4 +1,4 @@
-"""Dispatch of jobs to an executor; jobs of workers that die are submitted again."""
+"""Dispatch of jobs to an executor; jobs lost with a worker are submitted again."""
 
 import queue
 from collections import deque
@@ -14,7 +14,7 @@ from fecontact.sweeps.executors import Pool
 
 @dataclass(frozen=True)
 class Job:
-    """A function to call with a batch; ``breaks`` is 1 if a worker ended that may be its own."""
+    """A function and its batch; ``breaks`` is 1 if the job may have crashed a worker."""
 
     function: Callable[[Batch], Any]
     batch: Batch
@@ -22,24 +22,24 @@ class Job:
 
 
 class LostError(FecontactError):
-    """The worker of a single case ended, again and again."""
+    """A single case crashed its worker repeatedly."""
 
     def __init__(self) -> None:
-        super().__init__("The process that computed it ended without a word; it may have needed "
+        super().__init__("The process that computed it ended without a message; it may have needed "
                          "more memory than there is.")
 
 
 def results(waiting: deque[Job], pool: Pool) -> Iterator[tuple[Job, Any]]:
-    """Jobs with what they return, as it comes; jobs may be added to ``waiting`` meanwhile.
+    """Yield jobs and their results as they finish; ``waiting`` may grow meanwhile.
 
-    When workers end, the jobs that they may have been at run again, one by one to find the one
-    that is to blame, which is then split into its cases. A case that ends its worker when it runs
-    alone comes with a :class:`LostError`.
+    When a worker crashes, the jobs it may have been running are repeated one by one. The job that
+    crashes again is split into its cases. A single case that crashes its worker is returned with
+    a :class:`LostError`.
 
     Raises
     ------
     FecontactError
-        As the functions do; and when the executor is no longer there.
+        As raised by the functions, and if the executor has been shut down.
     """
     flying: dict[Future[Any], Job] = {}
     done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
@@ -89,7 +89,7 @@ def _launch(
     waiting: deque[Job], flying: "dict[Future[Any], Job]", done: "queue.SimpleQueue[Future[Any]]",
     pool: Pool,
 ) -> bool:
-    """Submit what may run now; False if the executor is broken."""
+    """Submit the jobs that can run; False if the executor is broken."""
     while waiting and len(flying) < pool.window:
         alone = waiting[0].breaks or any(job.breaks for job in flying.values())
         if alone and flying:

@@ -14,40 +14,40 @@ from typing import Any
 from fecontact.core.errors import AnalysisError, InputError, MissingLibraryError
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-PATIENCE = 10.0  # with a scheduler [s]
-_PER_CORE = 32  # worker processes at most; more would only wait for each other
+PATIENCE = 10.0  # for the Dask scheduler [s]
+_PER_CORE = 32  # largest number of worker processes; more would only contend
 _ADDRESS = re.compile(r"(?:\w+://)?(?:\[[0-9a-fA-F:.%]+\]|[^\s\[\]:/]+):(\d+)")
 
 
 class Pool:
-    """An executor of the user's, and how many batches it is given ahead.
+    """A user's executor, and the number of batches submitted in advance.
 
-    The executor is left running at the end.
+    The executor is not shut down at the end.
     """
 
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
-        # How many workers a cluster has, or will have, is not known.
+        # The number of workers of a cluster is unknown and may change.
         workers = getattr(executor, "_max_workers", None)
         self.window = 2 * workers + 2 if isinstance(workers, int) and workers > 0 else 1000
 
     def submit(self, function: Callable[[Any], Any], argument: Any) -> "Future[Any]":
-        """Start a computation."""
+        """Submit a call."""
         return self.executor.submit(function, argument)
 
     def renew(self) -> None:
-        """Replace the executor after it broke.
+        """Replace a broken executor.
 
         Raises
         ------
         AnalysisError
-            If that is not possible.
+            If the executor cannot be replaced.
         """
         raise AnalysisError("The executor broke because one of its workers ended; finished cases "
                             "are kept, go on with a new executor and resume.")
 
     def close(self, *, at_once: bool) -> None:
-        """Leave; ``at_once`` drops what is being computed."""
+        """End the use of the executor; ``at_once`` cancels pending work."""
 
 
 class Processes(Pool):
@@ -65,7 +65,7 @@ class Processes(Pool):
         return executor
 
     def renew(self) -> None:
-        """New processes in the place of those that ended."""
+        """Start new processes in place of those that ended."""
         if not self._probe.done() or self._probe.exception() is not None:
             raise AnalysisError("The worker processes end as soon as they start; a script must "
                                 "call sweep below if __name__ == '__main__': and needs memory for "
@@ -83,7 +83,7 @@ class Processes(Pool):
 
 
 def _begin() -> None:
-    """Begin as a worker: Ctrl-C is for the parent alone, and nobody outlives it."""
+    """Set up a worker: it ignores Ctrl-C and ends when its parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -96,7 +96,7 @@ def _begin() -> None:
 
 @contextlib.contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Processes that start in this block use one thread for linear algebra."""
+    """Processes started in this block use one thread for linear algebra."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:
@@ -111,18 +111,18 @@ def one_thread_each() -> Iterator[None]:
 
 @contextlib.contextmanager
 def opened(executor: Executor | None, workers: int | None) -> Iterator[Pool]:
-    """The executor as a pool, or processes on this machine.
+    """Wrap the executor as a pool, or start processes on this machine.
 
     Raises
     ------
     InputError
-        If it is no executor, or called from a worker's import of the main script.
+        If it is not an executor, or if a worker calls this while it imports the main script.
     """
     if executor is None:
         count = worker_count(workers)
         if getattr(multiprocessing.current_process(), "_inheriting", False):
-            raise SystemExit(1)  # the parent says what is wrong
-        # Compiled here once, if need be, and not by every worker.
+            raise SystemExit(1)  # the parent reports the error
+        # Compile kernels once here instead of in every worker.
         with one_thread_each():
             yield from _closing(Processes(count))
         return
@@ -142,7 +142,7 @@ def _closing(pool: Pool) -> Iterator[Pool]:
 
 
 def worker_count(workers: int | None) -> int:
-    """Number of processes on this machine, one a core by default; InputError if out of range."""
+    """Number of worker processes, by default one per core; InputError if out of range."""
     count, most = cores() if workers is None else workers, _PER_CORE * cores()
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
         raise InputError(f"workers = {count!r} must be a whole number from 1 to {most}, "
@@ -151,7 +151,7 @@ def worker_count(workers: int | None) -> int:
 
 
 def cores() -> int:
-    """Number of cores that this process may use."""
+    """Number of cores available to this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -159,21 +159,21 @@ def cores() -> int:
 
 @contextlib.contextmanager
 def dask_executor(address: str, timeout: float | None = None) -> Iterator[Executor]:
-    """The executor of a running Dask scheduler.
+    """Connect to a running Dask scheduler and return its executor.
 
     Parameters
     ----------
     address : str
         Like ``tcp://node1:8786``.
     timeout : float, optional
-        How long to wait for an answer [s]; ten seconds by default.
+        Time to wait for the scheduler [s]; ten seconds by default.
 
     Raises
     ------
     MissingLibraryError
         If Dask is not installed.
     InputError
-        If that is no address, or no scheduler answers there.
+        If the address is invalid or no scheduler answers there.
     """
     timeout = PATIENCE if timeout is None else timeout
     found = _ADDRESS.fullmatch(address) if isinstance(address, str) else None

@@ -1,4 +1,4 @@
-"""The cases of a sweep: values of its parameters, on grids, from lists, or drawn."""
+"""The cases of a sweep: values of its parameters on grids, from lists, or sampled."""
 
 import math
 from collections.abc import Sequence
@@ -12,8 +12,8 @@ from fecontact.core.memory import require_memory, shown_count
 from fecontact.core.types import Array
 from fecontact.study.sweep_section import Axis, Distribution, Span, SweepSettings
 
-_MOST = 10_000_000  # cases; more than that is a slip of the pen
-_BYTES = 2000.0  # memory for the values, the key and the row of a case
+_MOST = 10_000_000  # cases; more are taken for a mistake
+_BYTES = 2000.0  # bytes for the values, the key and the row of a case
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,11 @@ class Plan:
     Attributes
     ----------
     names : tuple of str
-        Dotted names of the parameters that change.
+        Dotted names of the varied parameters.
     rows : tuple of tuples
-        Their values, one row a case.
+        Parameter values, one row per case.
     shape : tuple of int or None
-        Numbers of values along each axis of a grid, the last changing fastest; None otherwise.
+        Number of values along each axis of a grid, the last axis varying fastest; otherwise None.
     """
 
     names: tuple[str, ...]
@@ -36,12 +36,12 @@ class Plan:
 
 
 def plan(settings: SweepSettings) -> Plan:
-    """The cases that settings describe.
+    """Cases described by the settings.
 
     Raises
     ------
     InputError
-        If there are no axes, one is empty, or they do not suit the method.
+        If there are no axes, an axis is empty, or the axes do not suit the method.
     """
     axes = settings.axes
     if not axes:
@@ -94,12 +94,12 @@ def _values(name: str, axis: Axis, method: str) -> Sequence[Any]:
         raise InputError(f"[sweep.axes]: {name} lacks the key 'count', the number of values from "
                          f"{axis.start!r} to {axis.end!r}, which method = '{method}' needs.")
     space = np.geomspace if axis.spacing == "log" else np.linspace
-    # As people would write them: 0.84, not 0.8400000000000001.
+    # Round to short decimals: 0.84, not 0.8400000000000001.
     return [float(f"{value:.12g}") for value in space(axis.start, axis.end, axis.count)]
 
 
 def _draw(settings: SweepSettings, d: int, samples: int) -> Array:
-    """Numbers (N, d) from 0 to 1."""
+    """Sample N points in the d-dimensional unit cube, (N, d)."""
     from scipy.stats import qmc
 
     rng = np.random.default_rng(settings.seed)
@@ -119,7 +119,7 @@ def _draw(settings: SweepSettings, d: int, samples: int) -> Array:
 
 
 def _inside(numbers: Array) -> Array:
-    # A distribution without bounds has no value at 0.
+    # The quantile 0 of an unbounded distribution is infinite.
     return np.clip(numbers, 0.5**33, 1.0 - 0.5**33)
 
 
@@ -130,7 +130,7 @@ def _exchanged(first: Array, second: Array, k: int) -> Array:
 
 
 def _at(name: str, axis: Axis, parts: Array) -> list[Any]:
-    """Values of a parameter below which the given parts of its distribution lie."""
+    """Quantiles of the distribution of a parameter."""
     if isinstance(axis, tuple):
         return [axis[k] for k in np.minimum((parts * len(axis)).astype(int), len(axis) - 1)]
     if isinstance(axis, Span):
@@ -142,7 +142,7 @@ def _at(name: str, axis: Axis, parts: Array) -> list[Any]:
 
 
 def frozen(axis: Distribution) -> Any:
-    """The distribution as scipy has it."""
+    """The frozen scipy distribution."""
     from scipy import stats
 
     p = axis.parameters

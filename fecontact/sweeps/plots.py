@@ -1,4 +1,4 @@
-"""Plots of sweeps: curves, maps, scatter, displacements once per period, Sobol indices."""
+"""Plots of sweeps: curves, maps, scatter plots, strobed displacements, Sobol indices."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,11 +32,11 @@ def plot_sweep(
     table: SweepTable, name: str, over: Sequence[str] | None = None, *,
     path: str | Path | None = None,
 ) -> "Figure":
-    """Plot a summary of a sweep over the parameters that changed.
+    """Plot a summary of a sweep over the varied parameters.
 
-    A map for a grid of two parameters with many values each, curves for a grid of one parameter,
-    or of two where one has few values or values that are not numbers; for all other sweeps a
-    scatter plot for each parameter, and a histogram.
+    A grid of two parameters with many values each gives a map. A grid of one parameter gives a
+    curve, as does one of two if the second has few or non-numeric values (a curve for each). All
+    other sweeps give a scatter plot for each parameter and a histogram.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def plot_sweep(
     name : str
         The summary.
     over : one or two parameters, optional
-        One for curves, two for a map in which the others have their first value.
+        One for curves, two for a map at the first value of all other parameters.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -66,7 +66,7 @@ def plot_sweep(
                 else _map(table, name, over[0], over[1], path))
     names = [key for key, values in table.parameters.items() if len(set(values)) > 1]
     if not names:
-        raise InputError("The sweep has one case only; there is nothing to plot.")
+        raise InputError("The sweep has only one case; there is nothing to plot.")
     numeric = [is_numeric(table.parameters[key]) for key in names]
     if table.shape is not None and len(names) == 2 and all(numeric) and min(
             len(set(table.parameters[key])) for key in names) > _MOST_LINES:
@@ -98,7 +98,7 @@ def _curves(
             places, values = x[order], table.values[name][order] / factor
             if not np.isfinite(values).any():
                 continue
-            # Cases that differ in other parameters too are no curve.
+            # Cases that also differ in other parameters do not form a curve.
             curve = len(places) <= 200 and (np.diff(places) > 0.0).all()
             axes.plot(places, values, linestyle="-" if curve else "none", color=colour,
                       linewidth=0.9, marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
@@ -121,7 +121,7 @@ def plot_strobed(
     table : SweepTable
         Of a sweep that strobes.
     parameter : str
-        One of those that changed.
+        A varied parameter.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -155,7 +155,7 @@ def plot_strobed(
 def _map(
     table: SweepTable, name: str, first: str, second: str, path: str | Path | None
 ) -> "Figure":
-    """A summary over two parameters of a grid; grey where cases failed."""
+    """Map of a summary over two parameters of a grid; failed cases are grey."""
     from matplotlib import colormaps
 
     if table.shape is None:
@@ -195,7 +195,7 @@ def _map(
 def _scatter(
     table: SweepTable, name: str, parameters: Sequence[str], path: str | Path | None
 ) -> "Figure":
-    """A summary over each of the parameters, and its distribution."""
+    """Scatter plots of a summary over each parameter, and its histogram."""
     rows = -(-(len(parameters) + 1) // 4)
     columns = -(-(len(parameters) + 1) // rows)
     with new_figure(3.1 * columns, 3.1 * rows, path) as figure:
@@ -231,14 +231,14 @@ def plot_sobol(
     Parameters
     ----------
     found : mapping of summary to SobolIndices
-        What :func:`fecontact.sweeps.sobol_indices` found.
+        Results of :func:`fecontact.sweeps.sobol_indices`.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
     InputError
-        For nothing to draw, another suffix, or a file that cannot be written.
+        If ``found`` is empty, for another suffix, or a file that cannot be written.
     """
     require_kind("plot_sobol", Mapping, found=found)
     if not found:
@@ -287,7 +287,7 @@ def _label(axes: "Axes", name: str, values: Array) -> float:
 
 
 def _places(values: Sequence[Any]) -> tuple[Array, list[str] | None]:
-    """Numbers along an axis; for other values their order, and their names."""
+    """Coordinates along an axis; for non-numeric values their indices and labels."""
     if is_numeric(values):
         return np.array(values, dtype=float), None
     names = list(dict.fromkeys(_shown(value) for value in values))
@@ -324,7 +324,7 @@ def _mark_failed(axes: "Axes", table: SweepTable, x: Array) -> None:
 
 
 def _is_geometric(points: Array) -> bool:
-    """Whether ascending points have equal ratios, and not equal differences."""
+    """Whether ascending points are spaced by equal ratios rather than equal differences."""
     if len(points) < 3 or points[0] <= 0.0:
         return False
     steps, ratios = np.diff(points), points[1:] / points[:-1]
@@ -332,7 +332,7 @@ def _is_geometric(points: Array) -> bool:
 
 
 def _edges(points: Array, log: bool) -> Array:
-    """Borders of cells around points."""
+    """Edges of the cells around points."""
     p = np.log(points) if log else points
     middle = 0.5 * (p[1:] + p[:-1])
     edges = np.concatenate([[2.0 * p[0] - middle[0]], middle, [2.0 * p[-1] - middle[-1]]])

@@ -1,4 +1,4 @@
-"""The progress bar of a sweep: the rate of its cases, the time left, failures."""
+"""Progress bar of a sweep: rate of cases, remaining time, failures."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,13 +9,13 @@ from fecontact.core.progress import clock, titled_bar
 
 @contextmanager
 def sweep_bar() -> Iterator[Callable[[int, int, int], None]]:
-    """A function that is told how many cases are done, failed and there are at all."""
+    """Callback for the numbers of finished, failed and all cases, which draws the bar."""
     begin = time.perf_counter()
     first: int | None = None
 
     def tell(done: int, failed: int, total: int) -> None:
         nonlocal first
-        # Cases of an earlier sweep took no time.
+        # Cases of an earlier sweep do not count towards the rate.
         first = done if first is None else first
         show(f"Sweeping {done}/{total}", done / max(total, 1),
              note(done, failed, total, first, time.perf_counter() - begin))

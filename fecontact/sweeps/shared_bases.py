@@ -1,4 +1,4 @@
-"""Modal bases that several batches share: computed once, stored, sent to the workers."""
+"""Modal bases shared by several batches: computed once, stored, sent to the workers."""
 
 import pickle
 from collections import Counter
@@ -16,10 +16,10 @@ from fecontact.sweeps.store import Store
 
 
 class Bases:
-    """The modal bases that batches wait for.
+    """Modal bases on which batches depend.
 
-    A basis that only one batch needs is left to that batch. If all cases have the same one it is
-    computed here, where a study may have it already; others are computed by the workers.
+    A basis needed by a single batch is computed with that batch. A basis common to all cases is
+    computed in this process, where the study may have cached it; workers compute the others.
     """
 
     def __init__(self, study: Study, store: Store, batches: Sequence[Batch]) -> None:
@@ -34,12 +34,12 @@ class Bases:
                        for batch in batches for case in batch.cases if case.basis in shared}
 
     def first(self) -> list[Job]:
-        """What can be started now: bases to compute, and batches that need not wait.
+        """Jobs that can start at once: bases to compute, and batches that do not wait for one.
 
         Raises
         ------
         FecontactError
-            If all cases have the same basis, and it cannot be computed.
+            If the basis common to all cases cannot be computed.
         """
         jobs = []
         for key, batch in self.makers.items():
@@ -53,7 +53,7 @@ class Bases:
         return jobs + self._released()
 
     def made(self, batch: Batch, result: bytes | str | LostError) -> list[Job]:
-        """The batches that need not wait any longer, now that a worker has made a basis."""
+        """Store a basis made by a worker; returns the jobs that can now start."""
         key = batch.cases[0].basis
         if isinstance(result, bytes):
             self._put(key, pickle.loads(result), batch)
@@ -67,7 +67,7 @@ class Bases:
         except OSError as error:
             raise AnalysisError(f"{self.store.basis_file(key)} cannot be written "
                                 f"({(error.strerror or str(error)).lower()}).") from None
-        # Fields are large; workers that write them see the folder anyway.
+        # Fields are large; workers that write them have access to the folder anyway.
         self.ready[key] = (self.store.basis_file(key).absolute() if batch.frames
                            else packed(basis, shapes=False))
 

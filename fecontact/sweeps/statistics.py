@@ -1,4 +1,4 @@
-"""Statistics of drawn samples: moments, quantiles and Sobol indices, with confidence intervals."""
+"""Statistics of samples: moments, quantiles and Sobol indices, with confidence intervals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with the ends of its confidence interval; they are infinite if it has none."""
+    """A value and the bounds of its confidence interval, infinite if it has none."""
 
     value: float
     low: float
@@ -30,11 +30,11 @@ class SobolIndices:
     Attributes
     ----------
     first : mapping of parameter to Estimate
-        Part of the variance that the parameter makes by itself.
+        Fraction of the variance due to the parameter alone.
     total : mapping of parameter to Estimate
-        Part that it has a share in, by itself or together with others.
+        Fraction due to the parameter alone or in interaction with others.
     samples : int
-        Base samples that the indices follow from.
+        Number of base samples used.
     """
 
     first: Mapping[str, Estimate]
@@ -47,15 +47,15 @@ def statistics(
 ) -> dict[str, Estimate]:
     """Mean, standard deviation and the quantiles 5 %, 50 % and 95 % of N samples.
 
-    The interval of the mean is Student's, that of the standard deviation from the bootstrap
-    (bias-corrected and accelerated), those of quantiles lie between order statistics, whatever
-    the distribution. They hold for independent samples; of a Latin hypercube or a Sobol sequence
-    means are more accurate than they say.
+    Confidence intervals: Student's t for the mean, the bias-corrected and accelerated bootstrap
+    for the standard deviation, order statistics (distribution-free) for the quantiles. They hold
+    for independent samples and are conservative for means over a Latin hypercube or a Sobol
+    sequence.
 
     Parameters
     ----------
     values : (N,) array
-        NaN, of cases that failed, is left out.
+        NaN, the value of failed cases, is ignored.
     confidence : float
         Probability with which an interval holds the true value.
     seed : int
@@ -71,7 +71,7 @@ def statistics(
     x = as_floats(values, "The values of statistics").ravel()
     x = x[np.isfinite(x)]
     if len(x) < 3:
-        raise InputError(f"Statistics need at least 3 cases that went well, not {len(x)}.")
+        raise InputError(f"Statistics need at least 3 successful cases, not {len(x)}.")
     _require_confidence(confidence)
     mean, std = float(x.mean()), float(x.std(ddof=1))
     half = std / np.sqrt(len(x)) * float(stats.t.ppf(0.5 + 0.5 * confidence, len(x) - 1))
@@ -102,18 +102,18 @@ def sobol_indices(
     Parameters
     ----------
     table : SweepTable
-        Of the sweep; base samples with a failed case are left out.
+        Table of the sweep; base samples with a failed case are ignored.
     name : str
-        Summary, or any column.
+        Name of a summary or any other column.
     confidence : float
-        Probability with which an interval, of bootstrap percentiles, holds the true value.
+        Probability with which a (bootstrap percentile) interval contains the true value.
     seed : int
         Of the bootstrap.
 
     Raises
     ------
     InputError
-        If the cases are not those of such a sweep, or too few went well.
+        If the sweep is of another method, or too few cases succeeded.
     """
     require_kind("sobol_indices", SweepTable, table=table)
     names = tuple(table.parameters)
@@ -128,9 +128,10 @@ def indices_of(
 ) -> tuple[list[Estimate], list[Estimate], int]:
     """First-order and total indices of d parameters, and the number of base samples used.
 
-    ``values`` (N (d + 2),) belong to samples A, B, and A with one parameter after the other from
-    B: ``S_i = <f_B (f_ABi - f_A)> / Var``, ``T_i = <(f_A - f_ABi)^2> / (2 Var)``, f less its mean
-    (Saltelli et al., Computer Physics Communications 181 (2010) 259).
+    ``values`` (N (d + 2),) belong to the samples A, B and AB_i, which is A with parameter i from
+    B. With f reduced by its mean, ``S_i = <f_B (f_ABi - f_A)> / Var`` and
+    ``T_i = <(f_A - f_ABi)^2> / (2 Var)`` (Saltelli et al., Computer Physics Communications 181
+    (2010) 259).
     """
     f = np.array(values, dtype=float)
     _require_confidence(confidence)
@@ -141,7 +142,7 @@ def indices_of(
     f = f[:, np.isfinite(f).all(axis=0)]
     samples = f.shape[1]
     if samples < 8:
-        raise InputError(f"Sobol indices need at least 8 base samples that went well, not "
+        raise InputError(f"Sobol indices need at least 8 successful base samples, not "
                          f"{samples}.")
     found = _indices(f)
     rng = np.random.default_rng(seed)

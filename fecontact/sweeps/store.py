@@ -22,19 +22,19 @@ from fecontact.sweeps.batch import case_file
 from fecontact.sweeps.case import Row
 
 _SUFFIXES = {"shards": ".json", "cases": ".vtkhdf", "bases": ".h5"}
-_OURS = re.compile(r"[0-9a-f]{24}")  # hashes, of rows, cases and bases
+_OURS = re.compile(r"[0-9a-f]{24}")  # hashes that name shards, cases and bases
 
 
 @dataclass(frozen=True)
 class Store:
-    """What a sweep keeps on disk.
+    """Files of a sweep on disk.
 
     Attributes
     ----------
     folder : Path
-        ``shards/``, ``bases/`` and ``cases/`` lie in it.
+        Contains ``shards/``, ``bases/`` and ``cases/``.
     files : bool
-        Whether a finished case has a file of its own.
+        Whether each finished case has its own file.
     """
 
     folder: Path
@@ -46,7 +46,7 @@ class Store:
         return self.folder / "cases"
 
     def rows(self) -> dict[str, Row]:
-        """All rows that are stored, by the keys of their cases.
+        """All stored rows by the keys of their cases.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class Store:
             found[key] = row
 
     def add(self, rows: Sequence[Row]) -> Path:
-        """Store the rows of a batch; the shard.
+        """Store the rows of a batch; returns the path of the shard.
 
         Raises
         ------
@@ -85,34 +85,34 @@ class Store:
         return path
 
     def basis_file(self, key: str) -> Path:
-        """The file of a modal basis."""
+        """Path of the file of a modal basis."""
         return self.folder / "bases" / f"{key}.h5"
 
     def keep_basis(self, key: str, basis: ModalBasis) -> None:
-        """Store a modal basis, unless it is there."""
+        """Store a modal basis unless it exists."""
         path = self.basis_file(key)
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
             write_basis(path, basis)
 
     def kept(self, what: str) -> list[Path]:
-        """The files that sweeps have kept in ``shards``, ``cases`` or ``bases``, by their names."""
+        """Files in ``shards``, ``cases`` or ``bases`` whose names show that a sweep wrote them."""
         return sorted(path for path in (self.folder / what).glob(f"*{_SUFFIXES[what]}")
                       if _OURS.fullmatch(path.stem))
 
     def tidy(self) -> None:
-        """Remove what a killed sweep has left half written."""
+        """Remove incomplete files of a killed sweep."""
         for name in ("", "shards", "bases", "cases"):
             clear_leftovers(self.folder / name)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other sweeps out of the folder; the system opens the lock when a process dies.
+        """Lock the folder against other sweeps; the system releases the lock if the process dies.
 
         Raises
         ------
         InputError
-            If another sweep is at work there.
+            If another sweep is running in the folder.
         """
         busy = (f"Another sweep is at work in {self.folder}; wait for it, or choose another "
                 f"folder.")
@@ -121,7 +121,7 @@ class Store:
 
 
 def _require_row(row: Any) -> None:
-    """Raise DamagedError unless a stored row is a whole one."""
+    """Raise DamagedError unless a stored row is complete and valid."""
     if not (isinstance(row, dict) and row.keys() >= Row.__required_keys__
             and isinstance(row["case"], str) and isinstance(row["reason"], str)
             and isinstance(row.get("warning", ""), str)
@@ -132,14 +132,14 @@ def _require_row(row: Any) -> None:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a text file whole or not at all, also when several processes do so at once.
+    """Write a text file atomically, even if several processes write it at the same time.
 
     Raises
     ------
     InputError
         If it cannot be written.
     """
-    with contextlib.suppress(OSError):  # said by what follows
+    with contextlib.suppress(OSError):  # reported by the write below
         path.parent.mkdir(parents=True, exist_ok=True)
     with replaced(path) as part:
         part.write_text(text, encoding="utf-8")

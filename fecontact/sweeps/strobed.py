@@ -1,4 +1,4 @@
-"""Stroboscopic sweeps: only states once per period are kept, batches are compiled ensembles."""
+"""Stroboscopic sweeps: states once per period, each batch run as a compiled ensemble."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,16 +16,16 @@ from fecontact.sweeps.case import Row, SweepCase
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
-_PHASES = 8  # states per period, which show the size of the motion
+_PHASES = 8  # states per period, to measure the range of the motion
 _AXES = ("x", "y")
 
 
 def strobed_rows(
     cases: Sequence[SweepCase], strobing: Strobing, study_of: Callable[[SweepCase], Study]
 ) -> list[Row]:
-    """Rows of cases, from ensembles of those whose states have the same size.
+    """Rows of cases, computed in ensembles of cases with equal numbers of states.
 
-    The numbers are those of :func:`fecontact.ensemble` for each case alone.
+    The results are those of :func:`fecontact.ensemble` for each case alone.
     """
     rows: dict[str, Row] = {}
     groups: dict[tuple[int, float], list[tuple[SweepCase, ContactSystem, Array, Array]]] = {}
@@ -57,9 +57,9 @@ def strobed_rows(
 
 
 def strobe_times(period: float, strobing: Strobing) -> Array:
-    """The start, and from the last period of the transient on eight times a period [s].
+    """Output times [s]: the start, then eight per period from the last transient period on.
 
-    The last time is the last that is kept: ``transient_periods + keep - 1`` periods.
+    They end at the last state to keep, after ``transient_periods + keep - 1`` periods.
     """
     phases = np.arange(-_PHASES + 1, _PHASES * (strobing.keep - 1) + 1)
     later = (strobing.transient_periods + phases / _PHASES) * period
@@ -75,7 +75,7 @@ def _row(case: SweepCase, system: ContactSystem, states: Array, strobing: Strobi
 
 
 def _periods(states: Array, once: Array, system: ContactSystem) -> float:
-    """Number of periods after which the states repeat; 0 if they do not, NaN if too few are kept.
+    """Number of periods after which the states repeat; 0 if they do not, NaN for too few states.
 
     By displacements and velocities of B and the contact nodes, as
     :func:`fecontact.analysis.periodicity`.

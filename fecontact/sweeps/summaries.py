@@ -1,8 +1,8 @@
 """Summaries of a run: scalar functions of a :class:`Trajectory`.
 
-Each is known by a name, to study files and in the columns of a sweep's table. ``NAME@POINT`` asks
-for another point than the usual one: ``amplitude_x@C``, ``amplitude_y@0`` for the first contact
-node. ``FILE.py:FUNCTION`` is a function of the user: it takes a Trajectory and returns a number.
+Each has a name, used in study files and as a column of the table of a sweep. ``NAME@POINT``
+selects another point than the default: ``amplitude_x@C``, or ``amplitude_y@0`` for the first
+contact node. ``FILE.py:FUNCTION`` is a user function of a Trajectory that returns a number.
 """
 
 import inspect
@@ -27,14 +27,14 @@ Point = str | int
 
 @dataclass(frozen=True)
 class Summary:
-    """A number that is kept of each case: the function that takes it from a run, and its unit."""
+    """A number stored for each case: the function that computes it from a run, and its unit."""
 
     function: Callable[..., float]
     unit: str
 
     @property
     def text(self) -> str:
-        """What it is, for people."""
+        """Description for display."""
         return summary(self.function)
 
 
@@ -42,14 +42,14 @@ def summarise(
     trajectory: Trajectory, functions: Mapping[str, Callable[[Trajectory], float]],
     t_start: float | None = None,
 ) -> dict[str, float]:
-    """Summaries of a run from a time on [s]; see :func:`functions_for`.
+    """Summaries of a run after a start time [s]; see :func:`functions_for`.
 
     Raises
     ------
     InputError
-        If fewer than two output times are left.
+        If fewer than two output times remain.
     FecontactError
-        As the functions do; with the name of the summary.
+        As raised by the functions, with the name of the summary.
     """
     late = trajectory if t_start is None else trajectory.between(t_start)
     values = {}
@@ -64,27 +64,27 @@ def summarise(
 def functions_for(
     names: Sequence[str], folder: Path | None = None, **known: Any
 ) -> dict[str, Callable[[Trajectory], float]]:
-    """Functions of a Trajectory alone, by the names of summaries.
+    """Functions of a Trajectory by the names of summaries.
 
     Parameters
     ----------
     names : sequence of str
         As in ``[sweep]``.
     folder : Path, optional
-        Where files of the user's functions are named from.
+        Folder to which files of user functions are relative.
     **known
-        What some summaries need besides the run: ``wear_coefficient`` [m^3/J], ``thickness`` [m].
+        Further inputs of some summaries: ``wear_coefficient`` [m^3/J], ``thickness`` [m].
 
     Raises
     ------
     InputError
-        If there is no such summary, or it needs what is not known.
+        If a summary does not exist, or an input that it needs is not given.
     """
     return {name: _function(name, folder or Path(), known) for name in names}
 
 
 def unit_of(name: str) -> str:
-    """Unit of a summary; empty for dimensionless ones and for the user's functions."""
+    """Unit of a summary; empty for dimensionless summaries and user functions."""
     found = SUMMARIES.get(name.partition("@")[0])
     return "" if found is None else found.unit
 
@@ -115,7 +115,7 @@ def _function(name: str, folder: Path, known: Mapping[str, Any]) -> Callable[[Tr
 
 
 def usual_point(trajectory: Trajectory) -> Point:
-    """B, or the contact node in the middle for a basis without B."""
+    """Default point: B, or the middle contact node for a basis without B."""
     basis = trajectory.system.basis
     return "B" if basis.T[0].any() else basis.contact_nodes // 2
 
@@ -134,19 +134,19 @@ def _part(trajectory: Trajectory, state: ContactState) -> float:
 
 
 def largest_displacement(trajectory: Trajectory) -> float:
-    """Largest displacement of B, C, the contact nodes and further points at any time."""
+    """Largest displacement of B, C, the contact nodes and other named points at any time."""
     rows = trajectory.system.basis.T[:, :2]
     moved = np.einsum("pkm,tm->tpk", rows, trajectory.modal_coordinates)
     return float(np.hypot(moved[..., 0], moved[..., 1]).max())
 
 
 def amplitude_x(trajectory: Trajectory, point: Point | None = None) -> float:
-    """Half of the way from the lowest to the highest displacement x of a point."""
+    """Half the range of the displacement x of a point."""
     return 0.5 * float(np.ptp(_of_point(trajectory, point)[:, 0]))
 
 
 def amplitude_y(trajectory: Trajectory, point: Point | None = None) -> float:
-    """Half of the way from the lowest to the highest displacement y of a point."""
+    """Half the range of the displacement y of a point."""
     return 0.5 * float(np.ptp(_of_point(trajectory, point)[:, 1]))
 
 
@@ -161,17 +161,17 @@ def _of_point(trajectory: Trajectory, point: Point | None) -> Array:
 
 
 def stick_fraction(trajectory: Trajectory) -> float:
-    """Part of time and contact length that sticks."""
+    """Fraction of time and contact length in stick."""
     return _part(trajectory, ContactState.STICK)
 
 
 def slip_fraction(trajectory: Trajectory) -> float:
-    """Part of time and contact length that slips."""
+    """Fraction of time and contact length in slip."""
     return _part(trajectory, ContactState.SLIP)
 
 
 def open_fraction(trajectory: Trajectory) -> float:
-    """Part of time and contact length without contact."""
+    """Fraction of time and contact length without contact."""
     return _part(trajectory, ContactState.OPEN)
 
 
@@ -206,7 +206,7 @@ def friction_power(trajectory: Trajectory) -> float:
 
 
 def belt_power(trajectory: Trajectory) -> float:
-    """Mean power that the moving ground puts in by dragging the body along."""
+    """Mean power supplied by the moving ground through friction."""
     return _power(trajectory, "belt")
 
 
@@ -216,12 +216,12 @@ def _power(trajectory: Trajectory, name: str) -> float:
 
 
 def wear_depth(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:
-    """Depth worn away where it is largest: coefficient x friction work per area."""
+    """Largest wear depth along the face: coefficient x friction work per area."""
     return float(trajectory.wear_depth(wear_coefficient, thickness)[-1].max())
 
 
 def wear_rate(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:
-    """Depth worn away per time where it is largest: coefficient x friction power per area."""
+    """Largest wear rate along the face: coefficient x friction power per area."""
     return wear_depth(trajectory, wear_coefficient, thickness) / _duration(trajectory)
 
 
@@ -253,7 +253,7 @@ def periods(trajectory: Trajectory) -> float:
 
 
 def lyapunov_exponent(trajectory: Trajectory) -> float:
-    """Largest Lyapunov exponent, from a run as long again that starts from the first state."""
+    """Largest Lyapunov exponent, from another run of equal length from the first state."""
     from fecontact.bifurcation.attractors.lyapunov import lyapunov_exponents
 
     duration = _duration(trajectory)
@@ -263,7 +263,7 @@ def lyapunov_exponent(trajectory: Trajectory) -> float:
 
 
 def end_time(trajectory: Trajectory) -> float:
-    """Time at which the run ended, at its end or by an event that stopped it."""
+    """Time at which the run ended, on schedule or at an event."""
     return float(trajectory.time[-1])
 
 

@@ -1,4 +1,4 @@
-"""Sweeps: many cases of a study on all cores or a cluster, stored so that they can be resumed."""
+"""Sweeps: many cases of a study on all cores or a cluster, stored and resumable."""
 
 import contextlib
 from collections import deque
@@ -30,7 +30,7 @@ from fecontact.sweeps.table import SweepTable
 
 Progress = Callable[[int, int, int], None]
 
-_BATCHES, _LARGEST = 64, 64  # batches of a sweep at least, cases of a batch at most
+_BATCHES, _LARGEST = 64, 64  # fewest batches of a sweep, most cases of a batch
 
 
 def sweep(
@@ -50,51 +50,51 @@ def sweep(
 
     ``sweep("study.toml", {"ground.speed": [0.1, 0.2], "friction.decay": Span(1.0, 9.0, 5)})``
 
-    Each case gives the numbers that ``study.with_(**changes).run()`` gives, to the last bit. It is
-    known by the hash of its resolved study; finished ones are kept in ``folder`` batch by batch,
-    so that a sweep that was stopped goes on where it was. Cases that fail have their reason in the
-    table and do not stop the others.
+    Each case gives the same numbers as ``study.with_(**changes).run()``, to the last bit, and is
+    identified by the hash of its resolved study. Finished batches are stored in ``folder``, so
+    that an interrupted sweep can be resumed. A failed case has its reason in the table; the other
+    cases still run.
 
     Parameters
     ----------
     study : Study or path
-        What all cases have in common.
+        The study that the cases vary.
     axes : mapping, optional
-        Parameters that change, by dotted names, with a list of values, a
+        Varied parameters by dotted names, each with a list of values, a
         :class:`~fecontact.study.Span` or a
-        :class:`~fecontact.study.Distribution`; those of ``[sweep.axes]`` by default.
+        :class:`~fecontact.study.Distribution`; by default ``[sweep.axes]``.
     executor : concurrent.futures.Executor, optional
-        What runs the batches: the executor of a Dask client, of mpi4py.futures, of executorlib,
-        threads; by default processes on this machine, which end with the sweep.
+        Executor of the batches, such as that of a Dask client, mpi4py.futures, executorlib or a
+        thread pool; by default processes on this machine, which end with the sweep.
     folder : path, optional
-        Where finished cases are kept; ``NAME-sweep`` among the results of the study by default.
+        Folder of finished cases; by default ``NAME-sweep`` in the results folder of the study.
     resume : bool
-        Go on with what is there, instead of complaining about it.
+        Continue a sweep that is in the folder instead of refusing the folder.
     overwrite : bool
-        Remove what is there.
+        Remove a sweep that is in the folder first.
     retry : bool
-        Compute cases again that have failed.
+        Repeat failed cases.
     workers : int, optional
-        Number of processes on this machine; as many as cores by default.
+        Number of processes on this machine; by default one per core.
     progress : bool or callable, optional
         True for a progress bar on a terminal or in a notebook; a function is called with the
-        numbers of cases that are done, that failed and of all.
+        numbers of finished, failed and all cases.
     **settings
-        Other values for the keys of ``[sweep]``; see
+        Values that override keys of ``[sweep]``; see
         :class:`~fecontact.study.SweepSettings`.
 
     Returns
     -------
     SweepTable
-        Also in ``folder`` as ``index.csv``.
+        Also written to ``folder`` as ``index.csv``.
 
     Raises
     ------
     InputError
-        If a parameter does not exist, an axis is empty or does not suit the method, a summary is
-        not known, the folder holds a sweep or cannot be written, another sweep is at work in it.
+        If a parameter or summary does not exist, an axis is empty or does not suit the method, or
+        the folder holds a sweep, is in use by another sweep, or cannot be written.
     AnalysisError
-        If the executor cannot go on; finished cases are kept.
+        If the executor fails; finished cases are kept.
     KeyboardInterrupt
         After Ctrl-C; finished cases are kept.
     """
@@ -138,7 +138,7 @@ def sweep(
                               f"on with --resume (resume=True).") from None
         finally:
             table = work.table(rows, place)
-            # Where something else went wrong, that is what must be said.
+            # Do not hide an earlier error.
             with contextlib.nullcontext() if finished else contextlib.suppress(InputError):
                 table.write(place / "index.csv")
     return table
@@ -146,7 +146,7 @@ def sweep(
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """All cases of a sweep, and what to do with each."""
+    """All cases of a sweep and the settings of their batches."""
 
     study: Study
     settings: SweepSettings
@@ -165,7 +165,7 @@ class _Work:
             for key, basis, row in zip(keys, bases, cases.rows, strict=True)))
 
     def batches(self, store: Store) -> Iterator[Batch]:
-        """All cases in batches; the same ones for every run of the sweep."""
+        """All cases in batches, independent of which are already finished."""
         different = list({case.key: case for case in self.cases}.values())
         first: dict[str, int] = {}
         for case in different:
@@ -183,7 +183,7 @@ class _Work:
             yield replace(common, cases=tuple(different[start : start + size]))
 
     def table(self, rows: Mapping[str, Row], folder: Path) -> SweepTable:
-        """The table of what is there."""
+        """Table of the finished cases."""
         found = [rows.get(case.key) for case in self.cases]
         nothing: dict[str, float] = {}
         return SweepTable(
@@ -253,7 +253,7 @@ def _compute(
     work: _Work, store: Store, rows: dict[str, Row], executor: Executor | None,
     workers: int | None, progress: Progress | None,
 ) -> None:
-    """Compute what is not in ``rows``, and put it there and into the store."""
+    """Compute the cases missing in ``rows``; add them to ``rows`` and to the store."""
     total = len({case.key for case in work.cases})
     done = sum(case.key in rows for case in {case.key: case for case in work.cases}.values())
     failed = sum(bool(rows[key]["reason"]) for key in {case.key for case in work.cases}

@@ -1,4 +1,4 @@
-"""The table of a sweep: parameters and summaries of all cases, in memory and as a CSV file."""
+"""Table of a sweep: parameters and summaries of all cases, in memory and as CSV."""
 
 import csv
 import io
@@ -28,21 +28,21 @@ class SweepTable(Summarised):
     Attributes
     ----------
     parameters : mapping of dotted name to (N,) sequence
-        Values of the parameters that changed.
+        Values of the varied parameters.
     values : mapping of name to (N,) array
         Summaries; NaN where a case failed or was not computed.
     keys : (N,) sequence of str
-        By which a case is known on disk.
+        Keys that identify the cases on disk.
     reasons : (N,) sequence of str or None
-        Why a case failed; empty for those that were computed, None for those that were not.
+        Reason of failure; empty for a case that succeeded, None for one not computed yet.
     shape : tuple of int or None
-        Of a grid: numbers of values along the axes.
+        Number of values along each axis of a grid; None for other sweeps.
     folder : Path or None
-        Where the sweep is kept.
+        Folder of the sweep.
     strobed : (N, K) array or None
-        Displacements once per period, of a sweep that strobes; NaN for cases that failed.
+        Displacements once per period, for stroboscopic sweeps; NaN for failed cases.
     warnings : (N,) sequence of str
-        Where runs leave what the model holds for; empty for those that do not.
+        Where runs exceed the limits of the model; empty for runs within them.
     """
 
     parameters: Mapping[str, Sequence[Any]]
@@ -58,7 +58,7 @@ class SweepTable(Summarised):
         return len(self.keys)
 
     def summary(self) -> list[tuple[str, str]]:
-        """Numbers of cases, ranges of the parameters, names of the summaries."""
+        """Short description: number of cases, parameter ranges, names of the summaries."""
         shape = "" if self.shape is None else f", grid {' x '.join(map(str, self.shape))}"
         return [
             ("cases", f"{len(self)}{shape}"), ("failed", f"{len(self.failed)}"),
@@ -82,31 +82,31 @@ class SweepTable(Summarised):
 
     @property
     def failed(self) -> dict[int, str]:
-        """Numbers of the cases that failed, with their reasons."""
+        """Indices of failed cases and the reasons."""
         return {k: reason for k, reason in enumerate(self.reasons) if reason}
 
     @property
     def missing(self) -> list[int]:
-        """Numbers of the cases that were not computed."""
+        """Indices of the cases not computed yet."""
         return [k for k, reason in enumerate(self.reasons) if reason is None]
 
     def changes(self, case: int) -> dict[str, Any]:
-        """What a case changes in the study: ``study.with_(**table.changes(3)).run()``."""
+        """Changes of a case to the study, for ``study.with_(**table.changes(3)).run()``."""
         return {name: values[case] for name, values in self.parameters.items()}
 
     def file(self, case: int) -> Path:
-        """The file of a case, of a sweep that keeps files."""
+        """Path of the file of a case, for a sweep that keeps files."""
         if self.folder is None:
             raise InputError("The table does not know the folder of its sweep.")
         return self.folder / "cases" / f"{self.keys[case]}.vtkhdf"
 
     def column(self, name: str) -> Array:
-        """A parameter or summary (N,) as numbers.
+        """Values (N,) of a numeric parameter or summary.
 
         Raises
         ------
         InputError
-            If there is none of that name, or it does not hold numbers.
+            If the column does not exist or is not numeric.
         """
         if name in self.values:
             return self.values[name]
@@ -119,12 +119,12 @@ class SweepTable(Summarised):
         return np.array(self.parameters[name], dtype=float)
 
     def grid(self, name: str) -> Array:
-        """A column in the shape of the grid.
+        """Column reshaped to the grid.
 
         Raises
         ------
         InputError
-            If the sweep is not a grid.
+            If the sweep is not on a grid.
         """
         if self.shape is None:
             raise InputError("The sweep is not a grid; its cases are columns of the table.")
@@ -133,8 +133,8 @@ class SweepTable(Summarised):
     def write(self, path: str | Path) -> Path:
         """Write the table as CSV: case, key, parameters, summaries, status, reason, warning.
 
-        Numbers have all their digits: reading gives them back to the last bit. Strobed
-        displacements go to ``NAME-strobed.csv``, one line a case.
+        Numbers are written with all digits and read back exactly. Strobed displacements go to
+        ``NAME-strobed.csv``, one line per case.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -168,19 +168,19 @@ def _text(value: Any) -> str:
 
 
 def read_table(path: str | Path) -> SweepTable:
-    """Read a table that :meth:`SweepTable.write` wrote.
+    """Read a table written by :meth:`SweepTable.write`.
 
     Raises
     ------
     InputError
-        If there is no such file, or it is no such table.
+        If the file does not exist or is not such a table.
     """
     path = as_path(path, "a table")
     try:
         with path.open(encoding="utf-8", newline="") as file:
             head, *rows = csv.reader(file)
         first = head.index("status")
-        # Summaries have no dots before an '@', and dots name parameters; but 'gap' has none.
+        # Parameter names contain dots, except 'gap'; summaries have none before an '@'.
         parameters = [name for name in head[2:first] if _is_parameter(name)]
         columns = dict(zip(head, zip(*rows, strict=True), strict=True))
         return SweepTable(
@@ -215,7 +215,7 @@ def _is_parameter(name: str) -> bool:
 
 
 def _shown(value: Any) -> str:
-    """A cell of the table for people."""
+    """Display text of a table cell."""
     return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 

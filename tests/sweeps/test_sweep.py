@@ -166,7 +166,7 @@ def test_a_case_that_ends_its_process_is_found_and_the_others_go_on(study, tmp_p
                   folder=tmp_path / "f", batch=2, workers=2,
                   summaries=["own.py:deadly", "amplitude_x"])
     assert list(table.failed) == [2]
-    assert "ended without a word" in table.failed[2]
+    assert "ended without a message" in table.failed[2]
     assert np.isfinite(table.values["amplitude_x"][[0, 1, 3]]).all()
 
 

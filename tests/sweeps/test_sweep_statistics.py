@@ -22,7 +22,7 @@ def test_moments_and_quantiles():
     assert found["5 %"].low == -np.inf
     assert found["95 %"].high == np.inf
     assert statistics(np.full(5, 2.0))["std"].high == 0.0
-    with pytest.raises(InputError, match="at least 3 cases that went well, not 2"):
+    with pytest.raises(InputError, match="at least 3 successful cases, not 2"):
         statistics([1.0, 2.0, np.nan])
     with pytest.raises(InputError, match=r"confidence = 1\.0 must lie between 0 and 1"):
         statistics(x, confidence=1.0)
@@ -87,5 +87,5 @@ def test_failed_cases_are_left_out_of_sobol_indices():
     assert indices_of(np.ones(40), 3)[0][0].value == 0.0
     with pytest.raises(InputError, match="need samples in blocks of 5"):
         indices_of(np.ones(41), 3)
-    with pytest.raises(InputError, match="at least 8 base samples that went well, not 4"):
+    with pytest.raises(InputError, match="at least 8 successful base samples, not 4"):
         indices_of(np.ones(20), 3)

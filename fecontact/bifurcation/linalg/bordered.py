@@ -1,4 +1,4 @@
-"""Collocation systems with further rows: the phase condition, the one that fixes a step."""
+"""Collocation systems with border rows, such as phase condition and arclength condition."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from fecontact.core.types import Array
 
 
 class Border:
-    """A further row, reduced to x_0, x_N and the common unknowns."""
+    """A border row, reduced to x_0, x_N and the common unknowns."""
 
     def __init__(self, factors: CondensedFactors, row: Array) -> None:
         self.weights = np.empty(pivot_rows(factors))
@@ -37,14 +37,14 @@ class Bordered:
         return np.hstack([small[:, :d] + self._closing * small[:, d : 2 * d], small[:, 2 * d :]])
 
     def solve(self, rhs: Array) -> Array:
-        """All unknowns for a right side of all rows; not finite where the system is singular."""
+        """Solution for a right-hand side of all rows; not finite if the system is singular."""
         d = len(self._factors.end)
         out = np.empty(self._nodal + self._small.shape[1] - 2 * d)
         bordered_kernels.solve(self._factors, rhs, self._weights, self._small, self._closing, out)
         return out
 
     def expand(self, solution: Array) -> Array:
-        """All unknowns from x_0 and the common ones where the right side is zero."""
+        """All unknowns from x_0 and the common unknowns for a zero right-hand side."""
         d, nodal = len(self._factors.end), self._nodal
         out = np.empty(nodal + len(solution) - d)
         out[nodal:] = solution[d:]

@@ -1,8 +1,9 @@
-"""Solutions of condensed collocation systems with further rows, the borders.
+"""Solution of condensed collocation systems with border rows.
 
-What elimination does to a border or to a right side is kept as a vector with one entry for each
-pivot row: (G, (m - 1) d, 8) of the inner nodes, (G - 1, d, 8) of the chains within segments,
-(S - 1, d) of the chain along them. A border's own right side then loses the product of the two.
+Elimination coefficients of a border, and a reduced right-hand side, are vectors with one entry for
+each pivot row: (G, (m - 1) d, 8) for the inner nodes, (G - 1, d, 8) for the chains within
+segments, (S - 1, d) for the chain along them. Their product is subtracted from the right-hand side
+of the border.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ from fecontact.core.dense_lu import solve as solve_dense
 
 @helper
 def _parts(factors, pivots):
-    """The three parts of a vector over the pivot rows."""
+    """Split a vector over the pivot rows into its three parts."""
     groups, size, _, _ = factors.inner.shape
     d = len(factors.end)
     inner = size - d
@@ -31,7 +32,7 @@ def _parts(factors, pivots):
 
 @helper
 def _take(given, first, group, groups, N, size, count, places, out):
-    """Fill out (count, 8) with given[j size + first ...] of a group's intervals, zero beyond N."""
+    """Gather given[j size + first ...] of a group of intervals in out (count, 8), zero beyond N."""
     for lane in range(WIDTH):
         places[lane] = min(lane * groups + group, N - 1) * size + first
     for c in range(count):
@@ -46,8 +47,8 @@ def _take(given, first, group, groups, N, size, count, places, out):
 def reduce_border(factors, given, weights, small):
     """Reduce a border ``given`` (N m d + e,) to x_0, x_N and the common unknowns.
 
-    Fills ``small`` (2 d + e,), and ``weights`` over the pivot rows with what its right side loses
-    by it, as multiples of the reduced right sides.
+    Fills ``small`` (2 d + e,) and, over the pivot rows, ``weights``: the multiples of the reduced
+    right-hand sides to subtract from that of the border.
     """
     factors, given, small, weights = (borrowed(factors), borrowed(given), borrowed(small),
                                       borrowed(weights))
@@ -69,7 +70,7 @@ def reduce_border(factors, given, weights, small):
     for group in range(groups):
         _take(given, d, group, groups, N, size, inner, places, row)
         for c in range(d):
-            # Until its interval is reached, x_j stands in the place of x_(j+1).
+            # Until its interval is reached, x_j occupies the place of x_(j+1).
             write(row[inner + c], read(link[2 * d + c]))
             write(row[inner + d + c], nothing)
         for c in range(e):
@@ -110,9 +111,9 @@ def reduce_border(factors, given, weights, small):
 
 @kernel(types.void(FACTORS, vector, vector, vector))
 def reduce_side(factors, rhs, reduced, side):
-    """Reduce the right side of the collocation rows, the first N m d entries of ``rhs``.
+    """Reduce the right-hand side of the collocation rows, the first N m d entries of ``rhs``.
 
-    Fills ``reduced`` over the pivot rows, and ``side`` (d,), that of the rows of ``factors.end``.
+    Fills ``reduced`` over the pivot rows and ``side`` (d,) for the rows of ``factors.end``.
     """
     factors, rhs, side, reduced = (borrowed(factors), borrowed(rhs), borrowed(side),
                                    borrowed(reduced))
@@ -170,7 +171,7 @@ def expand(factors, reduced, start, end, common, out):
     e = columns - 2 * d
     inner = size - d
     segments = len(factors.top) + 1
-    # The left ends of the groups' intervals, and after them those of the segments that follow.
+    # Left ends of the intervals of all groups, followed by those of the next segments.
     ends = np.zeros((groups + 1, d, WIDTH))
     whole = np.empty(3 * d + e)
     for c in range(d):
@@ -212,10 +213,10 @@ def expand(factors, reduced, start, end, common, out):
 
 @kernel(types.void(FACTORS, vector, matrix, matrix, f8, vector))
 def solve(factors, rhs, weights, small, closing, out):
-    """Fill ``out`` (N m d + e,) with the solution for a right side of all rows.
+    """Fill ``out`` (N m d + e,) with the solution for a right-hand side of all rows.
 
-    ``small`` (d + b, 2 d + e) are the reduced rows, those of ``factors.end`` first, ``weights``
-    (b, ...) what the borders lose over the pivot rows, and x_N is ``closing`` times x_0. The
+    ``small`` (d + b, 2 d + e) are the reduced rows, those of ``factors.end`` first; ``weights``
+    (b, ...) are the elimination coefficients of the borders; x_N is ``closing`` times x_0. The
     solution of a singular system is not finite.
     """
     N, d, _ = factors.local.shape

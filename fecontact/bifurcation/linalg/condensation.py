@@ -1,19 +1,19 @@
-"""Linear systems of collocation on intervals, solved in a time linear in their number.
+"""Linear systems of collocation, solved in time proportional to the number of intervals.
 
-On each of N intervals m d equations link the m + 1 nodes of the interval, d unknowns each, and e
-unknowns common to all (period, parameters). Further rows, the borders, link everything:
+On each of N intervals, m d equations link the m + 1 nodes of the interval, d unknowns each, and e
+unknowns common to all (period, parameters). Further rows, the borders, involve all unknowns:
 
     local_j [x_j0 ... x_jm, p] = r_j,  x_jm = x_(j+1)0,  x_Nm = x_00         border [x, p] = s
 
-:func:`condense` eliminates the inner nodes of each interval; d equations A_j x_j + B_j x_(j+1) +
-E_j p = .. are left of it. These are chained by eliminating x_1, x_2, ... one after the other, with
-row interchanges between the neighbours, so that nothing grows however unstable the orbit is in
-time. What is left links x_0, x_N and p (Doedel's scheme).
+:func:`condense` eliminates the inner nodes of each interval, which leaves d equations
+A_j x_j + B_j x_(j+1) + E_j p = ... These are chained by eliminating x_1, x_2, ... in turn, with
+row interchanges between neighbours, so that round-off does not grow with the instability of the
+orbit. The result links x_0, x_N and p (Doedel's scheme).
 
-The intervals are dealt out to eight segments of G = ceil(N / 8) neighbours each, which are worked
-on side by side, one in each lane: interval l G + g is lane l of group g. Intervals beyond the last
-are filled up with those of no width. The chain is eliminated within each segment first, and then
-along the segments.
+The intervals are distributed over eight segments of G = ceil(N / 8) neighbours each, processed in
+parallel, one in each SIMD lane: interval l G + g is lane l of group g. Empty lanes are filled with
+intervals of zero width. The chain is eliminated first within each segment, then along the
+segments.
 """
 
 from typing import NamedTuple
@@ -38,9 +38,9 @@ class CondensedFactors(NamedTuple):
     inner (G, m d, (m + 1) d + e, 8), columns: inner nodes, left end, right end, common unknowns;
     chain (G - 1, 2 d, 3 d + e, 8) within segments, columns: x_j, the segment's first, x_(j+1),
     common; top (S - 1, 2 d, 3 d + e), the same along the S segments that are not empty; end (d,
-    2 d + e), columns: x_0, x_N, common. Inverse pivots stand on the diagonals. The orders say which
-    row came to each place. local (N, d, 2 d + e), columns: left end, right end, common, are the
-    equations that are chained.
+    2 d + e), columns: x_0, x_N, common. Diagonals hold inverse pivots. The orders are the row
+    permutations. local (N, d, 2 d + e), columns: left end, right end, common, are the equations
+    to be chained.
     """
 
     inner: Array
@@ -58,7 +58,7 @@ FACTORS = types.NamedTuple([_groups, _orders, block, _groups, _orders, block, _p
 
 
 def factors_for(intervals: int, points: int, states: int, common: int) -> CondensedFactors:
-    """Room for the factors of a system of this size."""
+    """Allocate the factors of a system of this size."""
     N, m, d, e = intervals, points, states, common
     G = -(-N // WIDTH)
     S = -(-N // G)
@@ -71,14 +71,14 @@ def factors_for(intervals: int, points: int, states: int, common: int) -> Conden
 
 
 def pivot_rows(factors: CondensedFactors) -> int:
-    """Number of rows by which unknowns are eliminated, those of empty lanes among them."""
+    """Number of pivot rows, including those of empty lanes."""
     groups, size, _, lanes = factors.inner.shape
     d = len(factors.end)
     return int((groups * (size - d) + (groups - 1) * d) * lanes + len(factors.top) * d)
 
 
 def _aligned(groups: int, rows: int, columns: int) -> Array:
-    """Room (groups, rows, columns, 8) of which no eight numbers lie across two cache lines."""
+    """Allocate (groups, rows, columns, 8), each group of eight numbers in one cache line."""
     size = groups * rows * columns * WIDTH
     room = np.empty(size + WIDTH)
     first = -(room.__array_interface__["data"][0] // room.itemsize) % WIDTH
@@ -104,7 +104,7 @@ def _take_links(local, group, groups, places, links):
 
 @helper
 def _chain_segments(local, chain, order, end):
-    """Eliminate all but the ends of each segment; ``end`` (d, 2 d + e, 8) links these."""
+    """Eliminate all but the ends of each segment; ``end`` (d, 2 d + e, 8) links the ends."""
     d, columns, _ = end.shape
     e = columns - 2 * d
     groups = len(chain) + 1
@@ -181,7 +181,7 @@ def condense(J, f, P, widths, T, values, slopes, with_period, factors):
     inner = (m - 1) * d
     of_states, of_common, rates = J.reshape(-1), P.reshape(-1), f.reshape(-1)
     room, step, width = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
-    # Of each lane: where its interval begins, in numbers of collocation points.
+    # Start of the interval of each lane, counted in collocation points.
     first_point, places = np.empty(WIDTH, dtype=np.int64), np.empty(WIDTH, dtype=np.int64)
     for group in range(groups):
         a = factors.inner[group]

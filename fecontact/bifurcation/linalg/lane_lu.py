@@ -12,7 +12,7 @@ from fecontact.core.compiled import helper
 
 @helper
 def _with_pivot(a, k, order, room):
-    """Bring the largest entry of column k to row k in each lane; its inverse, kept there."""
+    """Move the largest entry of column k to row k in each lane; returns and stores its inverse."""
     rows, columns, _ = a.shape
     largest, place = magnitude(read(a[k, k])), spread(float(k))
     for i in range(k + 1, rows):
@@ -109,7 +109,7 @@ def forward_lanes(a, count, r):
 
 @helper
 def back_lanes(a, count, r, known):
-    """Fill known[:count] (.., 8), the rest given, from the reduced right side r (count, 8)."""
+    """Back-substitution of r (count, 8): fill known[:count] (.., 8) from its other entries."""
     width = len(known)
     for i in range(count):
         total, other = read(r[i]), spread(0.0)

@@ -1,10 +1,10 @@
 """Eigenvalues of a product of matrices, without forming the product.
 
-P = M_(N-1) ... M_1 M_0 may hold eigenvalues from 1e-300 to 1e300 side by side, of which the
-multiplied matrix keeps the largest sixteen digits only. The periodic QR algorithm (Bojanczyk,
-Golub and Van Dooren 1992) rotates the factors themselves: orthogonal changes of basis between
-neighbours make M_1 .. M_(N-1) upper triangular and M_0 upper Hessenberg, shifted steps drive that
-one to upper triangular too, and each eigenvalue is the product of one diagonal entry of each.
+P = M_(N-1) ... M_1 M_0 may have eigenvalues from 1e-300 to 1e300, of which the product formed in
+floating point keeps only the largest sixteen decades. The periodic QR algorithm (Bojanczyk, Golub
+and Van Dooren 1992) rotates the factors instead: orthogonal changes of basis between neighbours
+make M_1 .. M_(N-1) upper triangular and M_0 upper Hessenberg, shifted steps reduce M_0 to upper
+triangular form, and each eigenvalue is the product of corresponding diagonal entries.
 """
 
 import math
@@ -22,7 +22,7 @@ _complex_block = types.Array(_complex, 3, "C")
 _complex_vector = types.Array(_complex, 1, "C")
 
 _EPS = float(np.finfo(float).eps)
-_STEPS = 60  # shifted steps for one eigenvalue before it is given up
+_STEPS = 60  # shifted steps for one eigenvalue before giving up
 
 
 @helper
@@ -57,7 +57,7 @@ def _columns(a, k, c, s, last):
 
 @helper
 def _upward(H, k, c, s):
-    """Carry a rotation of rows k, k + 1 of H[0] through the triangular factors, back to H[0].
+    """Propagate a rotation of rows k, k + 1 of H[0] through the triangular factors to H[0].
 
     It changes the basis between H[0] and H[1]; the last rotation acts on the columns of H[0].
     """
@@ -137,7 +137,7 @@ def _step(H, first, last, exceptional):
     h = H[0]
     x = a * h[first, first] + b * h[first + 1, first]
     y = c * h[first + 1, first]
-    # The shift is brought to the scale of the first column; one out of range is no shift.
+    # Scale the shift to the first column; omit a shift out of range.
     difference = min(max(power - exponent, -1000), 900)
     x -= sigma * math.ldexp(1.0, difference)
     if exceptional:
@@ -171,7 +171,7 @@ def _step(H, first, last, exceptional):
 
 @helper
 def _plain_step(H, first, last, cosines, sines):
-    """One step without a shift; it parts eigenvalues that are decades apart."""
+    """One step without a shift, which separates eigenvalues that differ by decades."""
     d = H.shape[1]
     for k in range(first, last):
         c, s = _rotation(H[0, k, k], H[0, k + 1, k])
@@ -184,9 +184,9 @@ def _plain_step(H, first, last, cosines, sines):
 
 @kernel(types.boolean(block, _complex_vector))
 def product_eigenvalues(M, values):
-    """Fill the d eigenvalues of M[N - 1] ... M[0] (N, d, d), used up; the largest first.
+    """Fill the d eigenvalues of M[N - 1] ... M[0] (N, d, d), largest first; overwrites M.
 
-    Returns whether they were found.
+    Returns whether the iteration converged.
     """
     H = M[: condense_products(M)].astype(np.complex128)
     K, d, _ = H.shape
@@ -238,8 +238,8 @@ def product_eigenvalues(M, values):
 def eigenvalues_of_product(factors: Array) -> NDArray[np.complex128]:
     """Eigenvalues (d,) of M[N - 1] ... M[0] for M (N, d, d), by falling modulus.
 
-    Each is accurate to about the round-off of the factors times its own condition, however small
-    beside the others. Below 1e-308 it becomes zero, above 1e308 infinite.
+    Each is accurate to about the round-off of the factors times its condition number, even if it
+    is much smaller than the others. Below 1e-308 it becomes zero, above 1e308 infinite.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Transitions of an orbit from one interval to the next."""
+"""Transition matrices of an orbit from one interval to the next."""
 
 import math
 
@@ -12,7 +12,7 @@ from fecontact.core.dense_lu import factorise, solve_rows
 
 @kernel(types.void(FACTORS, block))
 def transitions(factors, out):
-    """Fill out (N, d, d) with M_j, x_(j+1) = M_j x_j, of the condensed intervals."""
+    """Fill out (N, d, d) with the M_j of the condensed intervals, x_(j+1) = M_j x_j."""
     factors, out = borrowed(factors), borrowed(out)
     local = factors.local
     N, d, _ = out.shape
@@ -30,7 +30,7 @@ def transitions(factors, out):
 def condense_products(M):
     """Multiply neighbours of M (N, d, d) in place as long as no digits are lost.
 
-    A product is closed before the bound of its condition number passes 100. Returns the number of
+    A product ends before the bound of its condition number exceeds 100. Returns the number of
     products.
     """
     M = borrowed(M)

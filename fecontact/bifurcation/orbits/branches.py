@@ -1,4 +1,4 @@
-"""Branches of periodic orbits, from any start and by either method."""
+"""Branches of periodic orbits from any start, by collocation or shooting."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ from fecontact.integrate.trajectory import Trajectory
 
 # Factors of the first step, tried in this order to leave a special point.
 _FIRST_STEPS = (1.0, 0.2, 0.04)
-# Kinds of special points of orbits at which other orbits branch off.
+# Special points of orbits at which other orbits branch off.
 _BRANCHING = ("period doubling", "branch point")
 
 T = TypeVar("T")
@@ -40,14 +40,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Collocation:
-    """Orbits by orthogonal collocation at Gauss points: of any field, on an adaptive mesh.
+    """Orthogonal collocation at Gauss points on an adaptive mesh, for any vector field.
 
     Parameters
     ----------
     intervals : int
-        Intervals of the mesh, at least 2.
+        Number of mesh intervals, at least 2.
     degree : int
-        Degree of the polynomial on each, 2 to 7.
+        Degree of the polynomial on each interval, 2 to 7.
 
     Raises
     ------
@@ -64,21 +64,21 @@ class Collocation:
 
 @dataclass(frozen=True)
 class Shooting:
-    """Orbits by multiple shooting with the compiled integrator: of contact systems alone.
+    """Multiple shooting with the compiled integrator, for contact systems only.
 
-    For steep friction, impacts and many states, where collocation needs many intervals. Minimum
-    and maximum of the states are those of samples, and period doublings have no normal form.
+    Suited to steep friction, impacts and many states, where collocation needs many intervals.
+    Extremes of the states are taken from samples; no normal form of period doublings is computed.
 
     Parameters
     ----------
     segments : int
-        Pieces of the period, each run for itself: more of them for unstable orbits.
+        Number of segments of the period, integrated separately; use more for unstable orbits.
     rtol : float
         Relative tolerance of the runs.
     derivative_rtol : float, optional
-        That of their derivatives, as for :func:`fecontact.sensitivity`. With many fast modes that
-        the motion hardly excites, 1e-2 saves most of the time, and changes their small multipliers
-        alone; with impacts it spoils all of them.
+        Relative tolerance of the derivatives, as for :func:`fecontact.sensitivity`. With many
+        fast modes that the motion hardly excites, 1e-2 saves most of the time and affects only
+        their small multipliers; with impacts it makes all multipliers inaccurate.
 
     Raises
     ------
@@ -110,52 +110,53 @@ def orbit_branch(
     Parameters
     ----------
     field : VectorField
-        The system; of the branch from which a point is.
+        The system; for a point, the field of its branch.
     start : BranchPoint, PeriodicMotion, Trajectory or (times, states)
         Where to begin:
 
         - a 'Hopf' point of equilibria: the orbits that are born there,
         - a 'period doubling' of orbits: those of twice the period,
         - a 'branch point' of orbits: those that cross there,
-        - another point of a branch of orbits, also of one read from a file: goes on from there,
-        - a motion that has settled over one period at least, such as
-          :func:`fecontact.bifurcation.periodic_motion` finds; its end counts.
+        - any other point of a branch of orbits, also one read from a file: continues the branch,
+        - a settled motion over at least one period, such as the result of
+          :func:`fecontact.bifurcation.periodic_motion`; its last period is used.
     parameter : str, optional
-        The one that is varied; by default that of the point, or the only one of the field.
+        The continuation parameter; by default that of the point, or the only one of the field.
     method : Collocation or Shooting, optional
-        How orbits are found; by default as on the branch of the point, else by collocation. Beyond
-        a period doubling there are by default twice the intervals or segments.
+        Method of discretisation; by default that of the branch of the point, else collocation.
+        Doubled orbits have twice the intervals or segments by default.
     options : ContinuationOptions, optional
-        How the branch is followed.
+        Options of the continuation.
     bounds : (float, float), optional
         Range of the parameter, as in the options.
     scales : (d,) sequence, optional
-        Amplitudes of the states that count as one in the length of a step. By default they are
-        those of the branch of orbits from which the point is; else those of the motion, or at a
-        Hopf point of the field, growing with the orbits of collocation.
+        Scales of the states in the step length. By default those of the branch of the point, or
+        the amplitudes of the motion; at a Hopf point those of the field, which grow with the
+        orbits in collocation.
     width : float, optional
         Width of the diagram in the parameter; by default that of the branch of orbits, or of the
         bounds.
     direction : float
-        Sign of the first change of the parameter from a motion. From a point of a branch of orbits
-        1 goes on along the branch and -1 back; at a branch point they are the two halves.
+        Sign of the first change of the parameter from a motion. From a point of a branch of
+        orbits, 1 continues along the branch and -1 goes back; at a branch point they select the
+        two halves.
     both : bool
-        Go to both sides, from a motion or a regular point.
+        Follow the branch in both directions, from a motion or a regular point.
 
     Returns
     -------
     Branch
-        Stored of each orbit: 'period' [s], 'multipliers' (d,), 'unstable' (number of those
-        outside the unit circle), 'stable', 'trivial_error' (distance from one of the multiplier
-        that is one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
+        Values of each orbit: 'period' [s], 'multipliers' (d,), 'unstable' (number of multipliers
+        outside the unit circle), 'stable', 'trivial_error' (deviation of the trivial multiplier
+        from one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
 
         - 'fold': with ``parameter_error``, the change of its parameter on a finer mesh,
         - 'period doubling' and 'Neimark-Sacker': with ``coefficient``, ``coefficient_error``,
           ``criticality`` ('supercritical', 'subcritical' or 'undecided') and ``parameter_error``,
         - 'branch point': where two branches of orbits cross, with ``parameter_error``,
         - 'period halving': where doubled orbits become single again; there the branch ends,
-        - 'unresolved': where 'unstable' changes but no test function has a zero; or a point of
-          the kind ``instead_of`` that finer meshes do not have.
+        - 'unresolved': 'unstable' changes without a zero of a test function, or a point of the
+          kind ``instead_of`` is not confirmed on finer meshes.
 
     Raises
     ------
@@ -217,7 +218,7 @@ def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
 
 
 def _method_of(point: BranchPoint) -> Collocation | Shooting:
-    """The method by which an orbit was found."""
+    """Method by which an orbit was computed."""
     known = point.branch.attributes
     if point.by_shooting:
         return Shooting(int(known["segments"]), float(known.get("rtol", 1e-9)),
@@ -226,7 +227,7 @@ def _method_of(point: BranchPoint) -> Collocation | Shooting:
 
 
 def _keeps(point: BranchPoint, method: Collocation | Shooting | None) -> bool:
-    """Whether the unknowns of a point serve the method, but for the intervals of their mesh."""
+    """Whether the unknowns of a point suit the method, apart from the number of intervals."""
     found = _method_of(point)
     if isinstance(found, Collocation):
         return method is None or (isinstance(method, Collocation)
@@ -235,7 +236,7 @@ def _keeps(point: BranchPoint, method: Collocation | Shooting | None) -> bool:
 
 
 def _first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch:
-    """The branch from the first attempt that succeeds."""
+    """Branch of the first attempt that succeeds."""
     failed: FecontactError = InputError("There is nothing to start from.")
     for attempt in attempts:
         try:
@@ -322,7 +323,7 @@ def _goes_on(
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
     both: bool,
 ) -> Branch:
-    """The branch of orbits on from one of its points."""
+    """Continue a branch of orbits from one of its points."""
     sign = float(np.copysign(1.0, direction))
     if point.by_shooting:
         return shooting_branches.goes_on(

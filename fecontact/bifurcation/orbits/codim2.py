@@ -22,12 +22,12 @@ from fecontact.core.types import Array, ArrayLike
 
 _TEST_STEP = 1e-5  # step of the differences of the test function, in the inner product
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
-_CUSP_RATE = 1e-3  # both parameters change by less than this part of a step
+_CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
 
 
 @dataclass(frozen=True, eq=False)
 class OrbitCurve(Problem):
-    """Orbits with a test function at zero, two parameters free.
+    """Orbits on which a test function vanishes, with two free parameters.
 
     The test function is the product of mu + 1 over the multipliers at period doublings, of
     mu_i mu_k - 1 over pairs at torus bifurcations. At folds it is the component of the first
@@ -42,7 +42,7 @@ class OrbitCurve(Problem):
     kind : str
         'fold', 'period doubling' or 'Neimark-Sacker'.
     row : (n,) array
-        The tangent's direction is measured along it; for folds.
+        Border row that normalises the tangent, for folds.
     """
 
     orbit: CollocationProblem
@@ -85,14 +85,14 @@ class OrbitCurve(Problem):
                      / self.orbit.scales[-1])
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
-        """Both parameters, and what a branch of orbits stores."""
+        """Both parameters and the values stored on a branch of orbits."""
         names = list(self.orbit.field.parameters)
         assert self.orbit.second is not None
         return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Points of codimension two."""
+        """Test functions of points of codimension two."""
         if self.kind == "fold":
             along = self.rest(u)
             return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}
@@ -106,7 +106,7 @@ class OrbitCurve(Problem):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        """No data at points of codimension two. A fold is a cusp if both parameters turn."""
+        """Confirm a point of codimension two; a fold is a cusp if both parameters turn."""
         if kind != "fold":
             return {}
         both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
@@ -127,7 +127,7 @@ class CurveLinearised:
 
     @cached_property
     def _plane(self) -> tuple[Any, list[Array], list[float]]:
-        """Bordered equations of the orbit, the two directions they leave, the test along them."""
+        """Bordered equations of the orbit, their two null directions, the test along these."""
         weights = self.problem.weights()
         bordered = self.orbit.with_rows([])
         _, _, vectors = np.linalg.svd(_even(bordered.matrix))
@@ -174,13 +174,13 @@ def orbit_curve(
     field, point, second, scales
         As for :func:`fecontact.bifurcation.codim2_curve`.
     widths : mapping
-        Width of the diagram in each parameter by name; by default that of the branch in the first
-        parameter, and the size of the second one.
+        Width of the diagram in each parameter by name; by default that of the branch for the first
+        parameter and the magnitude of the second one.
 
     Raises
     ------
     InputError
-        If the point is none of a branch of orbits by collocation, or of another field.
+        If the point is not on a branch of orbits by collocation, or belongs to another field.
     """
     problem, u, _ = restored(field, point)
     problem = rescaled(problem, scales, widths.get(point.branch.parameter_name))
@@ -202,7 +202,7 @@ def _unit(size: int, place: int) -> Array:
 
 
 def _critical_mean(multipliers: NDArray[np.complex128]) -> float:
-    """Mean of the two multipliers whose product is nearest to one: the cosine of their angle."""
+    """Mean of the two multipliers with product nearest to one: the cosine of their angle."""
     first, second = np.triu_indices(len(multipliers), 1)
     nearest = np.argmin(np.abs(multipliers[first] * multipliers[second] - 1.0))
     return float((multipliers[first] + multipliers[second])[nearest].real / 2.0)

@@ -21,7 +21,7 @@ from fecontact.core.types import Array
 
 # Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
-# Largest relative difference of the amplitude of one orbit on two meshes.
+# Largest relative difference in amplitude of the same orbit on two meshes.
 _AMPLITUDE_CHANGE = 0.1
 
 
@@ -36,13 +36,14 @@ class CollocationProblem(Discretisation, Problem):
     renewal : int
         Steps from one mesh to the next, 0 for never.
     limits : (d,) array, optional
-        Up to these the scales of the states grow with the orbit; without limits they stay.
+        Upper limits up to which the scales of the states grow with the orbit; None keeps the
+        scales constant.
     precision : float
-        Part of a step to which special points are located. Above 1e-6 their normal forms are
-        left out.
+        Tolerance of the location of special points, relative to the step. Above 1e-6 normal forms
+        are omitted.
     before : tuple of (n,) arrays
-        u, the tangent and, after the first step, its derivative along the branch, from which the
-        last step went; empty before the first one.
+        u and tangent at the start of the last step and, after the first step, the derivative of
+        the tangent along the branch; empty before the first step.
     """
 
     age: int = 0
@@ -127,14 +128,14 @@ class CollocationProblem(Discretisation, Problem):
         guess = u + step * tangent
         if len(self.before) < 3:
             return guess
-        # The old tangent has another length on the new mesh and scales.
+        # The length of the old tangent changes with mesh and scales.
         length = step / weighted_norm(self.weights(), self.before[1])
         aside = 0.5 * length * length * self.before[2]
         straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
         return guess if straight else guess + aside
 
     def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
-        """The problem for the next step: phase condition at u, now and then a new mesh."""
+        """The problem for the next step: phase condition at u, periodically a new mesh."""
         bend = self._bend(u, tangent)
         vectors = [u, tangent] if bend is None else [u, tangent, bend]
         mesh, age = self.mesh, self.age + 1

@@ -1,7 +1,7 @@
-"""Compiled loops of collocation, over the intervals of a mesh and the Gauss points of each.
+"""Compiled loops of collocation over the intervals of a mesh and their Gauss points.
 
-Nodes are (N m, d), the last one of an interval being the first one of the next; basis values and
-slopes (m, m + 1).
+Nodes are (N m, d): the last node of an interval is the first one of the next. Basis values and
+slopes are (m, m + 1).
 """
 
 from numba import types
@@ -13,7 +13,7 @@ from fecontact.core.compiled import borrowed, f8, kernel, matrix, vector
 def fill_mesh(mesh, points, scales, widths, times, weights):
     """Fill widths (N,), times (N m,) of the Gauss points, and weights of the inner product.
 
-    scales are those of the states, the first d, and of the unknowns at the end of the weights.
+    The first d scales are those of the states, the others those of the last unknowns.
     """
     mesh, scales, widths = borrowed(mesh), borrowed(scales), borrowed(widths)
     times, weights, points = borrowed(times), borrowed(weights), borrowed(points)

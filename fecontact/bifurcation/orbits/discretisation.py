@@ -48,13 +48,13 @@ class Discretisation:
     reference : (N m, d) array
         Nodes of the orbit that fixes the phase.
     scales : (d + 2,) array
-        What counts as one in the length of a step: of each state (root mean square over the
-        orbit), of the period, of the parameter.
+        Scales in the step length: of each state (root mean square over the orbit), of the period
+        and of the parameter.
     periods : int
-        Periods of the forcing in one of the orbit.
+        Number of forcing periods in one period of the orbit.
     second : int, optional
-        Index of another free parameter, which stands before the first one in u; two equations
-        are missing then.
+        Index of a second free parameter, placed before the first one in u; two equations are then
+        missing.
     """
 
     field: VectorField
@@ -84,7 +84,7 @@ class Discretisation:
 
     @cached_property
     def common(self) -> int:
-        """Number of unknowns that all intervals share."""
+        """Number of unknowns common to all intervals."""
         return len(self.active) + self.autonomous
 
     @cached_property
@@ -158,7 +158,7 @@ class Discretisation:
         return self._on_mesh[2]
 
 
-_DIFFERENCE = 1e-5  # relative step in a parameter that moves the period of the forcing
+_DIFFERENCE = 1e-5  # relative parameter step for the derivative of the forcing period
 
 
 class CollocationLinearisation:
@@ -194,7 +194,7 @@ class CollocationLinearisation:
 
     @property
     def _times(self) -> Array:
-        """Times (N m,) [s] of the Gauss points; all zero where nothing depends on them."""
+        """Times (N m,) [s] of the Gauss points; all zero for autonomous systems."""
         if self.problem.autonomous:
             return np.zeros(len(self._x))
         return self.problem.times * self.period
@@ -209,7 +209,7 @@ class CollocationLinearisation:
         return f, J, P
 
     def _add_forcing(self, x: Array, values: Array, P: Array) -> None:
-        """Let P be the derivative of T f(T tau, x, p) / T where the parameter moves T."""
+        """Add the dependence of T on the parameter to P, the derivative of T f(T tau, x, p) / T."""
         problem, T = self.problem, self.period
         for place, index in enumerate(problem.active):
             h = _DIFFERENCE * max(abs(values[index]), 1e-3)

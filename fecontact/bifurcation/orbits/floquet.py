@@ -1,4 +1,4 @@
-"""Floquet multipliers of a periodic orbit, and what they say of its stability."""
+"""Floquet multipliers and stability of a periodic orbit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,11 +15,10 @@ from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.core.compiled import i8, kernel, vector
 from fecontact.core.errors import AnalysisError
 
-# Distances from the unit circle at which a multiplier may lie on either side of it, at least and at
-# the most.
+# Smallest and largest uncertainty of the distance of a multiplier from the unit circle.
 _ROUNDING, _WORST = 1e-8, 0.1
-_NEAR = 1e-2  # distance of a critical multiplier from the circle, at a point located coarsely
-# Error of the trivial multiplier from which on the mesh is too coarse for any.
+_NEAR = 1e-2  # distance of a critical multiplier from the circle at a coarsely located point
+# Error of the trivial multiplier above which the mesh is too coarse for any conclusion.
 _LOST = 0.5
 
 
@@ -27,15 +26,15 @@ _LOST = 0.5
 class Floquet:
     """Stability of an orbit.
 
-    A disturbance of the orbit grows by the factor mu in one period for each multiplier.
+    For each multiplier mu a perturbation of the orbit grows by the factor mu in one period.
 
     Attributes
     ----------
     multipliers : (d,) complex array
-        By falling modulus, the trivial one too.
+        All multipliers, including the trivial one, by falling modulus.
     trivial : int or None
-        Place of the multiplier that is one because the orbit may be shifted in time; None for
-        forced systems.
+        Index of the trivial multiplier, which is one because the orbit may be shifted in time;
+        None for forced systems.
     """
 
     multipliers: NDArray[np.complex128]
@@ -50,7 +49,7 @@ class Floquet:
 
     @property
     def trivial_error(self) -> float:
-        """Distance of the trivial multiplier from one: a measure of the orbit's accuracy."""
+        """Deviation of the trivial multiplier from one: a measure of the accuracy of the orbit."""
         if self.trivial is None:
             return 0.0
         return float(abs(self.multipliers[self.trivial] - 1.0))
@@ -63,10 +62,10 @@ class Floquet:
 
     @cached_property
     def unstable_range(self) -> tuple[int, int]:
-        """Least and largest number of multipliers outside the unit circle, within their error.
+        """Smallest and largest number of multipliers outside the unit circle, given their errors.
 
-        That of the trivial one is known. Next to a fold, where another one is close to it, both
-        are off by as much.
+        The error of the trivial multiplier is known. Next to a fold another multiplier is close
+        to it and has an error of the same size.
         """
         error = min(max(_ROUNDING, 2.0 * self.trivial_error), _WORST)
         sizes = [abs(multiplier) for place, multiplier in enumerate(self.multipliers.tolist())
@@ -75,16 +74,16 @@ class Floquet:
 
     @property
     def stable(self) -> bool:
-        """Whether all disturbances die away."""
+        """Whether all perturbations decay."""
         return self.unstable == 0
 
     def tests(self, slope: float) -> dict[str, float]:
         """Test functions of special points of a branch.
 
-        ``slope`` is that of the parameter along it, in widths of the diagram.
+        ``slope`` is the derivative of the parameter along the branch, in widths of the diagram.
         """
         doubling, unit, torus = self.products
-        # At a fold a multiplier passes one as well, but there the parameter turns.
+        # A multiplier also passes one at a fold, but there the parameter turns.
         return {"period doubling": doubling, "torus": torus,
                 "branch point": -unit if slope <= -FLAT else unit}
 
@@ -98,9 +97,9 @@ class Floquet:
         return float(out[0]), float(out[1]), float(out[2])
 
     def confirmed(self, kind: str) -> dict[str, Any] | None:
-        """What the multipliers say of a zero of a test function; None if it is no special point.
+        """Classify a zero of a test function by the multipliers; None if it is no special point.
 
-        A torus bifurcation gets its name, Neimark-Sacker, and the angle of the pair.
+        A torus bifurcation becomes 'Neimark-Sacker', with the angle of the pair.
         """
         mu = self.others
         if kind in ("period doubling", "torus") and self.trivial_error > _LOST:
@@ -119,14 +118,14 @@ class Floquet:
 def floquet_of(factors: CondensedFactors, autonomous: bool) -> Floquet:
     """Floquet multipliers from the condensed equations of a periodic orbit.
 
-    They are the eigenvalues of the product of the transitions over the intervals, found without
-    multiplying these (see :mod:`fecontact.bifurcation.linalg.periodic_schur`): small and large ones
-    side by side are accurate.
+    They are the eigenvalues of the product of the transition matrices of the intervals, computed
+    without forming it (see :mod:`fecontact.bifurcation.linalg.periodic_schur`), so that small and
+    large multipliers are equally accurate.
 
     Raises
     ------
     AnalysisError
-        If they cannot be found.
+        If the eigenvalues do not converge.
     """
     d = factors.end.shape[0]
     M = np.empty((len(factors.local), d, d))
@@ -142,7 +141,7 @@ def floquet_of(factors: CondensedFactors, autonomous: bool) -> Floquet:
 
 # Slope of the parameter along a branch, in widths of the diagram, below which its sign is rounding.
 FLAT = 1e-8
-# A multiplier is told from one where it is farther from it than so many errors of the trivial one.
+# A multiplier differs from one if its distance exceeds this multiple of the trivial error.
 _RESOLVED = 10.0
 
 _complex_vector = types.Array(types.complex128, 1, "C")
@@ -152,8 +151,8 @@ _complex_vector = types.Array(types.complex128, 1, "C")
 def multiplier_tests(mu, trivial, out):
     """Fill out (3,) with the products of mu + 1, mu - 1 and, over pairs, mu_i mu_k - 1, scaled.
 
-    Without the multiplier ``trivial``, if it is not negative. They change sign where a multiplier
-    passes -1, where one passes 1, and where a complex pair passes the unit circle.
+    The multiplier ``trivial`` is excluded unless it is negative. The products change sign where a
+    multiplier passes -1, where one passes 1, and where a complex pair crosses the unit circle.
     """
     minus, plus, pairs = 1.0 + 0.0j, 1.0 + 0.0j, 1.0 + 0.0j
     for i in range(len(mu)):
@@ -176,18 +175,18 @@ def unresolved(
     values: tuple[Mapping[str, Any], Mapping[str, Any]],
     tests: tuple[Mapping[str, float], Mapping[str, float]],
 ) -> set[str]:
-    """Kinds of special points that rounding alone shows between two orbits of a branch.
+    """Kinds of special points that may be due to round-off between two orbits of a branch.
 
     Towards a homoclinic orbit, on a canard and in a conservative family the parameter changes by
-    less than its rounding: turns of it are no folds, and turns of its sign in the test for branch
-    points no crossings. In a conservative family one multiplier more is one throughout.
+    less than round-off: its turns are no folds, and sign changes in the test for branch points no
+    crossings. In a conservative family a second multiplier equals one throughout.
 
     Parameters
     ----------
     slopes : pair of float
         Component of the tangents along the parameter, in widths of the diagram.
     values, tests : pairs of mappings
-        What is stored of the two orbits, and their test functions.
+        Stored values of the two orbits, and their test functions.
     """
     flat = [abs(slope) < FLAT for slope in slopes]
     found: set[str] = {"fold"} if all(flat) else set()
@@ -201,7 +200,7 @@ def unresolved(
 
 
 def _near_one(stored: Mapping[str, Any]) -> bool:
-    """Whether a multiplier besides the trivial one cannot be told from one."""
+    """Whether a second multiplier is indistinguishable from one."""
     off = np.sort(np.abs(np.asarray(stored["multipliers"]) - 1.0))
     error = max(float(stored["trivial_error"]), 1e-10)
     return len(off) > 1 and bool(off[1] <= _RESOLVED * error)

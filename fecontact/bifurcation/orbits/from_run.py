@@ -15,7 +15,7 @@ from fecontact.system.forcing_period import common_period
 
 _SAMPLES = 1000
 _TRANSIENT_PERIODS, _LARGEST = 200, 16
-# Largest relative difference of a motion from itself a period later.
+# Largest relative difference of the motion after one period.
 _MISFIT = 1e-2
 
 
@@ -32,22 +32,22 @@ def periodic_motion(
     initial : any
         Start; see :func:`fecontact.simulate`.
     transient : float, optional
-        Time before the motion counts [s]; 200 periods of the excitation by default.
+        Transient before the motion is examined [s]; 200 excitation periods by default.
     longest_period : float, optional
-        Time that the motion may take to repeat [s]; 16 periods of the excitation by default.
+        Longest period considered [s]; 16 excitation periods by default.
     rtol : float
         Relative tolerance.
 
     Returns
     -------
     PeriodicMotion
-        One period of the motion, or two and more where nothing excites it; a start for
+        One period of the motion, or at least two for a self-excited one; a start for
         :func:`fecontact.bifurcation.orbit_branch`.
 
     Raises
     ------
     InputError
-        If nothing excites the system and the times are not given.
+        If the system is not excited and the times are not given.
     AnalysisError
         If the motion does not repeat, or comes to rest.
     """
@@ -93,7 +93,7 @@ def _run(
     system: ContactSystem, initial: Initial, end: float, outputs: Array, rtol: float,
     begin: float = 0.0,
 ) -> Trajectory:
-    """A run with the outputs asked for, the start only if it is one of them."""
+    """Run with the requested outputs; the start is included only if requested."""
     extra = outputs[0] > begin
     times = np.append(begin, outputs) if extra else outputs
     times[-1] = end
@@ -109,9 +109,10 @@ def _run(
 
 
 def _period(run: Trajectory, longest: float) -> float:
-    """Period [s] from equal passages of the largest modal displacement through its middle.
+    """Period [s] from repeated mean crossings of the largest modal displacement.
 
-    Slip velocities hardly change during stick, so that states alone do not tell the time well.
+    Slip velocities hardly change during stick, so distances between states determine the period
+    poorly.
     """
     t, states = run.time, run.states
     # Displacements, velocities and internal variables, each by the largest of them.

@@ -1,7 +1,7 @@
-"""Piecewise polynomials of collocation: their values, slopes and monitor of error.
+"""Piecewise polynomials of collocation: values, slopes and error monitor.
 
-On each interval of the mesh the solution is a polynomial of degree m, given at m + 1 equally
-spaced nodes, the ends among them; it meets the equation at the m Gauss points.
+On each mesh interval the solution is a polynomial of degree m, given at m + 1 equally spaced nodes
+including the ends; it satisfies the equation at the m Gauss points.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Rule:
     top : (m + 1,) array
         Derivatives of order m of the basis polynomials.
     fine : (k, m + 1) array
-        The basis polynomials at many places in order.
+        The basis polynomials at many ascending points.
     """
 
     points: Array
@@ -60,7 +60,7 @@ def rule(degree: int) -> Rule:
 
 @helper
 def _scales_of_basis(m):
-    """What each basis polynomial is divided by to be one at its own node."""
+    """Normalisation of each basis polynomial to one at its own node."""
     scales = np.ones(m + 1)
     for k in range(m + 1):
         for other in range(m + 1):
@@ -71,7 +71,7 @@ def _scales_of_basis(m):
 
 @helper
 def _basis_at(mesh, t, j, scales, weights):
-    """Fill weights (m + 1,) of the nodes of the interval of t; its index, looked for from j on."""
+    """Fill node weights (m + 1,) at t; returns the index of its interval, searched from j on."""
     N, m = len(mesh) - 1, len(weights) - 1
     while j > 0 and t < mesh[j]:
         j -= 1
@@ -144,7 +144,7 @@ def _fill_other_mesh(mesh, renewed, given, weights, scales, out):
 def carry_over(mesh, renewed, m, given, out):
     """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
 
-    The e last entries of each, which are no nodes, are copied.
+    The last e entries, which are not nodes, are copied.
     """
     _fill_other_mesh(mesh, renewed, given, np.empty(m + 1), _scales_of_basis(m), out)
 
@@ -158,7 +158,7 @@ def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
 
 @kernel(types.void(matrix, matrix, vector, vector))
 def _extremes(nodes, fine, low, high):
-    """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k places."""
+    """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k points."""
     nodes, fine = borrowed(nodes), borrowed(fine)
     total, d = nodes.shape
     m = fine.shape[1] - 1
@@ -170,7 +170,7 @@ def _extremes(nodes, fine, low, high):
             high[i] = max(high[i], nodes[node, i])
     values = np.empty(len(fine))
     for i in range(d):
-        # The top of a polynomial lies near the highest of its nodes: only those intervals count.
+        # The maximum lies near the highest node: search only adjacent intervals.
         margin = 0.002 * (high[i] - low[i])
         top, bottom = high[i], low[i]
         for j in range(total // m):
@@ -248,7 +248,7 @@ def _equidistribute(mesh, nodes, top, renewed):
     _monitor(mesh, nodes, top, share)
     total = share.sum()
     uniform = not 0.0 < total < np.inf
-    # A part is spread evenly over time: no interval gets longer than ten times the mean.
+    # Add a uniform share, which limits intervals to ten times the mean.
     before, after, j = 0.0, 0.0, -1
     for row in range(1, intervals):
         goal = 1.1 * row / intervals
@@ -264,11 +264,11 @@ def _equidistribute(mesh, nodes, top, renewed):
 
 
 def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> Array:
-    """A mesh on which each interval has the same share of the error of interpolation.
+    """Mesh that equidistributes the interpolation error (de Boor).
 
-    The error on an interval of width h is h^(m+1) |x^(m+1)|; its root of order m + 1 is spread
-    evenly (de Boor). The derivative of order m + 1 comes from the jumps of that of order m.
-    Each state counts by its own range over the orbit.
+    The error on an interval of width h is h^(m+1) |x^(m+1)|; its root of order m + 1 is
+    equidistributed. The derivative of order m + 1 follows from the jumps of that of order m. Each
+    state is scaled by its range over the orbit.
     """
     result = np.empty(intervals + 1)
     _equidistribute(mesh, nodes, rule(degree).top, result)

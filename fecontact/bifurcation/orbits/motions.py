@@ -1,4 +1,4 @@
-"""Sampled periodic motions, of runs and of the orbits of branches."""
+"""Sampled periodic motions, from runs and from orbits of branches."""
 
 from dataclasses import dataclass
 
@@ -11,30 +11,30 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.simulate import simulate
 from fecontact.system.contact_system import ContactSystem
 
-# Relative tolerance of the runs that give an orbit by shooting.
+# Relative tolerance of the runs that sample an orbit by shooting.
 _RTOL = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicMotion:
-    """A motion that repeats, over one period at least: a start for branches of orbits.
+    """A periodic motion over at least one period: a start for branches of orbits.
 
     Parameters
     ----------
     times, states : (k,) and (k, d) sequences
-        Samples [s] of the states; of contact systems y = [q, q', z]. The end counts.
+        Times [s] and states, y = [q, q', z] for contact systems. The last period is used.
     period : float, optional
-        Of the motion [s]. Without it the time since the last return to where the motion ends, and
-        for excited systems ``periods`` periods of the excitation.
+        Period of the motion [s]. By default ``periods`` periods of the excitation, or for systems
+        without excitation the time since the motion last passed its end point.
     periods : int
-        Periods of the excitation in one of the motion; 1 where nothing excites it.
+        Number of excitation periods in one period of the motion; 1 without excitation.
     parameter_values : (k,) sequence, optional
-        Values of the field's parameters to which the motion belongs; by default its base values.
+        Parameter values of the field for this motion; by default its base values.
 
     Raises
     ------
     InputError
-        If these are no numbers, or the period is not positive.
+        If values are not numbers, or the period is not positive.
     """
 
     times: Array
@@ -59,7 +59,7 @@ class PeriodicMotion:
 
     @property
     def amplitudes(self) -> Array:
-        """Half the range (d,) of each state, those of small ones not below 1e-3 of the largest."""
+        """Half the range (d,) of each state, at least 1e-3 of the largest."""
         found = np.ptp(self.states, axis=0) / 2.0
         return np.asarray(np.maximum(found, 1e-3 * found.max()))
 
@@ -70,9 +70,9 @@ def nodes_on_mesh(u: Array, mesh: Array, states: int) -> tuple[Array, int]:
     Raises
     ------
     InputError
-        If the orbit was found by shooting.
+        If the orbit was computed by shooting.
     """
-    # The nodes are followed by the period, of autonomous systems, and the parameter.
+    # After the nodes come the period (autonomous systems only) and the parameter.
     intervals = len(mesh) - 1
     degree = (len(u) - 1) // (intervals * states)
     if degree < 2:
@@ -82,7 +82,7 @@ def nodes_on_mesh(u: Array, mesh: Array, states: int) -> tuple[Array, int]:
 
 
 def collocated(u: Array, mesh: Array, states: int, period: float, samples: int) -> PeriodicMotion:
-    """An orbit by collocation over one period, both ends included."""
+    """Sample an orbit by collocation over one period, both ends included."""
     nodes, _ = nodes_on_mesh(u, mesh, states)
     phases = np.linspace(0.0, 1.0, samples)
     return PeriodicMotion(phases * period, interpolate(mesh, nodes, phases), period)
@@ -91,8 +91,9 @@ def collocated(u: Array, mesh: Array, states: int, period: float, samples: int) 
 def run_again(
     system: ContactSystem, u: Array, mesh: Array, period: float, samples: int
 ) -> PeriodicMotion:
-    """An orbit by shooting over one period, each segment run from its start; at least so many
-    samples, both ends included.
+    """Sample an orbit by shooting over one period by running each segment from its start.
+
+    Gives at least the requested number of samples, both ends included.
     """
     count = len(mesh) - 1
     starts, ends = u[: count * system.size].reshape(count, -1), mesh * period

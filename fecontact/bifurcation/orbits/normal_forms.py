@@ -25,10 +25,10 @@ from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 
 Array = NDArray[Any]
 
-# Steps of the differences, in ranges of the states over the orbit; the first two that agree serve.
+# Steps of the differences, in ranges of the states over the orbit; the first two that agree count.
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
 _AGREEMENT = 0.02
-# Largest relative error of a coefficient at which its sign decides.
+# Largest relative error of a coefficient whose sign is trusted.
 _DECIDED = 0.25
 
 
@@ -36,11 +36,11 @@ def examined(
     kind: str, problem: Discretisation, u: Array, linearised: CollocationLinearisation,
     details: bool = True
 ) -> dict[str, Any] | None:
-    """Details of a special point of a branch of orbits; None if it is none.
+    """Details of a special point of a branch of orbits; None if it is not one.
 
-    'coefficient' is c or Re D for eigenfunctions of mean square one in the scaled states,
-    'coefficient_error' by how much differences over two steps differ, 'criticality' the meaning of
-    both, see :func:`verdict`. Without ``details`` these are left out.
+    'coefficient' is c or Re D for eigenfunctions of unit mean square in the scaled states,
+    'coefficient_error' the change between two difference steps, 'criticality' their conclusion,
+    see :func:`verdict`. Without ``details`` these are omitted.
     """
     found = linearised.floquet.confirmed(kind)
     if found is None or not details:
@@ -56,7 +56,7 @@ def examined(
 def verdict(coefficient: float, error: float) -> dict[str, Any]:
     """A coefficient, its error, and 'supercritical', 'subcritical' or 'undecided'.
 
-    Undecided are those whose error is above a quarter of themselves, or unknown (NaN).
+    It is undecided if the error exceeds a quarter of the coefficient or is unknown (NaN).
     """
     criticality = "undecided"
     if error <= _DECIDED * abs(coefficient) and coefficient != 0.0:
@@ -139,7 +139,7 @@ class Expansion:
         return V / np.sqrt(np.sum(weights * np.abs(V / self._scales) ** 2))
 
     def _response(self, bend: Array) -> tuple[Array, float]:
-        """Periodic h with h' - A h = bend - a x' at the points, and a: how the phase is sped up."""
+        """Periodic h with h' - A h = bend - a x' at the points, and the phase acceleration a."""
         system, rows = self._periodic
         found = system.solve(np.append((self._h * bend).reshape(-1), np.zeros(rows)))
         h = self._at_points(found[: self._x.size], self._x.shape[1], 1.0)
@@ -147,7 +147,7 @@ class Expansion:
 
     @cached_property
     def _periodic(self) -> tuple[Bordered, int]:
-        """Equations of h' - A h + a x' with their phase, and how many rows fix that."""
+        """Equations of h' - A h + a x' with their phase condition, and its number of rows."""
         motion = self._motion[:, :, None] if self._problem.autonomous else np.zeros(
             (*self._x.shape, 0))
         rows = [np.append(self._problem.phase_row, 0.0)] if self._problem.autonomous else []
@@ -161,7 +161,7 @@ class Expansion:
         return _joined(self._at_points(found, turned.shape[1], 1.0))
 
     def _share(self, A: Array, columns: Array, kernel: Array, g: Array, closing: float) -> Array:
-        """Coefficients c with which w' - A w = g - columns c has a solution.
+        """Coefficients c for which w' - A w = g - columns c is solvable.
 
         The equations without the columns have the solution ``kernel``.
         """
@@ -180,7 +180,7 @@ class Expansion:
         return system.solve(side)[len(A) * D :]
 
     def _bordered(self, A: Array, columns: Array, rows: list[Array], closing: float) -> Bordered:
-        """Equations of w' - A w + columns c, with further rows and w(1) = closing w(0)."""
+        """Equations of w' - A w + columns c, with border rows and w(1) = closing w(0)."""
         problem = self._problem
         N, m, (_, D, q) = problem.intervals, problem.degree, columns.shape
         factors = factors_for(N, m, D, q)

@@ -20,12 +20,12 @@ P = TypeVar("P", CollocationProblem, ShootingProblem)
 def restored(
     field: VectorField, point: BranchPoint
 ) -> tuple[CollocationProblem, Array, Array]:
-    """Problem, unknowns and tangent of an orbit by collocation, to go on from.
+    """Problem, unknowns and tangent of an orbit by collocation, to continue from.
 
     Raises
     ------
     InputError
-        If the point is no such orbit, or one of another field.
+        If the point is not such an orbit, or belongs to another field.
     """
     known = point.branch.attributes
     if "degree" not in known or "mesh" not in point.values:
@@ -46,8 +46,8 @@ def restored_shooting(
     Raises
     ------
     InputError
-        If the point is no such orbit, or one of another field, or the field is not one of a
-        contact system.
+        If the point is not such an orbit or belongs to another field, or the field is not that of
+        a contact system.
     """
     known = point.branch.attributes
     if "segments" not in known or "mesh" not in point.values:

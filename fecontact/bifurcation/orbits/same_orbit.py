@@ -1,7 +1,7 @@
-"""Comparison of orbits that differ by a shift of time.
+"""Comparison of orbits up to a shift in time.
 
 A closed branch returns to its first orbit on another mesh and in another phase. A branch of doubled
-orbits may return to single ones; beyond, it repeats the same orbits with their halves exchanged.
+orbits may return to single orbits; beyond, it repeats the same orbits with their halves exchanged.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from fecontact.core.types import Array
 
 # Samples of an orbit for the first estimate of the shift.
 _SAMPLES = 512
-# Largest relative difference of the halves where they meet, and least part of the tangent that
+# Largest relative difference of halves that coincide, and smallest fraction of the tangent that
 # separates them.
 _HALVES_MEET, _HALVES_PART = 0.02, 0.9
 
@@ -22,12 +22,12 @@ HALVING = "period halving"
 
 
 def same_heading(weights: Array, one: Array, other: Array, common: int) -> bool:
-    """Whether period and parameter, which no shift changes, change alike along two directions."""
+    """Whether two directions agree in period and parameter, which are independent of the phase."""
     return float(weights[-common:] * one[-common:] @ other[-common:]) > 0.0
 
 
 def in_phase(problem: Discretisation, u: Array, like: Array) -> Array:
-    """An orbit on the mesh of the problem, shifted in time to be next to another one."""
+    """An orbit on the mesh of the problem, shifted in time to match another one."""
     mesh, d = problem.mesh, problem.field.dimension
     nodes, times = problem.nodes(u).copy(), node_times(mesh, problem.degree)
 
@@ -65,7 +65,7 @@ def _shift(
 
 
 def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
-    """Whether an orbit is a single one traversed twice, and the branch separates its halves."""
+    """Whether an orbit is a single orbit traversed twice whose halves separate along the branch."""
     times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
     nodes, along = problem.nodes(u).copy(), problem.nodes(tangent).copy()
     weights = problem.weights()[: problem.size].reshape(nodes.shape)

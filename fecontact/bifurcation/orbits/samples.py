@@ -40,7 +40,7 @@ def quantity_range(point: BranchPoint, row: ArrayLike) -> tuple[float, float]:
 
 
 def amplitude(row: ArrayLike) -> Callable[[BranchPoint], float]:
-    """A function of a branch's points: (max - min) / 2 of ``row @ x``; zero at equilibria."""
+    """Function of a branch point: (max - min) / 2 of ``row @ x``; zero at equilibria."""
     def of(point: BranchPoint) -> float:
         low, high = quantity_range(point, row)
         return (high - low) / 2.0
@@ -60,12 +60,12 @@ _SAMPLES = 4000
 def observe(
     field: ContactField, branch: Branch, point: str | int = "B", component: Literal["x", "y"] = "x"
 ) -> Branch:
-    """The branch with the range of a displacement at each of its points.
+    """Add the range of a displacement to each point of a branch.
 
-    Stored are the numbers 'observed_minimum', 'observed_maximum' and 'observed_amplitude', half of
-    what lies between the two [m], of an equilibrium or over one period; for orbits of excited
-    systems also 'observed_section' (n,), its values at the starts of the n periods of the
-    excitation, as :func:`fecontact.bifurcation.poincare_scan` keeps them.
+    Adds 'observed_minimum', 'observed_maximum' and 'observed_amplitude' (half the range) [m], at
+    an equilibrium or over one period. Orbits of excited systems also get 'observed_section' (n,),
+    the values at the starts of the n excitation periods, as in
+    :func:`fecontact.bifurcation.poincare_scan`.
 
     Parameters
     ----------

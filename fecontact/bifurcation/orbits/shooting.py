@@ -28,7 +28,7 @@ from fecontact.system.contact_system import ContactSystem
 _SAMPLES = 33
 # Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
-# Phase since the start of a segment below which its start is used without a run.
+# Phase after the start of a segment below which the start itself is used.
 _AT_START = 1e-10
 
 
@@ -36,16 +36,17 @@ _AT_START = 1e-10
 class ShootingProblem(Problem):
     """Equations of a periodic orbit of a contact system, one parameter free.
 
-    The period is cut into K segments; the run from the start x_j of each ends at the start of the
-    next. The integrator chooses its own steps, so that steep friction (k_s = 1e6 s/m) and many
-    states cost no more than in a run; collocation needs a mesh that resolves them. If nothing
-    depends on time, the period T is an unknown, and the phase is fixed by <f(y_0), x_0 - y_0> = 0
-    with the start y_0 of the orbit before; else T is ``periods`` times the period of the forcing.
+    The period is divided into K segments; the run from the start x_j of each ends at the start of
+    the next. The integrator chooses its own steps, so that steep friction (k_s = 1e6 s/m) and many
+    states cost no more than in a run, while collocation needs a mesh that resolves them. For
+    autonomous systems the period T is an unknown, and the phase is fixed by
+    <f(y_0), x_0 - y_0> = 0 with the start y_0 of the previous orbit; else T is ``periods`` times
+    the period of the forcing.
 
-    The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. What is stored,
-    and the tests for special points, are those of
+    The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. Stored values
+    and tests for special points are those of
     :class:`fecontact.bifurcation.orbits.collocation.CollocationProblem`; minimum and maximum are
-    those of samples.
+    taken from samples.
 
     Attributes
     ----------
@@ -59,18 +60,18 @@ class ShootingProblem(Problem):
     reference : (d,) array
         Start of the orbit that fixes the phase.
     scales : (d + 2,) array
-        What counts as one in the length of a step: of each state, the period, the parameter.
+        Scales in the step length: of each state, the period and the parameter.
     periods : int
-        Periods of the forcing in one of the orbit.
+        Number of forcing periods in one period of the orbit.
     rtol : float
         Relative tolerance of the runs.
     derivative_rtol : float or None
-        That of their derivatives; see :func:`fecontact.sensitivity`.
+        Relative tolerance of the derivatives; see :func:`fecontact.sensitivity`.
     precision : float
-        Part of a step to which special points are located on it. Beyond this, runs whose steps
-        differ decide, and each further trial costs a run with derivatives.
+        Tolerance of the location of special points, relative to the step. Below it, differences
+        between the steps of the runs dominate, and each trial costs a run with derivatives.
     before, bend
-        The orbit before with the tangent there, and the tangent's derivative along the branch.
+        The previous orbit with its tangent, and the derivative of the tangent along the branch.
     """
 
     field: ContactField
@@ -96,7 +97,7 @@ class ShootingProblem(Problem):
 
     @property
     def common(self) -> int:
-        """Number of unknowns that all segments share."""
+        """Number of unknowns common to all segments."""
         return 2 if self.autonomous else 1
 
     def starts(self, u: Array) -> Array:
@@ -227,7 +228,7 @@ class ShootingProblem(Problem):
 
 
 def require_segments(segments: int) -> None:
-    """Raise :class:`InputError` unless the period can be cut into so many segments."""
+    """Raise :class:`InputError` for an invalid number of segments."""
     if not (isinstance(segments, int | np.integer) and segments >= 1):
         raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
 
@@ -269,13 +270,13 @@ def run_from(system: ContactSystem, times: Array, starts: Array, rtol: float) ->
 def started_in_phase(problem: ShootingProblem, u: Array, like: Array) -> Array:
     """An orbit by shooting, shifted in time to lie next to another one.
 
-    Where the phase is free it starts on the plane of the phase condition, else a whole number of
-    periods of the forcing later.
+    If the phase is free, it starts on the plane of the phase condition, else an integer number of
+    forcing periods later.
 
     Raises
     ------
     AnalysisError
-        If a run of it fails.
+        If a run fails.
     """
     from scipy.optimize import brentq
 
@@ -358,7 +359,7 @@ class ShootingLinearisation:
 
     @cached_property
     def residual(self) -> Array:
-        """Gaps (K d,) between the segments, and the phase condition if the period is unknown."""
+        """Defects (K d,) between the segments, and the phase condition if the period is unknown."""
         problem = self.problem
         starts = problem.starts(self.u)
         gaps = (self._ends - np.roll(starts, -1, axis=0)).reshape(-1)
@@ -387,7 +388,7 @@ class ShootingLinearisation:
         return factors
 
     def _period_slope(self, values: Array) -> float:
-        """Rate dT/dp of the period of the forcing with the free parameter."""
+        """Derivative dT/dp of the forcing period with respect to the free parameter."""
         problem, h = self.problem, 1e-4 * (abs(float(self.u[-1])) or 1.0)
         above, below = values.copy(), values.copy()
         above[problem.free] += h
@@ -396,7 +397,7 @@ class ShootingLinearisation:
         return problem.periods * (periods[0] - periods[1]) / (2.0 * h)
 
     def _shifted(self, j: int, run: Sensitivity, values: Array) -> Array:
-        """Derivative (d,) of the end of segment j to the period, which moves both its times."""
+        """Derivative (d,) of the end of segment j with respect to the period."""
         problem, rates = self.problem, self.problem.field.rates
         before, after = (rates(self._times[k : k + 1], state[None].copy(), values)[0]
                          for k, state in ((j, run.states[0]), (j + 1, run.states[-1])))

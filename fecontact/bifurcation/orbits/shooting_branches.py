@@ -51,7 +51,7 @@ def born(
     start: Start, segments: int, rtol: float, derivative_rtol: float | None,
     options: ContinuationOptions
 ) -> Branch:
-    """The branch from a start at a Hopf point; for orbits that come to stick on steep friction."""
+    """Branch from a start at a Hopf point, for orbits that reach stick on steep friction."""
     found, u, leaving = start
     problem, first = shooting_from(found, u, segments, rtol, derivative_rtol)
     shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
@@ -66,10 +66,10 @@ def from_motion(
     rtol: float, derivative_rtol: float | None, options: ContinuationOptions, widths: Array,
     direction: float, both: bool,
 ) -> Branch:
-    """The branch through the orbit to which a motion of a contact system has settled.
+    """Branch through the orbit to which a motion of a contact system has settled.
 
-    Orbits whose period is unknown begin where the motion is fastest, if it is at least two periods
-    long. ``widths`` (d + 1,) are the scales of states and parameter.
+    Orbits of unknown period start where the motion is fastest, if it covers at least two periods.
+    ``widths`` (d + 1,) are the scales of states and parameter.
 
     Raises
     ------
@@ -99,10 +99,10 @@ def from_motion(
 def _to_fastest(
     times: Array, states: Array, sizes: Array, period: float, modes: int
 ) -> tuple[Array, Array]:
-    """The motion up to where it was fastest, within a period before its end.
+    """Truncate the motion at its fastest point within the last period.
 
-    There the phase is fixed best; beside transitions of stick and slip an orbit that is guessed
-    is far off.
+    The phase is best defined there. Next to a transition between stick and slip the first guess
+    would be far from the orbit.
     """
     last = np.flatnonzero(times > times[-1] - period)
     if len(last) == 0 or times[last[0]] - times[0] < period:
@@ -116,7 +116,7 @@ def goes_on(
     field: VectorField, point: BranchPoint, rtol: float | None, options: ContinuationOptions,
     scales: ArrayLike | None, width: float | None, sign: float, both: bool,
 ) -> Branch:
-    """The branch on from one of its points, or back where ``sign`` is -1."""
+    """Continue a branch from one of its points, or backwards if ``sign`` is -1."""
     problem, u, tangent = restored_shooting(field, point)
     problem = rescaled(problem, scales, width)
     if rtol is not None:
@@ -132,16 +132,16 @@ def doubled(
 ) -> Branch:
     """The branch of orbits of twice the period that begins at a period doubling.
 
-    They leave along the eigenvector of the multiplier -1, carried along the orbit; the second
-    round takes it with the other sign. Where the two rounds become the same again, at another
-    doubling of the single orbit, the branch ends with a point 'period halving': beyond it are the
-    same orbits with their halves exchanged. ``how`` is segments, rtol and derivative_rtol, by
-    default those of the branch with twice the segments.
+    They leave along the eigenvector of the multiplier -1, transported along the orbit, with
+    opposite sign in the second round. Where both rounds coincide again, at another doubling of the
+    single orbit, the branch ends with a point 'period halving': beyond it lie the same orbits with
+    their halves exchanged. ``how`` is segments, rtol and derivative_rtol, by default those of the
+    branch with twice the segments.
 
     Raises
     ------
     InputError
-        If the point is no period doubling, or the segments are others.
+        If the point is not a period doubling, or the number of segments differs.
     """
     if point.kind != "period doubling":
         raise InputError(f"{point.place} was found by shooting, by which other orbits begin at "
@@ -172,7 +172,7 @@ def _halves(u: Array, common: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Doubled(ShootingProblem):
-    """Doubled orbits, with a test function for their return to single ones.
+    """Doubled orbits with a test function for their return to single orbits.
 
     ``apart`` (K d / 2,) is the difference of the halves of the last orbit, ``largest`` the largest
     length of such a difference so far.
@@ -182,7 +182,7 @@ class _Doubled(ShootingProblem):
     largest: float = 0.0
 
     def length(self, apart: Array) -> float:
-        """Length of a difference of the halves."""
+        """Norm of a difference of the halves."""
         return float(np.sqrt(self.weights()[: len(apart)] @ apart**2))
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[_Doubled, Array, Array]":
@@ -204,9 +204,9 @@ class _Doubled(ShootingProblem):
 
 
 def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions) -> Branch:
-    """The branch with its end on single orbits, if it returns to them.
+    """Complete a branch that returns to single orbits by its end point.
 
-    Points beyond that end, where one step passed it, are single orbits and are dropped.
+    Points beyond it, reached within one step, are single orbits and are dropped.
     """
     common = single.common
     weights = single.weights()[:-common]
@@ -241,7 +241,7 @@ def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions
 def _doublings_near(
     single: ShootingProblem, u: Array, options: ContinuationOptions, off: float, name: str
 ) -> tuple[BranchPoint, ...]:
-    """Period doublings of the single orbits near u, within about ``off`` in the parameter."""
+    """Period doublings of single orbits near u, within about ``off`` in the parameter."""
     step = max(4.0 * off / float(single.scales[-1]), options.step)
     low, high = options.bounds
     beside = replace(options, step=step, largest_step=step, points=4, stop_at=(),

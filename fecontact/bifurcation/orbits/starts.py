@@ -41,11 +41,11 @@ def from_hopf(
     angular_frequency, vector
         w and the complex eigenvector (d,) of the pair on the imaginary axis.
     intervals, degree : int
-        Collocation at ``degree`` points on each of so many intervals.
+        Number of intervals and of collocation points on each.
     scales : (d + 1,) array
-        What counts as one in the length of a step: for the states and the parameter.
+        Scales of the states and the parameter in the step length.
     amplitude : float
-        That of the first guess, in the problem's inner product.
+        Amplitude of the first guess, in the inner product of the problem.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def from_hopf(
     leaving /= np.sqrt(problem.weights() @ leaving**2)
     u = np.concatenate([np.tile(np.asarray(state, dtype=float), len(shape)),
                         [period, values[free]]])
-    # At the Hopf point itself period and parameter do not affect the orbit: the system is singular.
+    # At the Hopf point itself the system is singular: period and parameter do not affect the orbit.
     return problem, u + amplitude * leaving, leaving
 
 
@@ -91,10 +91,10 @@ def from_samples(
     Parameters
     ----------
     times, states : (k,) and (k, d) array
-        Samples over at least one period; the last period counts.
+        Samples over at least one period; the last period is used.
     period : float or None
-        Period of the motion [s]; None is the last return to where the motion ends. Forced
-        systems take ``periods`` times the period of the forcing.
+        Period of the motion [s]; None for the time since the motion last passed its end point.
+        Forced systems take ``periods`` times the period of the forcing.
 
     field, values, free, intervals, degree, periods, scales
         See :func:`from_hopf`.
@@ -102,7 +102,7 @@ def from_samples(
     Raises
     ------
     InputError
-        If the samples do not cover a period, or show none.
+        If the samples do not cover a period, or are not periodic.
     """
     require_mesh(intervals, degree)
     t, x = np.asarray(times, dtype=float), np.asarray(states, dtype=float)
@@ -164,7 +164,7 @@ def corrected(
     Raises
     ------
     AnalysisError
-        If Newton's method does not converge, or falls onto an equilibrium.
+        If Newton's method does not converge, or converges to an equilibrium.
     """
     for fresh in (False, True):
         if fresh:
@@ -257,8 +257,8 @@ def on_intervals(start: Start, intervals: int | None) -> Start:
 def crossing(problem: CollocationProblem, u: Array, incoming: Array) -> Start:
     """Start on the other branch of orbits through a branch point u.
 
-    ``incoming`` is the direction of the first branch nearby: at the point itself the equations
-    have two directions, and do not tell which is which.
+    ``incoming`` is the direction of the first branch nearby; at the point itself the equations
+    cannot distinguish the two directions.
     """
     row = problem.weights() * incoming
     bordered = problem.linearise(u).bordered(row)

@@ -9,7 +9,7 @@ from fecontact.cli.console import echo, show
 
 
 def doctor() -> int:
-    """Check that all libraries are there and work; echo what to install."""
+    """Check that all libraries are installed and work; print how to install missing ones."""
     from fecontact.cli.console import waiting
     from fecontact.cli.doctor import examine
     from fecontact.cli.tables import table
@@ -30,7 +30,7 @@ def doctor() -> int:
 
 def laws(
     name: Annotated[str | None, Parameter(help=(
-        "A law, for its formula and parameters; one of your own, FILE.py:CLASS, is checked too."))]
+        "A law to explain; your own law, FILE.py:CLASS, is also checked."))]
     = None,
     /,
 ) -> None:
@@ -46,7 +46,7 @@ def laws(
 
 
 def keys(
-    section: Annotated[str | None, Parameter(help="A section, like ground.profile.")] = None, /,
+    section: Annotated[str | None, Parameter(help="A section, such as ground.profile.")] = None, /,
 ) -> None:
     """Print the sections and keys of study files: types, defaults, units and meaning."""
     from fecontact.cli.console import loading
@@ -57,9 +57,9 @@ def keys(
 
 
 def demo(
-    folder: Annotated[Path, Parameter(help="Where the results go.")] = Path("demo-output"), /,
+    folder: Annotated[Path, Parameter(help="Folder of the results.")] = Path("demo-output"), /,
 ) -> int:
-    """Make two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
+    """Run two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
     from fecontact.cli.demo import run_demo
 
     return run_demo(folder)

@@ -16,21 +16,22 @@ if TYPE_CHECKING:
 def branch(
     study: StudyFile,
     parameter: Annotated[str | None, Parameter(
-        help="Dotted name of a number, `ground.speed`, in place of that of `[branch]`.")] = None,
+        help="Continuation parameter, such as `ground.speed`; overrides `[branch]`.")] = None,
     /,
     *,
     bounds: Annotated[tuple[float, float] | None, Parameter(
-        help="Least and largest value of the parameter, in place of those of `[branch]`.")] = None,
+        help="Lower and upper bound of the parameter; overrides `[branch]`.")] = None,
     start: Annotated[float | None, Parameter(
-        help="Value at which it begins; the least by default.")] = None,
+        help="Starting value; the lower bound by default.")] = None,
     set_: Changes = None,
     output: Folder = None,
 ) -> int:
     """Follow steady sliding or periodic orbits over a parameter: folds, Hopf points, doublings.
 
-    The section [branch] of the study says what; without it, steady sliding. Writes all branches
-    (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, frequencies and growth rates of the
-    modes in steady sliding. Ctrl-C stops it; what was computed until then is written.
+    The section [branch] of the study selects the solutions; without it, steady sliding is
+    followed. Writes all branches (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, and
+    frequencies and growth rates of the modes in steady sliding. Ctrl-C stops it; the points
+    computed so far are written.
     """
     from fecontact.cli.console import INTERRUPTED, waiting
     from fecontact.cli.run_files import read_study
@@ -74,7 +75,7 @@ def _wanted(
     given: "BranchSettings", parameter: str | None, bounds: tuple[float, float] | None,
     start: float | None,
 ) -> "BranchSettings":
-    """The section with what the command line says in its place."""
+    """The section [branch] with the options of the command line."""
     changed = given if parameter is None else replace(given, parameter=parameter)
     if bounds is not None:
         changed = replace(changed, bounds=bounds, start=None)

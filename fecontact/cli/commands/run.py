@@ -16,19 +16,19 @@ def render(
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"],
         help="NAME.mp4 for a movie; NAME.png or a folder for numbered pictures.")] = None,
-    frames: Annotated[int | None, Parameter(help="Number of pictures.")] = None,
-    fps: Annotated[float | None, Parameter(help="Pictures a second.")] = None,
+    frames: Annotated[int | None, Parameter(help="Number of frames.")] = None,
+    fps: Annotated[float | None, Parameter(help="Frames per second.")] = None,
     size: Annotated[tuple[int, int] | None, Parameter(
-        help="Width and height in pixels, even.")] = None,
+        help="Width and height in pixels, even numbers.")] = None,
     colour: Annotated[Literal["displacement", "von_mises"] | None, Parameter(
         help="Quantity that colours the body.")] = None,
     scale: Annotated[float | None, Parameter(
-        help="Factor by which displacements are drawn larger.")] = None,
-    t_start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
-    t_end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
+        help="Magnification of displacements.")] = None,
+    t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
+    t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
     trust: Trust = False,
 ) -> None:
-    """Draw a run as a movie or as numbered pictures; [render] of the study holds the defaults."""
+    """Render a run as a movie or as numbered pictures; defaults come from [render] of the study."""
     from dataclasses import replace
 
     from fecontact.cli.run_files import movie, stored_run
@@ -61,17 +61,17 @@ def plot(
         help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
         "takes several.")] = None,
     component: Annotated[Literal["x", "y", "phi"] | None, Parameter(
-        help="Of the motion; that of the drive by default.")] = None,
+        help="Component of the motion; that of the drive by default.")] = None,
     quantity: Annotated[str, Parameter(
-        help="Of spectra: velocity, displacement, normal_force, ...")] = "velocity",
-    highest_hz: Annotated[float | None, Parameter(help="End of the frequencies [Hz].")] = None,
-    t_start: Annotated[float | None, Parameter(help="Begin at this time of the run [s].")] = None,
-    t_end: Annotated[float | None, Parameter(help="Stop at this time of the run [s].")] = None,
+        help="Quantity for spectra: velocity, displacement, normal_force, ...")] = "velocity",
+    highest_hz: Annotated[float | None, Parameter(help="Highest frequency to plot [Hz].")] = None,
+    t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
+    t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
     trust: Trust = False,
 ) -> None:
-    """Draw a plot of a run, again or of another kind."""
+    """Plot a stored run."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import stored_run
     from fecontact.core.files.atomic_write import output_folder
@@ -96,11 +96,11 @@ def export(
         name="--format", help="`pvd` with VTU files, for ParaView before 5.12; `csv` for "
         "spreadsheets; `mat` for MATLAB and Octave; `netcdf` for xarray.")] = "pvd",
     output: Annotated[Path | None, Parameter(
-        name=["--output", "-o"], help="The file, or for pvd a folder of its own.")] = None,
+        name=["--output", "-o"], help="Output file, or a folder for pvd.")] = None,
     frames: Annotated[int, Parameter(help="Number of fields over the body, for pvd.")] = 200,
     trust: Trust = False,
 ) -> None:
-    """Write a run in another format."""
+    """Export a run to another format."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import stored_run
     from fecontact.core.files.atomic_write import output_folder

@@ -11,12 +11,12 @@ from fecontact.core.errors import InputError
 
 
 def init(
-    file: Annotated[Path, Parameter(help="The file to write.")] = Path("study.toml"),
+    file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
     shape: Annotated[Literal["beam", "pendulum", "block"], Parameter(
         help="Beam on wavy ground, pendulum on a stop, or block on a moving belt.")] = "beam",
-    force: Annotated[bool, Parameter(negative=(), help="Replace the file if there is one.")]
+    force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
     """Write a commented study file to start from."""
@@ -25,7 +25,7 @@ def init(
 
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
-    # Resolved, because none/../study.toml is there once the folder of the new file is made.
+    # Resolve the path: none/../study.toml exists as soon as the folder of the new file is made.
     if file.resolve().exists() and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
@@ -33,7 +33,7 @@ def init(
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
-    """Make the mesh of a study, and print its size and its groups."""
+    """Generate or read the mesh of a study; print its size and groups."""
     from fecontact.cli.run_files import read_study
     from fecontact.cli.tables import mesh_table
     from fecontact.core.files.atomic_write import output_folder
@@ -58,10 +58,10 @@ def modes(
     set_: Changes = None,
     output: Folder = None,
     converge: Annotated[bool, Parameter(negative=(), help=(
-        "Refine the mesh, and take more modes: what changes, as a table and a plot."))]
+        "Show convergence with mesh refinement and number of modes, as a table and a plot."))]
     = False,
 ) -> None:
-    """Print frequency, damping, kind and effective mass of the modes, and draw their shapes."""
+    """Print frequency, damping, kind and effective mass of the modes; plot their shapes."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import convergence_of, read_study
     from fecontact.core.files.atomic_write import output_folder
@@ -92,12 +92,12 @@ def run(
     set_: Changes = None,
     output: Folder = None,
     resume: Annotated[bool, Parameter(
-        negative=(), help="Go on with a run that was interrupted.")] = False,
+        negative=(), help="Resume an interrupted run.")] = False,
 ) -> int:
     """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
 
-    Ctrl-C stops the run, and so do SIGTERM and SIGHUP; what was computed until then is written, and
-    --resume goes on from there.
+    Ctrl-C, SIGTERM and SIGHUP stop the run; the part computed so far is written, and --resume
+    continues it.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_run

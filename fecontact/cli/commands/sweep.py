@@ -28,20 +28,20 @@ def sweep(
         name=["--output", "-o"], help="Folder of the sweep, instead of NAME-sweep among the "
                                       "results of the study.")] = None,
     resume: Annotated[bool, Parameter(
-        negative=(), help="Go on with a sweep; what is finished is not computed again.")] = False,
+        negative=(), help="Resume a sweep; finished cases are not repeated.")] = False,
     retry: Annotated[bool, Parameter(
-        negative=(), help="With --resume: compute failed cases again.")] = False,
+        negative=(), help="With --resume: repeat failed cases.")] = False,
     overwrite: Annotated[bool, Parameter(
-        negative=(), help="Remove the sweep that is there and begin anew.")] = False,
+        negative=(), help="Remove an existing sweep and start again.")] = False,
     workers: Annotated[int | None, Parameter(
-        help="Processes on this machine; one a core by default.")] = None,
+        help="Processes on this machine; one per core by default.")] = None,
     dask: Annotated[str | None, Parameter(
-        help="Address of a running Dask scheduler, `tcp://node1:8786`, whose workers compute.")]
+        help="Address of a running Dask scheduler, such as `tcp://node1:8786`.")]
     = None,
 ) -> int:
     """Run many cases of a study on all cores or a cluster; write a table (index.csv) and plots.
 
-    Ctrl-C stops it; finished cases are kept, and --resume goes on from there.
+    Ctrl-C stops it; finished cases are kept, and --resume continues the sweep.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study
@@ -90,7 +90,7 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int
 
 
 def _complain(failed: Mapping[int, str]) -> None:
-    """One line for each reason, with the first of its cases."""
+    """Print one line for each reason of failure, with its first cases."""
     cases: dict[str, list[int]] = {}
     for case, reason in failed.items():
         cases.setdefault(reason, []).append(case)
@@ -103,7 +103,7 @@ def _complain(failed: Mapping[int, str]) -> None:
 
 
 def _warn(warnings: Mapping[int, str]) -> None:
-    """One line on the cases that leave the limits of the model, with what the first says."""
+    """Print one line on cases that exceed the limits of the model, with the first warning."""
     if warnings:
         first = min(warnings)
         print(f"warning: {len(warnings)} of the cases leave the limits of the model, see the "
@@ -124,7 +124,7 @@ def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
 
 
 def _summary_table(table: "SweepTable", method: str) -> Any:
-    """Statistics of drawn samples; smallest and largest value of grids and lists."""
+    """Statistics of random samples; smallest and largest value for grids and lists."""
     import numpy as np
     from rich.markup import escape
 

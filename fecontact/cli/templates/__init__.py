@@ -1,4 +1,4 @@
-"""Study files to start from; the demonstration runs two of them."""
+"""Template study files; the demonstration runs two of them."""
 
 from importlib.resources import files
 
@@ -7,5 +7,5 @@ TEMPLATES = {"beam": "beam_on_wavy_ground", "pendulum": "pendulum_on_stop",
 
 
 def template(shape: str) -> str:
-    """Text of the study file for a shape: beam, pendulum or block."""
+    """Text of the template for a shape: beam, pendulum or block."""
     return files(__name__).joinpath(f"{TEMPLATES[shape]}.toml").read_text(encoding="utf-8")

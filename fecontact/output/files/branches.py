@@ -38,7 +38,7 @@ def write_branch(path: str | Path, branch: Branch) -> Path:
 
 
 def read_branch(path: str | Path) -> Branch:
-    """Read the branch that :func:`write_branch` wrote, or the first of several.
+    """Read a branch written by :func:`write_branch`, or the first of several.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def read_branch(path: str | Path) -> Branch:
 def write_branches(path: str | Path, branches: Mapping[str, Branch]) -> Path:
     """Write branches by name into one HDF5 file, whole or not at all.
 
-    They stand in ``branches/0``, ``branches/1``, ... with their names as attributes.
+    They are stored as ``branches/0``, ``branches/1``, ... with their names as attributes.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def write_branches(path: str | Path, branches: Mapping[str, Branch]) -> Path:
 
 
 def read_branches(path: str | Path) -> dict[str, Branch]:
-    """Read the branches that :func:`write_branches` wrote, in their order.
+    """Read the branches written by :func:`write_branches`, in their order.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def _store(group: Any, branch: Branch) -> None:
 
 
 def _stored(group: Any, path: str | Path) -> Branch:
-    """Read a branch from an HDF5 group that :func:`_store` filled, of the file ``path``."""
+    """Read a branch from an HDF5 group written by :func:`_store` in the file ``path``."""
     with reading(path):
         kinds = texts(group, "kind") if len(member(group, "kind")) else []
         count = len(kinds)
@@ -123,7 +123,7 @@ def _stored(group: Any, path: str | Path) -> Branch:
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:
-    """One dataset for values of the same shape, else one for each."""
+    """Write one dataset for values of equal shape, else one for each value."""
     if len({np.shape(value) for value in values}) <= 1:
         group.create_dataset(name, data=np.array(values) if not values
                              or not isinstance(values[0], str) else values)
@@ -133,7 +133,7 @@ def _write(group: Any, name: str, values: list[Any]) -> None:
 
 
 def _members(group: Any, name: str) -> Any:
-    """The members of a group that may be missing."""
+    """Members of a group; empty if it is missing."""
     if name not in group:
         return {}
     found = member(group, name)

@@ -1,4 +1,4 @@
-"""Case files (HDF5): a run, everything it was computed from, and frames for ParaView."""
+"""Case files (HDF5): a run, the model it was computed from, and frames for ParaView."""
 
 import json
 import tomllib
@@ -30,18 +30,18 @@ _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^
           "work": "J"}
 _OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
              "held_normal_force": "N", "held_friction_force": "N"}
-# What laws of the user's own give, by which a run can be drawn without their code.
+# Recorded results of user-defined laws, so that a run can be drawn without their code.
 _OF_LAWS = {"penetration_rate": "m/s", "ground_rate": "m/s", "contact_energy": "J"}
 _CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
             "slip_velocity": "m/s", "contact_state": "0 open, 1 stick, 2 slip"}
-# In the order of the columns of a contact history.
+# Columns of a contact history, in order.
 _COLUMNS = ("normal_force", "friction_force", "penetration", "penetration_rate", "slip_velocity",
             "ground_rate")
 
 
 @dataclass(frozen=True)
 class Case:
-    """A run as read from its file.
+    """A run read from its file.
 
     Attributes
     ----------
@@ -64,9 +64,8 @@ def write_case(
 ) -> Path:
     """Write a run into one HDF5 file, whole or not at all.
 
-    With frames the file is a temporal VTKHDF file too: call it ``NAME.vtkhdf`` and ParaView opens
-    it by double click. The rest lies outside its group /VTKHDF: /basis, /trajectory, /system,
-    /study and /versions.
+    With frames it is also a temporal VTKHDF file: name it ``NAME.vtkhdf`` to open it in ParaView.
+    Other data lie outside the group /VTKHDF: /basis, /trajectory, /system, /study and /versions.
 
     Parameters
     ----------
@@ -75,14 +74,14 @@ def write_case(
     trajectory : Trajectory
         The run.
     frames : int
-        Number of output times whose fields are stored, evenly spaced, never more than there are;
-        zero, or a modal basis without shapes over the body, leaves /VTKHDF out.
+        Number of evenly spaced output times whose fields are stored, at most all. /VTKHDF is
+        omitted for zero frames, or if the modal basis has no shapes over the body.
     study : str, optional
         The study that described the run, as TOML text.
     root : str or Path, optional
-        Laws in files of your own that lie below this folder are named relative to the case, so
-        that the folder can be moved as a whole; by default that of the case. Laws elsewhere are
-        named by their absolute paths.
+        User law files below this folder are named relative to the case, so that the folder can be
+        moved as a whole; by default the folder of the case. Other law files are named by absolute
+        paths.
 
     Raises
     ------
@@ -110,24 +109,24 @@ def write_case(
 
 
 def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case:
-    """Read a run that :func:`write_case` wrote.
+    """Read a run written by :func:`write_case`.
 
     Parameters
     ----------
     path : str or Path
         The file.
     trust : bool or files
-        Whether to run the code of laws that the file names as ``FILE.py:CLASS``, or the files of
-        Python whose code may be run. Untrusted laws are not loaded: forces, states of contact and
-        energies of the run are those that the file holds, and what needs the laws themselves
-        raises InputError. Laws of modules that are loaded already are used.
+        Whether to execute code of laws that the file names as ``FILE.py:CLASS``, or the Python
+        files that may be executed. Untrusted laws are not loaded: forces, contact states and
+        energies are those stored in the file, and anything that needs the laws themselves raises
+        InputError. Laws from modules that are already loaded are used.
 
     Raises
     ------
     InputError
-        If there is no such file, it is not HDF5, was not written by fecontact, holds no run, is
-        damaged, its system has parameters that this version does not know, or its ground, drive
-        or load needs code that is not trusted.
+        If the file does not exist, is not HDF5, was not written by fecontact, holds no run or is
+        damaged, if its system has parameters unknown to this version, or if its ground, drive or
+        load needs untrusted code.
     """
     path = as_path(path, "a run")
     with open_file(path, "basis") as file:
@@ -162,7 +161,7 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
 
 
 def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
-    """What a trajectory holds besides system, status and statistics."""
+    """Arrays of a trajectory, without system, status and statistics."""
     time = array(stored, "time", (None,))
     N, m, n = len(time), basis.modes, basis.contact_nodes
     if not (N and np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
@@ -184,7 +183,7 @@ def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
 
 
 def _require_states(system: ContactSystem, state: dict[str, Any]) -> None:
-    """Raise DamagedError unless states have as many internal variables as the laws."""
+    """Raise DamagedError unless the states have the internal variables required by the laws."""
     n, memory = system.basis.contact_nodes, state.get("memory")
     found = 0 if memory is None else memory.shape[1]
     if found != n * system.memory:
@@ -194,7 +193,7 @@ def _require_states(system: ContactSystem, state: dict[str, Any]) -> None:
 
 
 def _read_of_laws(stored: Any, basis: ModalBasis, count: int) -> tuple[Any, Any, Any] | None:
-    """Contact history, contact states and contact energy of a run with laws of the user's own."""
+    """Recorded contact history, contact states and contact energy of user-defined laws."""
     if not all(name in stored for name in _OF_LAWS):
         return None
     shape = count, basis.contact_nodes
@@ -204,7 +203,7 @@ def _read_of_laws(stored: Any, basis: ModalBasis, count: int) -> tuple[Any, Any,
 
 
 def _changed(study: str, change: Callable[[Any], Any]) -> str:
-    """A study with its tables changed, but for that of the mesh; the same text where none is."""
+    """Study text with changed tables, except [geometry]; the same text if nothing changes."""
     tables = tomllib.loads(study)
     changed = {name: table if name == "geometry" else change(table)
                for name, table in tables.items()}

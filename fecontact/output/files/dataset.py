@@ -27,7 +27,7 @@ class Variable:
     Attributes
     ----------
     dims : tuple of str
-        Names out of time, point, component, node, mode.
+        Names of dimensions: time, point, component, node, mode.
     values : array
     unit : str
     """
@@ -38,7 +38,7 @@ class Variable:
 
 
 def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
-    """What the dimensions stand for: time, names of points, axes, nodes, modes."""
+    """Coordinates of the dimensions: time, names of points, axes, nodes, modes."""
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
     basis = trajectory.system.basis
     return {
@@ -54,10 +54,10 @@ def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
 
 
 def variables(trajectory: Trajectory) -> dict[str, Variable]:
-    """All that a run holds and what follows from it.
+    """Stored and derived quantities of a run.
 
-    Displacements and velocities [x, y, phi] of B, C and further named points that the body has
-    and of the contact nodes, forces and states of these, energies, modal coordinates.
+    Displacements and velocities [x, y, phi] of B, C, other named points and the contact nodes,
+    forces and states of the contact nodes, energies, modal coordinates.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
     basis, q, rate = (trajectory.system.basis, trajectory.modal_coordinates,
@@ -83,7 +83,7 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
 def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
     """All variables as single columns (N,) with headers, ``B displacement x [m]``.
 
-    Modal coordinates are left out: they say nothing without the modes.
+    Modal coordinates are omitted: they have no meaning without the modes.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
     names = {key: [str(value) for value in variable.values]

@@ -16,10 +16,9 @@ SUFFIXES = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc"}
 
 
 def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
-    """Write a run as a table: one row a time, one column a quantity, a line of names and units.
+    """Write a run as a CSV table: one row per time, one column per quantity, headers with units.
 
-    Seventeen digits, so that numbers read back are equal to the last bit. Modal coordinates are
-    left out.
+    Numbers read back exactly. Modal coordinates are omitted.
 
     Returns
     -------
@@ -38,7 +37,7 @@ def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
             file.write(",".join(f'"{name}"' if "," in name else name for name in table) + "\n")
             for first in range(0, len(trajectory.time), 1000):
                 rows = np.column_stack([values[first : first + 1000] for values in table.values()])
-                # Shortest texts that read back as the same numbers.
+                # Shortest decimals that read back exactly.
                 file.writelines(",".join(map(repr, row)) + "\n" for row in rows.tolist())
 
     return _whole(path, write)
@@ -102,7 +101,7 @@ def export_netcdf(trajectory: Trajectory, path: str | Path) -> Path:
 def export_run(
     trajectory: Trajectory, case: Path, form: str, output: Path | None = None, frames: int = 200
 ) -> Path:
-    """Write a stored run in another format beside its file, or where ``output`` says.
+    """Write a stored run in another format beside its file, or to ``output``.
 
     Parameters
     ----------
@@ -113,14 +112,14 @@ def export_run(
     form : 'pvd', 'csv', 'mat' or 'netcdf'
         The format.
     output : Path, optional
-        A file; for 'pvd' a folder of its own.
+        A file; for 'pvd' a folder.
     frames : int
         Number of fields over the body, for 'pvd'.
 
     Raises
     ------
     InputError
-        For another format, a file with another ending, or what cannot be written.
+        For an unknown format, a wrong file suffix, or a file that cannot be written.
     """
     if form == "pvd":
         from fecontact.output.files.pvd import export_pvd
@@ -138,7 +137,7 @@ def export_run(
 
 
 def _whole(path: str | Path, write: Callable[[Path], None]) -> Path:
-    """Let a file be written beside its place, and put it there when it is complete."""
+    """Write to a temporary file and move it into place when it is complete."""
     path = as_path(path, "a table")
     with replaced(path) as part:
         write(part)

@@ -16,7 +16,7 @@ from fecontact.reduction.modal_basis import ModeShapes
 def frame_indices(
     time: Array, frames: int, t_start: float | None = None, t_end: float | None = None
 ) -> NDArray[np.intp]:
-    """Output times to show: the nearest ones to ``frames`` evenly spaced times, each once.
+    """Indices of the output times nearest to ``frames`` evenly spaced times, without repetition.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def frame_indices(
     Raises
     ------
     InputError
-        If ``frames`` is not such a number, or no output time lies between t_start and t_end.
+        If ``frames`` is negative, or no output time lies between t_start and t_end.
     """
     for name, value in (("t_start", t_start), ("t_end", t_end)):
         if value is not None and not (isinstance(value, Real) and value == value):
@@ -83,7 +83,7 @@ def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
 
 
 def nodal_contact_force(trajectory: Trajectory, which: Any = slice(None)) -> Array:
-    """Contact forces (F, N, 2) spread over the nodes of the body [N]; their sum is the total."""
+    """Contact forces (F, N, 2) distributed over the body nodes [N]; the total is preserved."""
     field = require_field(trajectory)
     forces = contact_forces(trajectory, which)
     n = forces.shape[1]
@@ -94,6 +94,6 @@ def nodal_contact_force(trajectory: Trajectory, which: Any = slice(None)) -> Arr
 
 
 def blocks(indices: NDArray[np.intp], nodes: int) -> list[NDArray[np.intp]]:
-    """Pieces of the chosen times, small enough for four doubles per node to stay in cache."""
+    """Blocks of the chosen times, small enough for four doubles per node to stay in cache."""
     size = max(1, 2**20 // (4 * nodes))
     return [indices[first : first + size] for first in range(0, len(indices), size)]

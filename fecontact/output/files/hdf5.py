@@ -29,10 +29,9 @@ _MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
 
 
 class _Sink(io.FileIO):
-    """A file for HDF5 that never fails: the first error is kept, what follows is dropped.
+    """File object for HDF5 that never raises: it keeps the first error and drops later writes.
 
-    The library leaves a file that it cannot write in a state in which closing it crashes the
-    process.
+    After a failed write, HDF5 crashes the process when it closes the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,9 +58,9 @@ class _Sink(io.FileIO):
 
 @contextmanager
 def new_file(path: str | Path) -> Iterator[Any]:
-    """A new HDF5 file, open for writing, that takes its place when the block ends well.
+    """Open a new HDF5 file for writing; it is moved into place if the block succeeds.
 
-    Ctrl-C is held back until then: an exception inside the library would leave a broken file open.
+    Ctrl-C is deferred until then: an exception inside the library would leave a broken file open.
 
     Raises
     ------
@@ -85,13 +84,13 @@ def new_file(path: str | Path) -> Iterator[Any]:
 
 @contextmanager
 def open_file(path: str | Path, group: str) -> Iterator[Any]:
-    """An HDF5 file, open for reading, that must hold ``group``.
+    """Open an HDF5 file for reading; it must contain ``group``.
 
     Raises
     ------
     InputError
-        If there is no such file, it is not HDF5, or it has no such group; and in the place of
-        whatever else the block raises, see :func:`fecontact.core.files.stored.reading`.
+        If the file does not exist, is not HDF5, or lacks the group; other errors in the block are
+        converted too, see :func:`fecontact.core.files.stored.reading`.
     """
     import h5py
 
@@ -122,12 +121,12 @@ def write_basis(path: str | Path, basis: ModalBasis) -> None:
 
 
 def read_basis(path: str | Path) -> ModalBasis:
-    """Read a basis that :func:`write_basis` wrote, or that of a case; exact to the last bit.
+    """Read a basis written by :func:`write_basis`, or that of a case, exactly.
 
     Raises
     ------
     InputError
-        If there is no such file, or it holds no basis or a damaged one.
+        If the file does not exist, or its basis is missing or damaged.
     """
     with open_file(path, "basis") as file:
         return stored_basis(member(file, "basis"))
@@ -156,12 +155,12 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
 
 
 def stored_basis(group: Any) -> ModalBasis:
-    """Read a basis from an HDF5 group that :func:`store_basis` filled.
+    """Read a basis from an HDF5 group written by :func:`store_basis`.
 
     Raises
     ------
     DamagedError, KeyError, InputError
-        If it holds something else; see :func:`fecontact.core.files.stored.reading`.
+        If the group holds other data; see :func:`fecontact.core.files.stored.reading`.
     """
     w = array(group, "angular_frequencies", (None,))
     m = len(w)

@@ -32,12 +32,12 @@ def export_pvd(
     case : Case, Trajectory, str or Path
         The run, or the file it is stored in.
     path : str or Path
-        ``FOLDER`` for ``FOLDER/FOLDER.pvd`` with the frames beside it, or ``NAME.pvd`` with the
-        frames in the folder ``NAME``. The folder is written whole or not at all. One that exists
-        is replaced if there is nothing in it but files of these names; its parent folder is made
-        if there is none.
+        ``FOLDER`` writes ``FOLDER/FOLDER.pvd`` and the frames beside it; ``NAME.pvd`` writes the
+        frames to the folder ``NAME``. The folder is written whole or not at all. An existing
+        folder is replaced if it contains only files of these names; missing parent folders are
+        created.
     frames : int
-        Number of frames, evenly spaced, never more than there are output times.
+        Number of evenly spaced frames, at most one for each output time.
     trust : bool
         Whether to run code that a file names; see :func:`fecontact.read_case`.
 
@@ -49,7 +49,7 @@ def export_pvd(
     Raises
     ------
     InputError
-        If the run has no shapes over the body, ``frames`` is not above zero, the folder holds
+        If the run has no shapes over the body, ``frames`` is not positive, the folder contains
         other files or cannot be written, or the case cannot be read.
     """
     trajectory = _trajectory(case, trust)

@@ -1,7 +1,7 @@
 """Contact systems whose laws are replaced by their recorded values.
 
-Laws of a user's own file are code. A run read from somewhere else is not to run it; what its file
-holds of the laws is enough to draw and export the run.
+User-defined laws are code, which must not be executed when a run from another source is read. The
+values recorded in its file suffice to draw and export the run.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ LAW_PARTS = ("normal", "friction")
 
 
 class UnreadLaw:
-    """A law whose code was not run; InputError for all that is asked of it."""
+    """A law whose code was not executed; every access raises InputError."""
 
     def __init__(self, table: Mapping[str, Any], needs: str) -> None:
         self._table, self._needs = dict(table), needs
@@ -38,14 +38,14 @@ class UnreadLaw:
 
 
 class _Recorded:
-    """A function of rows of numbers that is known at some of them."""
+    """A function of rows of numbers, tabulated at recorded rows."""
 
     def __init__(self, rows: Array, values: NDArray[Any], needs: str) -> None:
         self._values, self._needs = values, needs
         self._places = {row.tobytes(): place for place, row in enumerate(rows)}
 
     def __call__(self, rows: Array) -> NDArray[Any]:
-        """Values at rows that are all known; InputError for others."""
+        """Values at recorded rows; InputError for others."""
         try:
             return self._values[[self._places[row.tobytes()] for row in
                                  np.ascontiguousarray(rows)]].copy()
@@ -57,7 +57,7 @@ class _Recorded:
 class RecordedSystem(ContactSystem):
     """A system whose contact forces, states and energies are those of one run.
 
-    All that does not follow from them raises InputError.
+    Anything that does not follow from them raises InputError.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class RecordedSystem(ContactSystem):
     states : int
         Number of internal variables of a node.
     needs : str
-        The sentence for what is not recorded.
+        Error message for quantities that are not recorded.
     """
 
     history: Any = None
@@ -88,15 +88,15 @@ class RecordedSystem(ContactSystem):
 
     @property
     def arrays(self) -> Any:
-        """The compiled laws, which are not there."""
+        """Not available: needs the compiled laws."""
         raise InputError(self.needs)
 
     def with_(self, **changes: Any) -> ContactSystem:
-        """A copy with other parameters, which the laws would be needed for."""
+        """Not available: needs the laws."""
         raise InputError(self.needs)
 
     def parameters(self) -> dict[str, Any]:
-        """All parameters, which the laws would be needed for."""
+        """Not available: needs the laws."""
         raise InputError(self.needs)
 
     def contact_history(self, times: Array, states: Array) -> Array:
@@ -110,7 +110,7 @@ class RecordedSystem(ContactSystem):
     def sticks(
         self, slip_velocity: Array, normal_force: Array, friction_force: Array
     ) -> NDArray[np.bool_]:
-        """Whether nodes stuck (N, n)."""
+        """Recorded flags (N, n) of sticking nodes."""
         return np.asarray(self.sticking(np.hstack([slip_velocity, normal_force, friction_force])))
 
 
@@ -118,7 +118,7 @@ def recorded_system(
     basis: ModalBasis, tables: Mapping[str, Any], where: str, state: Mapping[str, Any],
     contact: Array, contact_state: NDArray[Any], energy: Array, needs: str,
 ) -> RecordedSystem:
-    """The system of a run from what was recorded of it.
+    """The system of a run with recorded contact quantities.
 
     Parameters
     ----------
@@ -137,12 +137,12 @@ def recorded_system(
     energy : (N,) array
         Energy in the contact [J].
     needs : str
-        The sentence for what is not recorded.
+        Error message for quantities that are not recorded.
 
     Raises
     ------
     InputError
-        If ground, drive or load need code too.
+        If ground, drive or load also need user code.
     """
     parts = system_parts(tables, where, ("ground", "drive", "load"))
     laws = {part: _law(part, tables, where, needs) for part in LAW_PARTS}
@@ -159,7 +159,7 @@ def recorded_system(
 
 
 def _law(part: str, tables: Mapping[str, Any], where: str, needs: str) -> Any:
-    """A law that needs no code, or what stands in its place."""
+    """A law that needs no user code, or its placeholder."""
     if tables.get("contact"):
         return UnreadLaw(tables["contact"], needs)
     try:

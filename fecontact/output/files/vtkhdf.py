@@ -29,11 +29,11 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     Parameters
     ----------
     file : h5py.File or Group
-        Where the group is made.
+        Parent of the new group.
     trajectory : Trajectory
         Its modal basis must hold shapes over the body.
     indices : (F,) integer array
-        Which output times.
+        Indices of the output times.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def _write_grid(group: Any, nodes: Array, cells: Integers) -> None:
 
 
 def _write_steps(group: Any, times: Array, nodes: int) -> None:
-    """Where the data of each step begin: the grid always at zero, point data one after another."""
+    """Write the offsets of each step: zero for the grid, consecutive for point data."""
     zeros = np.zeros(len(times), dtype=np.int64)
     group.attrs["NSteps"] = np.int64(len(times))
     group["Values"] = times
@@ -91,7 +91,7 @@ def _write_steps(group: Any, times: Array, nodes: int) -> None:
 
 
 def _three(vectors: Array) -> NDArray[np.float32]:
-    """Plane vectors (F, N, 2) as (F N, 3) in single precision."""
+    """Convert plane vectors (F, N, 2) to (F N, 3) in single precision."""
     out = np.zeros((vectors.shape[0] * vectors.shape[1], 3), dtype=np.float32)
     out[:, :2] = vectors.reshape(-1, 2)
     return out
