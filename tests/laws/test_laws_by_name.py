@@ -327,7 +327,7 @@ def test_example_in_the_documentation_is_the_example():
 MEMORY_LAW = """
 from dataclasses import dataclass
 from typing import ClassVar
-import fecontact as fc
+from fecontact.laws import FrictionLaw, memory_friction_law, normal_law
 
 @memory_friction_law
 def f(v, F, z, p, force, rates):
