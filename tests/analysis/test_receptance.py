@@ -213,7 +213,7 @@ def test_what_has_no_response():
         receptance(system, -1.0, [("B", "x")])
     with pytest.raises(InputError, match="give a ContactSystem"):
         receptance(system.basis, 1.0, [("B", "x")], linearised_at="rest")
-    with pytest.raises(InputError, match="pair of a point and a direction"):
+    with pytest.raises(InputError, match="pair of a point and a component"):
         receptance(system, 1.0, ["B"])
     with pytest.raises(InputError, match="at least one"):
         receptance(system, 1.0, [])

@@ -199,7 +199,7 @@ def test_own_laws_on_the_command_line(tmp_path, capsys):
 import math
 from dataclasses import dataclass
 from typing import ClassVar
-import fecontact as fc
+from fecontact.laws import FrictionLaw, friction_law
 
 @friction_law
 def f(v, F, p):

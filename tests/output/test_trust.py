@@ -109,7 +109,7 @@ def test_what_needs_the_law_says_so(stored):
 
 def test_the_command_line_runs_nothing_unasked(stored, capsys):
     out = stored.parent / "out"
-    for kind in ("contact", "energies", "friction_work", "receptance"):
+    for kind in ("contact_map", "energies", "friction_work", "receptance"):
         code = execute(["plot", str(stored), kind, "-o", str(out / f"{kind}.png")])
         said = capsys.readouterr().err
         assert (code, said) == (0, "") or (

@@ -185,7 +185,7 @@ def test_basis_keys_reach_the_basis(tiny):
 
 def test_gap_of_a_crowned_face(tiny):
     crowned = tiny.with_(gap={"radius": 2.0, "centre": 0.05})
-    x = crowned.basis().contact_x
+    x = crowned.modal_basis().contact_x
     np.testing.assert_allclose(crowned.system().gap, (x - 0.05) ** 2 / 4.0, rtol=1e-3)
     assert Study.from_toml(crowned.to_toml()) == crowned
 
