@@ -82,46 +82,38 @@ def ensemble(
     workers: int | None = None,
     progress: bool | Callable[[int], None] | None = None,
 ) -> Ensemble:
-    """Run many systems, or one from many initial states, and keep their states at few times.
+    """Run many systems, or one from many initial states, and keep states at a few times.
 
-    The same numbers as single runs of :func:`fecontact.simulate` with as loose a grip on their
-    energies: powers are not integrated, which also leaves the steps to the motion alone.
+    The results are those of :func:`fecontact.simulate`, except that powers are not integrated and
+    do not limit the steps. Threads share the cores.
 
     Parameters
     ----------
     systems : ContactSystem or sequence of E ContactSystem
-        What moves. The modal bases may differ in everything but the size of the state.
+        The modal bases may differ in everything but the size of the state.
     times : (K,) or (E, K) array
-        The start of each run and the times to keep states at, ascending [s]; the first column
-        belongs to the initial states.
+        Start of each run and the times to keep states at, ascending [s].
     initial : (E, size) array, sequence of E, or one for all
-        Initial states, or what :func:`fecontact.integrate.initial_state.initial_state` takes.
+        Initial states, or anything that :func:`fecontact.integrate.initial_state` takes.
     rtol : float
         Relative tolerance.
     max_step : float, optional
         Longest step [s]; see :func:`fecontact.simulate`.
     chain : int
-        Runs in a row that hand on their last state: only the first of each chain starts from its
-        initial state, as when a parameter is moved slowly. With E the whole ensemble is one chain
-        and runs on one core.
+        Length of chains of runs in which each run starts from the last state of the one before,
+        as when a parameter is moved slowly. A chain runs on one core; after a run that failed, the
+        next one starts from its own initial state.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        What to watch for, such as the passage through a Poincare section; a run that stops at one
-        has no states after it.
+        Events to locate; a run that stops at one has no states after it.
     workers : int, optional
-        Threads; default one a core.
+        Number of threads; by default one per core.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is called with the
-        number of runs that have ended, now and then.
+        True for a progress bar; a function is called with the number of completed runs.
 
     Raises
     ------
     InputError
         For states or times that do not fit the systems, and values out of range.
-
-    Notes
-    -----
-    A chain breaks where a run cannot go on; the next run then starts from its own initial state.
-    Ctrl-C ends all runs.
     """
     members, starts, instants = _members(systems, initial, times)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):

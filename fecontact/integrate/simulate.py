@@ -42,54 +42,42 @@ def simulate(
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> Trajectory:
-    r"""Integrate a contact system in time.
+    """Integrate a contact system in time.
 
     Parameters
     ----------
     system : ContactSystem
-        What moves.
-    t_end : float
-        End of the run [s].
-    t_start : float, optional
-        Its start [s]; default the end of the run that it continues, else zero.
+        The system.
+    t_end, t_start : float
+        End and start of the run [s]; by default it starts where the run that it continues ends, or
+        at zero.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
-        Where it starts; see :func:`fecontact.integrate.initial_state.initial_state`.
+        Initial state; see :func:`fecontact.integrate.initial_state`.
     outputs : int or (N,) array
-        Number of equally spaced output times, both ends included, or the times themselves,
-        ascending, the first ``t_start``, the last ``t_end``.
+        Number of equally spaced output times, both ends included, or ascending times [s].
     solver : Rodas5P, SetValued, Scipy or CVODE
-        The compiled integrator, the default; friction without smoothing and rigid stops; stiff
-        solvers of scipy and SUNDIALS, as references. Each takes the options that are its own.
+        Default integrator; set-valued friction and rigid stops; stiff reference solvers.
     rtol : float
-        Relative tolerance; absolute ones follow from it, the penetration scale of the normal law
-        and the width of the friction smoothing.
+        Relative tolerance; absolute ones follow from it and the scales of the contact laws.
     max_step : float, optional
-        Longest step [s]; by default, and at most, a part of the shortest period of drive, loads
-        and waves. Touches and slips within a step are found without it by Rodas5P.
+        Longest step [s]; at most a fraction of the shortest period of drive, loads and waves.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        For Rodas5P: what to watch for, located within the steps and kept in
-        :attr:`Trajectory.events`; the run ends at those that say so.
+        Located within the steps of Rodas5P and stored in :attr:`Trajectory.events`.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is called with the time
-        reached [s] now and then.
+        True for a progress bar; a function is called with the time reached [s].
 
     Returns
     -------
     Trajectory
-        Also of a run that ended early: by Ctrl-C, or because the solver could not go on; its
-        ``status`` says which.
+        Also if the run ended early, by Ctrl-C or because the solver failed; see its ``status``.
+        Each of its ``limits_exceeded`` is a ModelWarning.
 
     Raises
     ------
     InputError
-        For values out of range, and a checkpoint of another run.
+        For values out of range, or a checkpoint of another run.
     AnalysisError
         If there is no equilibrium to start from.
-
-    Warns
-    -----
-    ModelWarning
-        For each of :attr:`Trajectory.limits_exceeded`.
     """
     if not isinstance(system, ContactSystem):
         raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")

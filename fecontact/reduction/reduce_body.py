@@ -40,36 +40,34 @@ def modal_basis(
     body : ElasticBody
         The finite-element body.
     modes : int
-        Number of modes, the rigid ones included, lowest first.
+        Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground; its outward normal must point down, to -y. Several
-        boundaries are as many contact groups, which may have laws of their own.
+        Boundary that touches the ground, its outward normal pointing to -y. Each of several
+        boundaries is a contact group, which may have its own laws.
     contact_nodes : int or 'all', or one of them for each boundary
-        Number of equal segments of the contact boundary, each with a node in its middle that
-        moves with the segment's mean displacement; or every displacement node of the
-        boundary.
+        Number of equal segments of the boundary, each with a contact node at its centre that moves
+        with the segment's mean displacement; 'all' takes every displacement node of the boundary.
     B, C : place, optional
-        Excitation and load point: the name of a point or boundary of the mesh, (x, y), or
-        :class:`~fecontact.fem.points.Patch`. Default: the mesh's point of that name; without
-        one, the rows are zero.
+        Excitation and load point: the name of a point or boundary of the mesh, (x, y), or a
+        :class:`~fecontact.fem.points.Patch`. Default: the mesh's point of that name, else zero
+        rows.
     points : mapping of name to place, optional
         Further points to observe.
-    damping : float, (m,) sequence, Rayleigh or (m, m) array
-        See :func:`fecontact.reduction.damping.modal_damping`; modes that complete the given number
-        take the last ratio.
+    damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
+        See :func:`fecontact.reduction.damping.modal_damping`. Residual vectors and constraint modes
+        take the last ratio of a sequence.
     reduction : 'vibration', 'residual' or 'craig-bampton'
-        The lowest vibration modes alone; these completed by residual vectors of forces at
-        B, C and the contact nodes, so that static deflections there are right; or that many
-        fixed-interface modes with constraint modes.
+        Vibration modes alone; vibration modes and residual vectors of forces at B, C and the
+        contact nodes, for exact static deflections there; or fixed-interface and constraint modes.
     tolerance : float
-        For 'residual': the part of its own static compliance that may be missing at any of
-        these points, in x or y. Zero keeps all residual vectors; the larger, the fewer.
+        For 'residual': largest fraction of its static compliance that may be missing at any of
+        these points, in x or y. Zero keeps all residual vectors.
 
     Raises
     ------
     InputError, MeshError
-        For names that do not exist, places outside the body, an upward contact face, more
-        modes than unknowns, more contact nodes than the boundary has.
+        For unknown names, places outside the body, an upward contact face, more modes than
+        unknowns, or more contact nodes than the boundary has.
     """
     import scipy.sparse as sp
 

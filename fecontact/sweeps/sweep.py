@@ -50,53 +50,44 @@ def sweep(
 
     ``sweep("study.toml", {"ground.speed": [0.1, 0.2], "friction.decay": Span(1.0, 9.0, 5)})``
 
-    Each case gives the numbers that ``study.with_(**changes).run()`` gives, to the last bit. It is
-    known by the hash of its resolved study; finished ones are kept in ``folder`` batch by batch,
-    so that a sweep that was stopped goes on where it was. Cases that fail have their reason in the
-    table and do not stop the others.
+    Each case gives bit for bit the numbers of ``study.with_(**changes).run()``. Cases that fail
+    have their reason in the table and do not stop the others; finished ones are kept, also after
+    Ctrl-C, so that a sweep can be resumed. See docs/sweeps.md.
 
     Parameters
     ----------
     study : Study or path
-        What all cases have in common.
+        The study that all cases share.
     axes : mapping, optional
-        Parameters that change, by dotted names, with a list of values, a
-        :class:`~fecontact.study.sweep_section.Span` or a
-        :class:`~fecontact.study.sweep_section.Distribution`; those of ``[sweep.axes]`` by default.
+        Parameters by dotted names, each with a list of values, a :class:`fecontact.study.Span` or a
+        :class:`fecontact.study.Distribution`; by default those of ``[sweep.axes]``.
     executor : concurrent.futures.Executor, optional
-        What runs the batches: the executor of a Dask client, of mpi4py.futures, of executorlib,
-        threads; by default processes on this machine, which end with the sweep.
+        Runs the batches: threads, the executor of a Dask client, of mpi4py.futures or executorlib;
+        by default processes on this machine.
     folder : path, optional
-        Where finished cases are kept; ``NAME-sweep`` among the results of the study by default.
-    resume : bool
-        Go on with what is there, instead of complaining about it.
-    overwrite : bool
-        Remove what is there.
+        Where finished cases are kept; by default ``NAME-sweep`` among the results of the study.
+    resume, overwrite : bool
+        Continue the sweep in the folder, or remove it; otherwise an existing one is an error.
     retry : bool
-        Compute cases again that have failed.
+        Compute failed cases again.
     workers : int, optional
-        Number of processes on this machine; as many as cores by default.
+        Number of processes on this machine; by default one per core.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is called with the
-        numbers of cases that are done, that failed and of all.
+        True for a progress bar; a function is called with the numbers of finished, failed and all
+        cases.
     **settings
-        Other values for the keys of ``[sweep]``; see
-        :class:`~fecontact.study.sweep_section.SweepSettings`.
+        Other values for the keys of ``[sweep]``; see :class:`fecontact.study.SweepSettings`.
 
     Returns
     -------
     SweepTable
-        Also in ``folder`` as ``index.csv``.
+        Also written to ``folder`` as ``index.csv``.
 
     Raises
     ------
-    InputError
-        If a parameter does not exist, an axis is empty or does not suit the method, a summary is
-        not known, the folder holds a sweep or cannot be written, another sweep is at work in it.
-    AnalysisError
-        If the executor cannot go on; finished cases are kept.
-    KeyboardInterrupt
-        After Ctrl-C; finished cases are kept.
+    InputError, AnalysisError
+        If a parameter or summary is unknown, an axis is empty or does not suit the method, the
+        folder holds a sweep, is in use or cannot be written, or the executor cannot go on.
     """
     study = study if isinstance(study, Study) else Study.read(study)
     worker_count(workers)

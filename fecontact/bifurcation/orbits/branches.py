@@ -107,63 +107,43 @@ def orbit_branch(
 ) -> Branch:
     """Follow periodic orbits over a parameter.
 
+    Each point stores 'period' [s], 'multipliers' (d,), 'unstable' (number outside the unit circle),
+    'stable', 'trivial_error', 'mesh' (N + 1,), 'minimum' and 'maximum' (d,). Special points are
+    'fold', 'period doubling', 'Neimark-Sacker', 'branch point', 'period halving' and 'unresolved';
+    see docs/orbits.md.
+
     Parameters
     ----------
     field : VectorField
-        The system; of the branch from which a point is.
+        The system; that of the branch if ``start`` is a point of one.
     start : BranchPoint, PeriodicMotion, Trajectory or (times, states)
-        Where to begin:
-
-        - a 'Hopf' point of equilibria: the orbits that are born there,
-        - a 'period doubling' of orbits: those of twice the period,
-        - a 'branch point' of orbits: those that cross there,
-        - another point of a branch of orbits, also of one read from a file: goes on from there,
-        - a motion that has settled over one period at least, such as
-          :func:`fecontact.bifurcation.periodic_motion` finds; its end counts.
+        A Hopf point of equilibria, a period doubling or branch point of orbits; another point of a
+        branch of orbits, to continue it; or a settled motion over at least one period.
     parameter : str, optional
-        The one that is varied; by default that of the point, or the only one of the field.
+        The parameter to vary; by default that of the point, or the only one of the field.
     method : Collocation or Shooting, optional
-        How orbits are found; by default as on the branch of the point, else by collocation. Beyond
-        a period doubling there are by default twice the intervals or segments.
+        By default that of the point's branch, else collocation. Twice the intervals or segments are
+        used beyond a period doubling.
     options : ContinuationOptions, optional
-        How the branch is followed.
+        Step lengths, tolerances and stopping conditions.
     bounds : (float, float), optional
-        Range of the parameter, as in the options.
+        Range of the parameter, in place of that of the options.
     scales : (d,) sequence, optional
-        Amplitudes of the states that count as one in the length of a step. By default they are
-        those of the branch of orbits from which the point is; else those of the motion, or at a
-        Hopf point of the field, growing with the orbits of collocation.
+        Amplitudes of the states that count as one in the arclength; by default those of the point's
+        branch or the motion, at a Hopf point those of the field.
     width : float, optional
-        Width of the diagram in the parameter; by default that of the branch of orbits, or of the
-        bounds.
+        Parameter range that counts as one; by default that of the point's branch, or of the bounds.
     direction : float
-        Sign of the first change of the parameter from a motion. From a point of a branch of orbits
-        1 goes on along the branch and -1 back; at a branch point they are the two halves.
+        Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
+        its branch and -1 back, or along either half of the other branch at a branch point.
     both : bool
         Go to both sides, from a motion or a regular point.
 
-    Returns
-    -------
-    Branch
-        Stored of each orbit: 'period' [s], 'multipliers' (d,), 'unstable' (number of those
-        outside the unit circle), 'stable', 'trivial_error' (distance from one of the multiplier
-        that is one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
-
-        - 'fold': with ``parameter_error``, the change of its parameter on a finer mesh,
-        - 'period doubling' and 'Neimark-Sacker': with ``coefficient``, ``coefficient_error``,
-          ``criticality`` ('supercritical', 'subcritical' or 'undecided') and ``parameter_error``,
-        - 'branch point': where two branches of orbits cross, with ``parameter_error``,
-        - 'period halving': where doubled orbits become single again; there the branch ends,
-        - 'unresolved': where 'unstable' changes but no test function has a zero; or a point of
-          the kind ``instead_of`` that finer meshes do not have.
-
     Raises
     ------
-    InputError
-        If no orbits begin at the start, the bounds exclude it, or its samples do not cover a
-        period.
-    AnalysisError
-        If no orbit is found near a motion.
+    InputError, AnalysisError
+        If no orbits emanate from the start, it lies outside the bounds or covers no period, or no
+        orbit is found near a motion.
     """
     require_field(field)
     require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, tuple), start=start)
