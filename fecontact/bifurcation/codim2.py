@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
@@ -27,7 +26,7 @@ from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 # Smallest component of a tangent of length one that tells the sign of a parameter's change.
 _RESTS = 1e-6

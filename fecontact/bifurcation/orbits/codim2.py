@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem
@@ -18,7 +18,7 @@ from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 
 _TEST_STEP = 1e-5  # step of the differences of the test function, in the inner product
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
