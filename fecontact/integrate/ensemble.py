@@ -1,7 +1,7 @@
-"""Many runs at once: one system with many parameter sets or initial states, on all cores.
+"""Ensembles of runs: many parameter sets or initial states of one system, on all cores.
 
-Each run is one compiled call that leaves Python's lock alone, so that threads share the cores
-without copies of anything; only what is asked for of each run is kept.
+Each run is one compiled call that releases the GIL, so that threads share the cores without copying
+data; only the requested states are kept.
 """
 
 import os
@@ -38,13 +38,13 @@ class Ensemble(Summarised):
     times : (E, K) array
         [s].
     states : (E, K, 2 m + n s) array
-        y = [q, q', z]; NaN after the end of a run that could not go on.
+        y = [q, q', z]; NaN after the end of a run that failed or stopped.
     status : tuple of Status
         How each run ended.
     steps : (E,) array
         Steps of the integrator.
     events : tuple of Events, or None
-        What was watched for in each run; None if nothing was.
+        Events located in each run; None if none were requested.
     """
 
     times: Array
@@ -66,7 +66,7 @@ class Ensemble(Summarised):
 
     @property
     def finished(self) -> NDArray[np.bool_]:
-        """Which runs (E,) reached their end."""
+        """Mask (E,) of the runs that reached their end."""
         return np.array([status is Status.FINISHED for status in self.status])
 
 
@@ -171,30 +171,30 @@ def strobe(
     period: float | ArrayLike | None = None,
     **settings: Any,
 ) -> Ensemble:
-    """States once per period of the excitation, after a transient: a Poincare section in time.
+    """States once per period of the excitation, after a transient (stroboscopic map).
 
     Parameters
     ----------
     systems : ContactSystem or sequence of E ContactSystem
-        What moves.
+        The systems.
     transient_periods : int
-        Periods that are not kept.
+        Number of periods before the first state that is kept.
     keep : int
-        States kept, one per period from there on.
+        Number of states to keep, one per period.
     period : float or (E,) array, optional
-        Period of strobing [s]; default that of each system's excitation.
+        Sampling period [s]; by default that of each system's excitation.
     **settings
         As for :func:`ensemble`.
 
     Returns
     -------
     Ensemble
-        With ``keep`` states a run.
+        With ``keep`` states per run.
 
     Raises
     ------
     InputError
-        For a system without a period of its own if none is given, and as :func:`ensemble`.
+        As :func:`ensemble`, or if a system is not excited periodically and no period is given.
     """
     for name, value, least in (
             ("transient_periods", transient_periods, 0), ("keep", keep, 1)):
@@ -220,7 +220,7 @@ def strobe(
 def _members(
     systems: ContactSystem | Sequence[ContactSystem], initial: Any, times: ArrayLike,
 ) -> tuple[list[ContactSystem], Callable[[int], Array], Array]:
-    """One system and row of times for each run, and a function that gives its initial state."""
+    """System and times of each run, and a function that returns its initial state."""
     require_kind("ensemble", (ContactSystem, Sequence), systems=systems)
     instants = np.array(as_floats(times, "times"))
     single = isinstance(systems, ContactSystem)

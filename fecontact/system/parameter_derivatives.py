@@ -1,8 +1,8 @@
 """Compiled derivatives of a contact system's equations with respect to a parameter.
 
-What the equations are linear in, or differentiate by themselves, goes by the chain rule; only a law
-whose own parameters move is differenced, at the state and the forces as they are. The system is
-given as arrays s, and the rates of all of them with the parameter as arrays r of the same form.
+The chain rule covers all linear terms and the derivatives that laws return; only the dependence of
+a law on its own parameters is found by finite differences, at fixed state and forces. The system is
+given as arrays s, and their derivatives with respect to the parameter as arrays r of the same form.
 """
 
 import numpy as np
@@ -10,14 +10,14 @@ import numpy as np
 from fecontact.core.compiled import helper
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 
-# Differences of fourth order: places in steps, and weights in twelfths of a step.
+# Fourth-order differences: offsets in steps, and weights in twelfths of a step.
 _PLACES = np.array([1.0, -1.0, 2.0, -2.0])
 _WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0])
 
 
 @helper
 def _beside(parameters, rates, h):
-    """Laws' parameters (4, k, p) at the places of the differences; (0, k, p) if none moves."""
+    """Laws' parameters (4, k, p) at the offsets of the differences; (0, k, p) if none varies."""
     k, p = parameters.shape
     count = 4 if h > 0.0 and moves(rates) else 0
     out = np.empty((count, k, p))
@@ -40,9 +40,9 @@ def moves(rates):
 
 @helper
 def laws_beside(s, r, h):
-    """Parameters of all laws at the places of the differences, each (4, k, p) or (0, k, p).
+    """Parameters of all laws at the offsets of the differences, each (4, k, p) or (0, k, p).
 
-    Those of normal laws, friction, profile, friction along the ground, its motion, drive, loads.
+    For normal laws, friction, profile, friction variation, ground motion, drive and loads.
     """
     return (_beside(s.normal_parameters, r.normal_parameters, h),
             _beside(s.friction_parameters, r.friction_parameters, h),
@@ -87,7 +87,7 @@ def given_rates(t, s, r, h, laws, load):
 
 @helper
 def _ground_rates(address, xi, beside, h):
-    """Derivatives of a ground law's value and slope at one place."""
+    """Derivatives of a ground law's value and slope at one abscissa."""
     value, slope = 0.0, 0.0
     for k in range(len(beside)):
         a, b, _ = ground_at(address)(xi, beside[k, 0])
@@ -101,10 +101,10 @@ def node_rates(j, xi, slip, height, height_rate, z, F, shifts, s, r, h, laws, fo
                room, room_rates, memory):
     """Derivatives of F, R, slip velocity and pressing force at node j.
 
-    ``shifts`` holds those of xi, height, slip velocity and rate of the height by themselves;
+    ``shifts`` holds the explicit derivatives of xi, height, slip velocity and rate of the height;
     ``force`` and ``partial`` are results of :func:`fecontact.system.kernels.node_gradients`.
-    Fills ``memory`` (s,) with what the friction law's own parameters add to the rates of its
-    internal variables; ``room`` (3 + s,) and ``room_rates`` (s, 3 + s) are overwritten.
+    Fills ``memory`` (s,) with the contribution of the friction law's own parameters to the rates of
+    its internal variables; ``room`` (3 + s,) and ``room_rates`` (s, 3 + s) are overwritten.
     """
     ground, slope = _ground_rates(s.profile, xi, laws[2], h)
     F_p = -partial[0, 1] * ground - partial[0, 3] * slope * slip
@@ -124,7 +124,7 @@ def node_rates(j, xi, slip, height, height_rate, z, F, shifts, s, r, h, laws, fo
             scale_x * shifts[0] + _ground_rates(s.friction_scale, xi, laws[3], h)[0])
     R_F = force[2]
     if s.memory[j] == 0 and F == 0.0 and F_p != 0.0:
-        # Friction is not asked for without a normal force, but is about to begin.
+        # Friction is zero without a normal force, but may be about to begin.
         R_F = friction_at(s.friction[j])(slip, 0.0, s.friction_parameters[j])[2]
     R_p = force[1] * shifts[2] + R_F * pressing_p
     for i in range(s.memory[j]):
