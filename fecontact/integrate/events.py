@@ -182,7 +182,8 @@ class Events:
     time : (K,) array
         [s], located to round-off on the dense output of the steps.
     kind : tuple of str
-        'touch-down', 'lift-off', 'stick', 'slip', or 'event k' for the k-th user-defined one, from 0.
+        'touch-down', 'lift-off', 'stick', 'slip', or 'event k' for the k-th user-defined one
+        from 0.
     node : (K,) array
         Number of the contact node from 0; -1 for user-defined events.
     states : (K, size) array

@@ -78,7 +78,7 @@ def modal_basis(
     for name in points:
         require_kind("points", str, name=name)
         if name in ("B", "C"):
-            raise InputError(f"points: '{name}' is a name of its own; give it as {name}=...")
+            raise InputError(f"points: the name '{name}' is reserved; use {name}=... instead.")
     if reduction not in get_args(Reduction):
         raise InputError(f"reduction = {reduction!r} must be one of {choices(get_args(Reduction))}"
                          f"{nearest(str(reduction), get_args(Reduction))}.")
@@ -90,7 +90,7 @@ def modal_basis(
     restriction = sp.csr_array(sp.vstack(
         [*(row.matrix for row in named), face.matrix, *(row.matrix for row in further)]))
     system = FreeSystem.of(body)
-    # Forces act at B, C and the contact nodes in x and y; the rotation carries none.
+    # Forces act at B, C and the contact nodes in x and y; there are no moments.
     loaded = np.flatnonzero(np.arange(restriction.shape[0]) % 3 < 2)
     flexibility = Flexibility(system, sp.csr_array(restriction[loaded] @ body.expansion))
     w, free_shapes, vibration = _modes(system, flexibility, modes, reduction, tolerance,
@@ -127,7 +127,7 @@ def _modes(
     system: FreeSystem, flexibility: Flexibility, count: int, reduction: Reduction,
     tolerance: float, used: int,
 ) -> tuple[Array, Array, int]:
-    """Frequencies, shapes and the number of true eigenmodes among them."""
+    """Frequencies, shapes and number of the eigenmodes among them."""
     if reduction == "craig-bampton":
         w, shapes = craig_bampton(system, flexibility.rows[:used], count)
         return w, shapes, system.rigid.shape[1]
@@ -136,7 +136,7 @@ def _modes(
         return w, shapes, count
     if count < system.rigid.shape[1]:
         raise InputError(f"modes = {count} must be at least the number of rigid modes, "
-                         f"{system.rigid.shape[1]}, to be completed by residual vectors.")
+                         f"{system.rigid.shape[1]}, for reduction = 'residual'.")
     more, completing = residual_modes(flexibility.of_first(used), w, shapes, tolerance)
     return np.concatenate([w, more]), np.hstack([shapes, completing]), count
 
@@ -159,7 +159,7 @@ def _quality(
 
 def linear_cells(body: ElasticBody) -> Integers:
     """First-order cells between all displacement nodes, counter-clockwise."""
-    # Indices are 64-bit integers in files too.
+    # 64-bit indices, as in files.
     dofs = body.basis.element_dofs.astype(np.int64)
     if body.degree == 1:
         cells = dofs.T
