@@ -39,7 +39,7 @@ class Flexibility:
 
     @cached_property
     def _balance(self) -> tuple[Array, Array]:
-        """Response (f, r) of the supported body to the inertia of rigid modes, and W rigid (k, r)."""
+        """Response (f, r) of the supported body to rigid-body inertia, and W rigid (k, r)."""
         system = self.system
         response = np.zeros_like(system.rigid)
         if system.rigid.shape[1]:
