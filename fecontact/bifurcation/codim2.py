@@ -42,53 +42,41 @@ def codim2_curve(
 ) -> Branch:
     """Follow a special point over two parameters, such as the border of flutter or stick-slip.
 
-    The kind of the point tells which curve it is: folds and Hopf points of equilibria (minimally
-    augmented systems), or folds, period doublings and Neimark-Sacker points of orbits by
-    collocation (the orbit with its test function at zero).
+    The kind of the point selects the curve. docs/bifurcation.md lists what its points store, and
+    its special points.
 
     Parameters
     ----------
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
-        A special point of a branch over the first parameter.
+        A point of a branch over the first parameter; of orbits, one found by collocation.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
-        How the curve is followed; ``bounds`` there are those of the first parameter.
+        Step lengths, tolerances and stopping conditions; its bounds are those of the first
+        parameter.
     bounds : mapping, optional
-        Range of each parameter by name, ``{"B": (0.0, 30.0)}``; the curve ends there. They also
-        set the widths of the diagram; without they are those of the branch, or the values at the
-        point.
+        Range of each parameter by name, ``{"B": (0.0, 30.0)}``, at which the curve ends; it also
+        scales the arclength (by default the branch does, or the values at the point).
     scales : (d,) sequence, optional
-        Sizes of the states that count as one in the length of a step; by default they grow with
-        the states of equilibria, and are those of the branch for orbits.
+        Sizes of the states that count as one in the arclength; by default they grow with the states
+        of equilibria, and are those of the branch for orbits.
     direction : float
-        Sign of the first change of the first parameter; of the second one where the first rests.
+        Sign of the first change of the first parameter, or of the second where the first is
+        constant.
     both : bool
-        Go to both sides; the points then go from one end of the curve to the other.
+        Go to both sides; the points then run from one end of the curve to the other.
 
     Returns
     -------
     Branch
-        With ``parameter_names`` (first, second); each point stores both by name. Besides, and as
-        special points, there are
-
-        - folds of equilibria: 'state', 'unstable_besides', the number of eigenvalues with positive
-          real part besides the one that is zero; 'cusp', 'Bogdanov-Takens', 'zero-Hopf',
-        - Hopf points: 'state', 'frequency_hz', 'first_lyapunov', 'unstable_besides' the critical
-          pair; 'Bautin' (generalised Hopf), 'double Hopf', 'zero-Hopf', and 'Bogdanov-Takens',
-          where the curve ends,
-        - orbits: what :func:`fecontact.bifurcation.orbit_branch` stores; 'cusp' on curves of folds,
-          'generalised period doubling', where doublings turn from super- to subcritical, on curves
-          of tori 'resonance 1:1' to 'resonance 1:4', where the multipliers pass 1, -1, or the
-          angle 120 or 90 degrees; and 'turning point'.
+        With ``parameter_names`` (first, second); each point stores both by name.
 
     Raises
     ------
     InputError
-        If the point starts no curve, was found by shooting, or lies outside the bounds, or a
-        parameter is unknown.
+        If the point starts no curve or lies outside the bounds, or a parameter is unknown.
     AnalysisError
         If the curve has no direction at the point.
     """

@@ -1,4 +1,4 @@
-"""Checks of arguments that several functions of the interface share."""
+"""Checks of arguments, shared by all public functions."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -11,19 +11,19 @@ import numpy as np
 from fecontact.core.errors import InputError, require_positive, shown
 from fecontact.core.types import Array, Integers
 
-_SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second: the encoder is given two decimals
-_LARGEST = 1e12  # factor of displacements; they are drawn in single precision
+_SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
+_LARGEST = 1e12  # factor of displacements, which are drawn in single precision
 
 
 def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> None:
-    """Raise :class:`InputError` unless the named arguments are of a class.
+    """Raise :class:`InputError` unless the named arguments are instances of a class.
 
     Parameters
     ----------
     owner : str
         The function or class, for the message.
     kind : type or tuple of types
-        What they must be.
+        The class, or several of which any will do.
     **values
         Arguments by name.
     """
@@ -39,43 +39,43 @@ _NAMES: dict[Any, str] = {Mapping: "a mapping of names", Sequence: "a sequence",
 
 
 def as_path(path: Any, what: str) -> Path:
-    """A path; InputError if it is none, or has a zero character in it.
+    """Convert to a path; InputError if it is none or contains a null character.
 
-    ``what`` says what lies there, for the message: 'a mesh'.
+    ``what`` names the content in the message: 'a mesh'.
     """
     if not isinstance(path, str | os.PathLike):
         raise InputError(f"The path of {what} must be a text or Path, not {type(path).__name__}.")
     found = Path(path)
     if "\0" in str(found):
-        raise InputError(f"The path of {what}, {str(found)!r}, holds a zero character, which no "
-                         f"name may have.")
+        raise InputError(f"The path of {what}, {str(found)!r}, contains a null character; "
+                         f"remove it.")
     return found
 
 
 def as_count(value: Any, what: str, least: int = 1) -> int:
-    """A whole number of at least some value; InputError if it is not. ``what`` is its name."""
+    """Convert to an int of at least ``least``; ``what`` is its name in the InputError."""
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise InputError(f"{what} = {shown(value)} must be a whole number, {least} or above.")
     return int(value)
 
 
 def as_floats(values: Any, what: str) -> Array:
-    """An array of numbers; ``what`` is its name, for messages.
+    """Convert to an array of floats; ``what`` is its name in messages.
 
     Raises
     ------
     InputError
-        For complex numbers, truth values, texts, None and lists of unequal lengths.
+        For complex numbers, booleans, strings, None and lists of unequal lengths.
     """
     try:
         given = np.asarray(values)
         if isinstance(values, list | tuple) and any(isinstance(item, bool) for item in values):
-            given = np.empty(0, bool)  # beside numbers, NumPy takes truth values for 0 and 1
+            given = np.empty(0, bool)  # NumPy converts booleans among numbers to 0 and 1
         if given.dtype.kind in "iuf":
             return np.asarray(given, dtype=float)
         if given.dtype.kind == "O" and all(isinstance(item, Real) and not isinstance(item, bool)
                                            for item in given.flat):
-            return np.asarray(given, dtype=float)  # fractions, whole numbers beyond 64 bits
+            return np.asarray(given, dtype=float)  # fractions, integers beyond 64 bits
     except (TypeError, ValueError, OverflowError):
         pass
     raise InputError(f"{what} must be real numbers, not {shown(values)}; give a number, or lists "
@@ -83,7 +83,7 @@ def as_floats(values: Any, what: str) -> Array:
 
 
 def is_numeric(values: Any) -> bool:
-    """Whether :func:`as_floats` takes it."""
+    """Whether :func:`as_floats` accepts the values."""
     try:
         as_floats(values, "")
     except InputError:
@@ -92,7 +92,7 @@ def is_numeric(values: Any) -> bool:
 
 
 def as_pair(values: Any, what: str) -> tuple[float, float]:
-    """Two finite numbers, the coordinates of a place; InputError if they are not."""
+    """Convert to two finite coordinates; InputError otherwise."""
     place = as_floats(values, what)
     if place.shape != (2,) or not np.isfinite(place).all():
         raise InputError(f"{what} = {shown(values)} must be a pair of coordinates x, y [m].")
@@ -100,7 +100,7 @@ def as_pair(values: Any, what: str) -> tuple[float, float]:
 
 
 def as_integers(values: Any, what: str) -> Integers:
-    """An array of whole numbers; InputError if it is none, or a number has a fraction."""
+    """Convert to an array of integers; InputError if a value is not a whole number."""
     found = as_floats(values, what)
     if not (np.isfinite(found) & (found == np.round(found))).all():
         raise InputError(f"{what} must be whole numbers.")
@@ -108,14 +108,14 @@ def as_integers(values: Any, what: str) -> Integers:
 
 
 def require_frame_rate(owner: str, fps: float) -> None:
-    """Raise :class:`InputError` unless movies can have so many frames a second."""
+    """Raise :class:`InputError` unless ``fps`` is a possible frame rate of a movie."""
     if not (isinstance(fps, Real) and not isinstance(fps, bool) and _SLOWEST <= fps <= _FASTEST):
         raise InputError(f"{owner}: fps = {fps!r} must be a number from {_SLOWEST:g} to "
                          f"{_FASTEST:g} frames a second.")
 
 
 def require_scale(owner: str, scale: float) -> None:
-    """Raise :class:`InputError` unless displacements can be drawn larger by this factor."""
+    """Raise :class:`InputError` unless displacements can be drawn enlarged by ``scale``."""
     require_positive(owner, scale=scale)
     if scale > _LARGEST:
         raise InputError(f"{owner}: scale = {scale!r} must be at most {_LARGEST:g}.")

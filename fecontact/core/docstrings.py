@@ -9,9 +9,9 @@ from docstring_parser.common import DocstringParam
 
 
 def documented(cls: type) -> list[tuple[tuple[str, ...], str]]:
-    """Parameters of a class and their descriptions; names that share a description are together.
+    """Parameters of a class and their descriptions, grouped where names share a description.
 
-    A parameter without a description has its type in place of one.
+    A parameter without a description gets its type instead.
     """
     return [(_names(entry), " ".join((entry.description or entry.type_name or "").split()))
             for entry in _parsed(inspect.getdoc(cls) or "").params]
@@ -27,11 +27,10 @@ def summary(thing: Any) -> str:
 
 
 def inherit_documentation(cls: type) -> None:
-    """Add to the docstring of a dataclass what it leaves to those of its bases.
+    """Complete the docstring of a dataclass from those of its bases.
 
-    These are the fields that it does not describe itself, in the order of the fields, and the
-    errors that are raised. A base may describe fields that only its subclasses have. A class
-    without a docstring stays without.
+    Add the fields that it does not describe itself, in their order, and the errors raised. A base
+    may describe fields that only its subclasses have. A class without a docstring is left alone.
     """
     text = cls.__dict__.get("__doc__")
     if not text:
@@ -61,7 +60,7 @@ def inherit_documentation(cls: type) -> None:
 def _parsed(text: str) -> Docstring:
     found = parse(text, DocstringStyle.NUMPYDOC)
     for entry in found.params:
-        entry.default = None  # taken from the words "by default", which stay in the description
+        entry.default = None  # parsed from the words "by default", which stay in the description
     return found
 
 

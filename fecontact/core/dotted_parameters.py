@@ -9,7 +9,7 @@ from typing import Any
 def parameters_of(whole: Any, prefix: str = "") -> dict[str, Any]:
     """Every value below a dataclass, a mapping or a tuple of dataclasses, by its dotted name.
 
-    Parts that are not there (None) are left out.
+    Parts that are None are left out.
     """
     result: dict[str, Any] = {}
     for name, value in _members(whole).items():
@@ -22,7 +22,7 @@ def parameters_of(whole: Any, prefix: str = "") -> dict[str, Any]:
 
 
 def with_parameters(whole: Any, changes: Mapping[str, Any]) -> Any:
-    """A copy with some values or parts replaced, by their dotted names.
+    """Copy with some values or parts replaced, by their dotted names.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Exceptions of the package, and the checks of numbers that raise them.
 
-Every message is one sentence that names the thing that is wrong, its value, what is allowed and
-what to do about it.
+Every message is one sentence that names the argument or key, its value, the allowed values and a
+remedy.
 """
 
 import difflib
@@ -18,23 +18,23 @@ class InputError(FecontactError, ValueError):
 
 
 class MeshError(FecontactError, ValueError):
-    """A mesh, or a file that should hold one, is not usable."""
+    """A mesh or mesh file is not usable."""
 
 
 class MissingLibraryError(FecontactError):
-    """A library of the system or an optional package is not installed; the message says how to."""
+    """A system library or optional package is missing; the message says how to install it."""
 
 
 class AnalysisError(FecontactError, ArithmeticError):
-    """A computation has no answer (no equilibrium, no convergence), and the message says why."""
+    """A computation failed (no equilibrium, no convergence); the message says why."""
 
 
 class ModelWarning(UserWarning):
-    """A result lies outside what the model holds for, and the message says where."""
+    """A result lies outside the range of validity of the model; the message says where."""
 
 
 def choices(names: Iterable[str]) -> str:
-    """The given names, sorted and quoted, for a message: ``'a', 'b'``, or ``none``."""
+    """Names sorted and quoted for a message: ``'a', 'b'``, or ``none``."""
     return ", ".join(f"'{name}'" for name in sorted(names)) or "none"
 
 
@@ -44,7 +44,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
-# Beyond these, squares and products of a few values leave the range of floating-point numbers.
+# Beyond these limits, products of a few values may overflow or underflow.
 _LEAST, _MOST = 1e-60, 1e60
 
 
@@ -81,7 +81,7 @@ def _is_number(value: object) -> bool:
 
 
 def shown(value: object) -> str:
-    """A value in one line, cut to a length that fits into a sentence."""
+    """One-line text of a value, truncated to fit into a sentence."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def held_back_interrupt() -> Iterator[Callable[[], None]]:
-    """A function that raises KeyboardInterrupt if Ctrl-C has come since the block began.
+    """Yield a function that raises KeyboardInterrupt if Ctrl-C was pressed within the block.
 
-    For libraries that call back into Python and swallow an exception that is raised there, or are
-    left in disorder by it. Where Ctrl-C is ignored it stays so.
+    For libraries that swallow exceptions raised in callbacks, or are left in an inconsistent state
+    by them. If Ctrl-C is ignored, it stays ignored.
     """
     came: list[int] = []
 

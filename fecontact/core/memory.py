@@ -10,17 +10,17 @@ _UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
 
 def available_memory() -> float:
-    """Memory that this process may still take [bytes]; infinite where that is not known.
+    """Memory still available to this process [bytes]; infinite if unknown.
 
-    The least of what the system has left, of what a container's limit leaves, and of the
-    process's own limit (``ulimit -v``).
+    The minimum of the free memory of the system, the limit of the container and the limit of the
+    process (``ulimit -v``).
     """
     found = [_system(), _container(Path("/sys/fs/cgroup")), _own_limit()]
     return max(min(found), 0.0)
 
 
 def require_memory(name: str, count: float, each: float, remedy: str = "") -> None:
-    """Raise :class:`InputError` if a number of things does not fit into memory.
+    """Raise :class:`InputError` if ``count`` items do not fit into memory.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ def require_memory(name: str, count: float, each: float, remedy: str = "") -> No
     count : float
         Its value.
     each : float
-        Memory for one of them [bytes].
+        Memory per item [bytes].
     remedy : str
-        What may be done besides taking fewer, for the end of the message.
+        Alternative to taking fewer, for the end of the message.
     """
     free = available_memory()
     if count * each <= free:
@@ -43,7 +43,7 @@ def require_memory(name: str, count: float, each: float, remedy: str = "") -> No
 
 
 def shown_memory(size: float) -> str:
-    """A size in bytes for people: ``1.6 GB``."""
+    """A size in bytes as text: ``1.6 GB``."""
     for unit, symbol in _UNITS:
         if size >= unit:
             return f"{size / unit:.3g} {symbol}"
@@ -51,12 +51,12 @@ def shown_memory(size: float) -> str:
 
 
 def shown_count(count: float) -> str:
-    """A number of things for people; the digits of very large ones are left out."""
+    """A count as text; very large ones in scientific notation."""
     return f"{count}" if abs(count) < 1e15 else f"{float(min(count, sys.float_info.max)):.3g}"
 
 
 def _system() -> float:
-    """What the operating system can give without swapping."""
+    """Memory that the operating system can provide without swapping."""
     try:
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):
@@ -70,7 +70,7 @@ def _system() -> float:
 
 
 def _container(folder: Path) -> float:
-    """What a memory limit of control groups (version 2) leaves; cached files can be dropped."""
+    """Memory left by the limit of control groups (version 2); file caches count as free."""
     try:
         limit = float((folder / "memory.max").read_text(encoding="ascii"))
         used = float((folder / "memory.current").read_text(encoding="ascii"))

@@ -1,7 +1,7 @@
-"""Progress bars: drawn on a terminal or in a notebook, and nowhere else.
+"""Progress bars on a terminal or in a notebook.
 
-A computation takes ``progress``, which is True for a bar of its own or a function that is told how
-far it is. Functions further down take the function alone, and draw nothing.
+Public functions take ``progress``: True for a progress bar, or a callback. Internal functions take
+the callback alone and draw nothing.
 """
 
 import sys
@@ -14,14 +14,14 @@ from typing import Any, Protocol
 
 from fecontact.core.errors import InputError
 
-PATIENCE = 2.0  # nothing is shown of work that takes less [s]
-_PAUSE = 0.1  # between two drawings [s]
+PATIENCE = 2.0  # shorter computations show no bar [s]
+_PAUSE = 0.1  # between two updates [s]
 
 
 class Show(Protocol):
-    """Told what is being done, which part of it is done (0 to 1), and what to write beside it.
+    """Callback that takes a title, the completed fraction (0 to 1) and a note beside the bar.
 
-    An empty note stands for the time that is left.
+    Without a note, the estimated remaining time is shown.
     """
 
     def __call__(self, what: str, part: float, note: str = "") -> None:
@@ -29,7 +29,7 @@ class Show(Protocol):
 
 
 class _Bar(Protocol):
-    """What a bar is drawn on."""
+    """Surface that a bar is drawn on."""
 
     def draw(self, what: str, part: float, note: str) -> None: ...
 
@@ -41,14 +41,14 @@ def shown(
     progress: bool | Callable[..., None] | None,
     bar: Callable[[], AbstractContextManager[Callable[..., None]]],
 ) -> Iterator[Callable[..., None] | None]:
-    """The function that a computation tells how far it is, for its argument ``progress``.
+    """Context with the callback for an argument ``progress``, or None.
 
     Parameters
     ----------
     progress : bool or callable, optional
-        True for a bar; a function is handed on as it is; else there is nobody to tell.
+        True for a bar; a function is used as it is; None or False for none.
     bar : callable
-        Makes the bar, as a context manager that gives the function to call.
+        Makes the bar, as a context manager that yields its callback.
 
     Raises
     ------
@@ -63,31 +63,31 @@ def shown(
     elif callable(progress):
         yield progress
     else:
-        raise InputError(f"progress = {progress!r} must be True, for a bar, or a function that is "
-                         f"told how far the work is.")
+        raise InputError(f"progress = {progress!r} must be True, for a bar, or a function to be "
+                         f"called with the progress made.")
 
 
 @contextmanager
 def progress_bar(
     what: str, total: float, start: float = 0.0
 ) -> Iterator[Callable[[float], None]]:
-    """A function that is told how far the work is, from ``start`` to ``total``."""
+    """Progress bar whose callback takes a value from ``start`` to ``total``."""
     with titled_bar() as show:
         yield lambda done: show(what, (done - start) / (total - start))
 
 
 @contextmanager
 def counting_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A function that is told how many things are done, and how many there are."""
+    """Progress bar whose callback takes the numbers of completed and of all items."""
     with titled_bar() as show:
         yield lambda done, total: show(what, done / total)
 
 
 @contextmanager
 def titled_bar() -> Iterator[Show]:
-    """A function that draws how far work is on a terminal or in a notebook, if there is one.
+    """Progress bar with changing titles, on a terminal or in a notebook, if there is one.
 
-    Nothing is drawn in the first two seconds, and nothing is left at the end.
+    It appears after two seconds and is removed at the end.
     """
     kind = _kind()
     bar: _Bar | None = None
@@ -118,12 +118,12 @@ def clock(seconds: float) -> str:
 
 
 def _left(part: float, first: float, passed: float) -> str:
-    """The time left, if work goes on as it did from its part ``first`` on."""
+    """Estimated remaining time, from the rate since the fraction ``first``."""
     return f"{clock(passed * (1.0 - part) / (part - first))} left" if part > first else ""
 
 
 def _kind() -> Callable[[], _Bar] | None:
-    """The bar that suits where the process writes to, or None if nobody would see it."""
+    """Class of the bar for the output of this process; None if it is not interactive."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     if getattr(shell, "kernel", None) is not None:
         return _NotebookBar
@@ -153,9 +153,9 @@ class _TerminalBar:
 
 
 class _NotebookBar:
-    """An output of a notebook's cell, in HTML and as text.
+    """An output of a notebook cell, in HTML and as text.
 
-    The bars of rich need ipywidgets in a notebook; this one asks only for IPython, which is there.
+    The bars of rich need ipywidgets in a notebook; this one needs only IPython.
     """
 
     def __init__(self) -> None:

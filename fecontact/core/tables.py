@@ -23,15 +23,15 @@ _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
 
 @dataclass(frozen=True)
 class Kinds:
-    """Classes whose subclasses are told apart in tables by the key ``law``.
+    """Base classes whose subclasses are selected in tables by the key ``law``.
 
     Attributes
     ----------
     is_kind : function
         Whether a type is one of these classes.
     law_class : function
-        The subclass of such a class by its name, which may be None; the last argument is where
-        the name stands, for messages.
+        The subclass of such a class by its name, which may be None; the last argument names the
+        place in the file, for messages.
     name_of : function
         The name of an instance of a subclass; None for a default and for all other instances.
     """
@@ -45,12 +45,12 @@ _kinds = Kinds(lambda hint: False, lambda kind, name, where: kind, lambda instan
 
 
 def register_kinds(kinds: Kinds) -> None:
-    """Let tables hold the subclasses of these classes by name."""
+    """Register the classes that tables refer to by name."""
     global _kinds
     _kinds = kinds
 
 
-_DEEPEST = 30  # tables and lists within each other; studies need less than ten
+_DEEPEST = 30  # nesting depth; studies need less than ten
 
 
 def parsed(text: str, title: str) -> dict[str, Any]:
@@ -59,7 +59,7 @@ def parsed(text: str, title: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it is not TOML, or more than a reader can be asked to take.
+        If it is not valid TOML, or nested too deeply.
     """
     try:
         return tomllib.loads(text.removeprefix("\ufeff"))
@@ -67,19 +67,19 @@ def parsed(text: str, title: str) -> dict[str, Any]:
         raise InputError(f"{title} is not valid TOML: {error}.") from None
     except RecursionError:
         raise _too_deep(title) from None
-    except ValueError:  # Python refuses to read whole numbers of thousands of digits
+    except ValueError:  # Python refuses integers of thousands of digits
         raise InputError(f"{title} holds a whole number of more than "
                          f"{sys.get_int_max_str_digits()} digits; write it as 1e300, and not "
                          f"above 1.8e308.") from None
 
 
 def require_readable(tables: Any, title: str) -> None:
-    """Check what no key may have: too many levels, names that are no texts, zero characters.
+    """Refuse tables nested too deeply, keys that are not strings, and null characters.
 
     Raises
     ------
     InputError
-        With the key in question.
+        Naming the key.
     """
     ahead: list[tuple[str, Any, int]] = [("", tables, 0)]
     while ahead:
@@ -105,8 +105,8 @@ def _require_no_zero(text: str, name: str, title: str) -> None:
 
 
 def _too_deep(title: str) -> InputError:
-    return InputError(f"{title} has tables or lists within each other more than {_DEEPEST} levels "
-                      f"deep; studies need less than ten.")
+    return InputError(f"{title} has tables or lists nested more than {_DEEPEST} levels deep; "
+                      f"studies need less than ten.")
 
 
 def from_table(cls: type[T], table: Any, where: str) -> T:
@@ -121,7 +121,7 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
         Keys and values; keys with defaults may be missing. Whole numbers serve as floats, lists
         as tuples.
     where : str
-        Where the table stands, for messages: ``study.toml: [ground]``.
+        Name of the table in messages: ``study.toml: [ground]``.
 
     Raises
     ------
@@ -156,15 +156,14 @@ def _hints(cls: Any) -> dict[str, Any]:
 
 
 def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
-    """The fields of a dataclass as a table that TOML can hold.
+    """The fields of a dataclass as a table for TOML.
 
     Parameters
     ----------
     instance : Any
         A dataclass instance.
     defaults : bool
-        Whether fields that have their default value are in the table; those that are None never
-        are.
+        Whether to include fields that have their default value; those that are None are left out.
     """
     name = _kinds.name_of(instance)
     table: dict[str, Any] = {} if name is None else {"law": name}
@@ -184,7 +183,7 @@ def require_known(key: str, valid: Mapping[str, Any] | Sequence[str], where: str
 
 
 def convert(value: Any, hint: Any, where: str, key: str) -> Any:
-    """A value of a table as the type that a field of a dataclass asks for.
+    """Convert a value of a table to the type of a field.
 
     Raises
     ------
@@ -203,7 +202,7 @@ def convert(value: Any, hint: Any, where: str, key: str) -> Any:
 
 @contextmanager
 def located(where: str, *titles: str) -> Iterator[None]:
-    """Put the place before the message of an error, instead of the titles that it begins with."""
+    """Begin the message of an error with ``where``, in place of the given titles."""
     try:
         yield
     except FecontactError as error:
@@ -215,7 +214,7 @@ def located(where: str, *titles: str) -> Iterator[None]:
 
 
 def shown(value: Any) -> str:
-    """A value as it would stand in a file, cut to a length that fits into a sentence."""
+    """A value as written in a file, truncated to fit into a sentence."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     try:
@@ -232,7 +231,7 @@ def shown(value: Any) -> str:
 
 
 def described(hint: Any, *, plural: bool = False) -> str:
-    """What a type is called in a message: ``a number or a list of numbers``."""
+    """Description of a type in a message: ``a number or a list of numbers``."""
     words = list(dict.fromkeys(
         word for option in _options(hint) if option is not types.NoneType
         for word in _words(option, plural)))
@@ -241,13 +240,13 @@ def described(hint: Any, *, plural: bool = False) -> str:
 
 
 class _MismatchError(Exception):
-    """A value is not of the type asked for."""
+    """A value is not of the required type."""
 
 
 def _converted(value: Any, hint: Any, where: str) -> Any:
     options = _options(hint)
     if isinstance(value, Mapping):
-        # Of several tables that may stand here, the one that shares the most keys is meant.
+        # Of several possible tables, take the one that shares the most keys.
         options = sorted(options, key=lambda option: -_shared_keys(option, value))
     for option in options:
         try:
@@ -320,7 +319,7 @@ def _words(hint: Any, plural: bool) -> list[str]:
 
 
 def plain(value: Any) -> Any:
-    """A value as TOML can hold it: dataclasses and mappings as tables, sequences as lists."""
+    """A value for TOML: dataclasses and mappings as tables, sequences as lists."""
     if is_dataclass(value) and not isinstance(value, type):
         return to_table(value)
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""Units of parameters, numbers in units that suit their size, and objects in short."""
+"""Units of parameters, numbers with SI prefixes, and short representations of objects."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -20,7 +20,7 @@ _UNITS = {
     "J": ((1e-9, "nJ"), (1e-6, "µJ"), (1e-3, "mJ"), (1.0, "J"), (1e3, "kJ")),
 }
 
-_LONGEST = 360  # characters of an object in a line
+_LONGEST = 360  # characters of a one-line representation
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Unit:
 
 
 def suitable_unit(size: float, unit: str) -> tuple[float, str]:
-    """The largest unit that a value is not below, as its factor and its symbol.
+    """The largest prefixed unit that does not exceed a value, as factor and symbol.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
 
 
 def round_125(value: float) -> float:
-    """The largest 1, 2 or 5 times a power of ten that is not above a positive value."""
+    """The largest of 1, 2 or 5 times a power of ten that does not exceed a positive value."""
     power = 10.0 ** math.floor(math.log10(value))
     digit = value / power
     return power * (5.0 if digit >= 5.0 else 2.0 if digit >= 2.0 else 1.0)
@@ -68,12 +68,12 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def count(number: int, noun: str) -> str:
-    """A number of things: ``1 node``, ``2 nodes``."""
+    """A count with its noun: ``1 node``, ``2 nodes``."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def span(values: Iterable[float], unit: str = "") -> str:
-    """Smallest and largest of some numbers: ``0.3 ... 9.6 Hz``; one where they agree."""
+    """Smallest and largest of some numbers: ``0.3 ... 9.6 Hz``; one if they agree."""
     known = [float(value) for value in values if math.isfinite(value)]
     if not known:
         return "none"
@@ -82,7 +82,7 @@ def span(values: Iterable[float], unit: str = "") -> str:
 
 
 def listed(items: Sequence[str], most: int = 4) -> str:
-    """The first of some texts, and how many more there are: ``a, b and 3 more``."""
+    """The first of some strings and the number of the others: ``a, b and 3 more``."""
     shown = ", ".join(items[:most])
     return f"{shown} and {len(items) - most} more" if len(items) > most else shown or "none"
 
@@ -90,7 +90,7 @@ def listed(items: Sequence[str], most: int = 4) -> str:
 def html_table(
     title: str, rows: Iterable[Sequence[str]], headings: Sequence[str] = ()
 ) -> str:
-    """A table for a notebook, its first column as headings of the rows; texts are escaped."""
+    """A table for a notebook, its first column as row headings; text is escaped."""
     def row(kinds: Iterable[str], texts: Iterable[str]) -> str:
         return "<tr>" + "".join(f'<{kind} style="text-align: left">{escape(text)}</{kind}>'
                                 for kind, text in zip(kinds, texts, strict=False)) + "</tr>"
@@ -101,13 +101,13 @@ def html_table(
 
 
 class Summarised:
-    """What a console shows in a line and a notebook as a small table.
+    """Base class of objects shown as one line in a console and as a small table in a notebook.
 
-    Subclasses say in :meth:`summary` what matters; dataclasses among them have ``repr=False``.
+    Subclasses define :meth:`summary`; dataclasses among them have ``repr=False``.
     """
 
     def summary(self) -> list[tuple[str, str]]:
-        """What matters about the object, as pairs of a name and a text."""
+        """The main properties of the object, as pairs of name and text."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

@@ -13,17 +13,16 @@ from fecontact.core.errors import InputError, nearest
 
 
 def user_module(file: str | Path, where: str = "") -> ModuleType:
-    """The module in a Python file, as the file is at this time.
+    """Load a Python file as a module.
 
-    It is loaded once for each time that the file was written, and found by pickling under
-    :func:`module_name`.
+    The module is reloaded when the file has changed; pickle finds it under :func:`module_name`.
 
     Parameters
     ----------
     file : path
         The file.
     where : str
-        What names the file, before the messages: ``study.toml: [friction]: ``.
+        Prefix of messages: ``study.toml: [friction]: ``.
 
     Raises
     ------
@@ -63,7 +62,7 @@ def user_function(file: Path, name: str) -> Callable[[Any], float]:
 
 
 def module_name(file: str | Path) -> str:
-    """The name under which the module of a file is kept."""
+    """Name of the module of a file in ``sys.modules``."""
     return f"fecontact_user_{re.sub(r'[^0-9a-zA-Z]', '_', str(Path(file).resolve()))}"
 
 

@@ -31,15 +31,15 @@ def contact_groups(
     body: ElasticBody, boundaries: str | Sequence[str],
     counts: Literal["all"] | int | Sequence[int | Literal["all"]],
 ) -> ContactNodes:
-    """Contact nodes on one or several boundaries, one boundary after the other.
+    """Contact nodes on one or several boundaries, in the order of the boundaries.
 
-    ``counts`` holds for each boundary, or has one entry for each; see :func:`contact_nodes`.
+    ``counts`` is common to all boundaries or has one entry per boundary; see :func:`contact_nodes`.
 
     Raises
     ------
     InputError
-        Also if a boundary stands twice, two of them share an edge, or there are more counts than
-        boundaries.
+        As :func:`contact_nodes`, or if a boundary is named twice, two of them share an edge, or the
+        number of counts differs from that of the boundaries.
     """
     import scipy.sparse as sp
 
@@ -53,12 +53,12 @@ def contact_groups(
     if not names or len(set(names)) < len(names):
         raise InputError(f"contact = {boundaries!r} must name boundaries, each once.")
     if len(each) != len(names):
-        raise InputError(f"contact_nodes = {counts!r} must be one for all boundaries, or one for "
-                         f"each of the {len(names)}.")
+        raise InputError(f"contact_nodes = {counts!r} must be one entry for all boundaries, or "
+                         f"one for each of the {len(names)}.")
     edges = np.concatenate([np.sort(body.mesh.boundary(name), axis=1) for name in names])
     if len(np.unique(edges, axis=0)) < len(edges):
-        raise InputError(f"The contact boundaries {choices(names)} share edges; a place of the "
-                         f"body's outline can belong to one contact group alone.")
+        raise InputError(f"The contact boundaries {choices(names)} share edges; an edge can "
+                         f"belong to only one contact group.")
     faces = [contact_nodes(body, name, count)
              for name, count in zip(names, each, strict=True)]
     return ContactNodes(
@@ -72,19 +72,20 @@ def contact_groups(
 def contact_nodes(
     body: ElasticBody, boundary: str, count: int | Literal["all"]
 ) -> ContactNodes:
-    """Contact nodes on a named boundary, in the order in which they lie along it.
+    """Contact nodes on a named boundary, in their order along it.
 
-    With a number, the boundary is cut into that many segments of equal length (per connected
-    part, in proportion to its length); a node stands for its segment, moves with the segment's
-    mean displacement and loads it with a uniform traction. With 'all', every displacement node
-    of the boundary is one, with the integral of its shape function as tributary length.
+    With a number, the boundary is cut into that many segments of equal length (distributed over
+    connected parts in proportion to their length); a node represents its segment, moves with the
+    segment's mean displacement and loads it with a uniform traction. With 'all', every
+    displacement node of the boundary is a contact node, with the integral of its shape function as
+    tributary length.
 
     Raises
     ------
     MeshError
         If the mesh has no such boundary.
     InputError
-        If the boundary faces up, or has fewer nodes than asked for.
+        If the boundary faces up, or has fewer nodes than requested.
     """
     import scipy.sparse as sp
 
@@ -135,7 +136,7 @@ def _check_faces_down(body: ElasticBody, boundary: str) -> None:
 
 
 def _chains(edges: Integers) -> list[Integers]:
-    """The edges as runs (k, 2) of successive ones, each run from one end to the other."""
+    """The edges as chains (k, 2) of successive edges, each from one end to the other."""
     neighbours: dict[int, list[int]] = {}
     for index, edge in enumerate(edges.tolist()):
         for node in edge:
@@ -169,7 +170,7 @@ def _lengths(body: ElasticBody, nodes: Integers) -> Array:
 
 
 def _shared_out(count: int, totals: Array) -> list[int]:
-    """Whole numbers of sum ``count``, at least one each, in proportion to ``totals``."""
+    """Integers of sum ``count``, at least one each, in proportion to ``totals``."""
     shares = np.ones(len(totals), dtype=int)
     for _ in range(count - len(totals)):
         shares[np.argmax(totals / shares)] += 1

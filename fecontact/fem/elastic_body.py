@@ -22,7 +22,7 @@ from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.supports import check_supports, expansion, fixed_dofs, hinges
 
-# Unknowns of a cell by its corners and the degree, and memory for each to find modes [bytes].
+# Unknowns of a cell by number of corners and degree, and memory per unknown for modes [bytes].
 _UNKNOWNS = {(3, 1): 1, (3, 2): 4, (4, 1): 2, (4, 2): 8}
 _BYTES = {3: 7e3, 4: 9.5e3}
 
@@ -59,7 +59,7 @@ class Material:
 
     @classmethod
     def named(cls, name: str) -> "Material":
-        """'steel' or 'aluminium' with handbook values; InputError lists the names there are."""
+        """'steel' or 'aluminium' with handbook values; InputError for other names."""
         require_kind("Material.named", str, name=name)
         if name not in _MATERIALS:
             raise InputError(f"There is no material '{name}'"
@@ -76,7 +76,7 @@ _MATERIALS = {"steel": (2.1e11, 0.3, 7850.0), "aluminium": (7.0e10, 0.33, 2700.0
 class ElasticBody(Summarised):
     """A plane linear elastic body of quadratic (or linear) finite elements.
 
-    Displacement nodes are the mesh nodes, then the middles of the edges, then those of the
+    Displacement nodes are the mesh nodes, then the mid-points of the edges, then the centres of the
     quadrilaterals; degree of freedom 2 k is the displacement of node k in x, 2 k + 1 that in y.
 
     Parameters
@@ -90,8 +90,8 @@ class ElasticBody(Summarised):
     degree : 2 or 1
         Quadratic (P2, Q2) or linear (P1, Q1) displacements.
     fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
-        Supports on named boundaries or points of the mesh: displacements held at zero, or a
-        hinge, whose nodes (those of the boundary of a hole, say) turn rigidly about their centre.
+        Supports on named boundaries or points of the mesh: displacements fixed at zero, or a
+        hinge, whose nodes (such as the boundary of a hole) rotate rigidly about their centre.
 
     Raises
     ------
@@ -126,8 +126,8 @@ class ElasticBody(Summarised):
         check_supports(self.mesh, self.fixed)
         pieces = _pieces(self.mesh)
         if pieces > 1:
-            raise MeshError(f"The mesh falls into {pieces} pieces that share no node; a body must "
-                            f"be one piece.")
+            raise MeshError(f"The mesh consists of {pieces} pieces that share no node; a body must "
+                            f"be connected.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Mesh, material, kind of elements and supports."""
@@ -168,8 +168,8 @@ class ElasticBody(Summarised):
         import scipy.sparse as sp
         from skfem import BilinearForm
 
-        # The weak form component by component: three scalar forms of 9 x 9 pairs take a fraction
-        # of the time of one vector form of 18 x 18 pairs, most of whose products are zero.
+        # Three scalar forms of 9 x 9 pairs are much faster than one vector form of 18 x 18 pairs,
+        # most of whose products are zero.
         gradients = [
             BilinearForm(lambda u, v, w, a=a, b=b: v.grad[a] * u.grad[b]).assemble(self.basis)
             for a, b in ((0, 0), (1, 1), (0, 1))
@@ -200,7 +200,7 @@ class ElasticBody(Summarised):
 
     @cached_property
     def gradients(self) -> tuple[Any, Any]:
-        """Derivatives to x and y at the nodes, sparse (N, N): means of the adjoining elements."""
+        """Derivatives in x and y at the nodes, sparse (N, N): means of the adjacent elements."""
         return _nodal_gradients(self.basis)
 
     @property
@@ -215,7 +215,7 @@ class ElasticBody(Summarised):
 
     @cached_property
     def fixed_dofs(self) -> Integers:
-        """Degrees of freedom held at zero by the supports, ascending."""
+        """Degrees of freedom fixed at zero by the supports, ascending."""
         return fixed_dofs(self.fixed, self._supported)
 
     @cached_property
@@ -225,12 +225,12 @@ class ElasticBody(Summarised):
 
     @cached_property
     def hinges(self) -> list[tuple[Integers, Array]]:
-        """Nodes and centre (2,) [m] of each boundary that turns rigidly about its centre."""
+        """Nodes and centre (2,) [m] of each boundary that rotates rigidly about its centre."""
         return hinges(self.mesh, self.nodes, self.fixed, self._supported)
 
     @cached_property
     def _supported(self) -> dict[str, Integers]:
-        # Meshes may hold a group both ways; only the boundary has the nodes in the middle of edges.
+        # A group may be both points and a boundary; only the boundary has mid-side nodes.
         boundaries, points = self.mesh.boundaries, self.mesh.points
         return {name: np.unique(self.edge_nodes(boundaries[name])) if name in boundaries
                 else np.asarray(points[name]) for name in self.fixed}
@@ -259,10 +259,9 @@ def _pieces(mesh: Mesh) -> int:
 
 
 def _nodal_gradients(basis: Any) -> tuple[Any, Any]:
-    """Derivatives to x and to y at the nodes, sparse (N, N).
+    """Derivatives in x and y at the nodes, sparse (N, N).
 
-    Each is the mean over the adjoining elements, weighted by their areas, of the gradient that
-    the element has at the node.
+    Each is the area-weighted mean of the gradients of the adjacent elements at the node.
     """
     import scipy.sparse as sp
 

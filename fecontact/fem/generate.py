@@ -21,9 +21,9 @@ from fecontact.fem.shapes import Beam, Block, Grid, Hole, Pendulum, Shape, grid_
 
 
 class Rim:
-    """Curves around a hole: arcs of an eighth, and lines from their ends to the rectangles'.
+    """Curves around a hole: arcs of 45 degrees, and lines from their ends to the rectangles.
 
-    Places on the rim go by their direction from the centre, (1, 0), (1, 1), (0, 1), ...
+    Points on the rim are named by their direction from the centre, (1, 0), (1, 1), (0, 1), ...
     """
 
     def __init__(self, geo: Any, grid: Grid, hole: Hole, element_size: float,
@@ -40,11 +40,11 @@ class Rim:
         self.spokes: dict[tuple[int, int], int] = {}
 
     def touches(self, i: int, j: int) -> bool:
-        """Whether the hole takes a corner of the rectangle (i, j)."""
+        """Whether the hole cuts a corner of the rectangle (i, j)."""
         return i in (self.column - 1, self.column) and j in (self.row - 1, self.row)
 
     def side(self, i: int, j: int) -> tuple[int, int]:
-        """1 for a rectangle right of the centre, and above it; else 0."""
+        """Two indices: 1 for a rectangle right of, and above, the centre, else 0."""
         return i - self.column + 1, j - self.row + 1
 
     def loops(self, i: int, j: int, upright: int, level: int,
@@ -84,7 +84,7 @@ class Rim:
 __all__ = ["MAX_CELLS", "Beam", "Block", "Pendulum", "Shape", "generate"]
 
 MAX_CELLS = 2_000_000
-_BYTES = 3000.0  # memory for a cell while Gmsh makes it
+_BYTES = 3000.0  # memory per cell during meshing
 
 _SIGACTION_BYTES = 512  # more than struct sigaction has on any system
 _GMSH_LOCK = threading.Lock()  # Gmsh has one global state
@@ -104,12 +104,12 @@ def generate(shape: Shape) -> Mesh:
     Parameters
     ----------
     shape : Beam, Block or Pendulum
-        The body, with the size and kind of its elements.
+        The body, with size and kind of its elements.
 
     Returns
     -------
     Mesh
-        With the boundaries and points that the shape names; its points are nodes exactly there.
+        With the named boundaries and points of the shape; its points are nodes.
 
     Raises
     ------
@@ -120,8 +120,8 @@ def generate(shape: Shape) -> Mesh:
 
     Notes
     -----
-    May be called from any thread, and while Gmsh is in use: the caller's models, options and
-    signal handlers are left as they are.
+    May be called from any thread, and while Gmsh is in use: models, options and signal handlers of
+    the caller are restored.
     """
     if not isinstance(shape, Shape):
         raise InputError(f"generate: {shape!r} is not a shape; give a Beam, a Block or a Pendulum.")
@@ -187,7 +187,7 @@ def _mesh(gmsh: Any, grid: Grid, shape: Shape) -> Mesh:
     cells = np.concatenate([
         gmsh.model.mesh.getElementsByType(cell_type, surface)[1] for surface in surfaces
     ])
-    # The centre of a hole is a node of Gmsh's that no cell uses.
+    # Gmsh makes the centre of a hole a node, which no cell uses.
     order = np.argsort(tags)
     order = order[np.isin(tags[order], cells)]
     tags = tags[order]
@@ -214,10 +214,10 @@ def _mesh(gmsh: Any, grid: Grid, shape: Shape) -> Mesh:
 
 @contextmanager
 def _signals_as_before() -> Iterator[None]:
-    """Leave signals as they are: Gmsh sets several back to their defaults as it starts.
+    """Restore the signal handlers that Gmsh resets to their defaults when it starts.
 
-    A closed pipe would end the process without a word, and so would SIGTERM. By the C library,
-    since Python sets signals in the main thread alone.
+    Otherwise a closed pipe or SIGTERM would end the process silently. Calls the C library, since
+    Python sets signal handlers in the main thread only.
     """
     action = None if os.name == "nt" else getattr(ctypes.CDLL(None), "sigaction", None)
     if action is None:
@@ -237,10 +237,10 @@ def _signals_as_before() -> Iterator[None]:
 
 @contextmanager
 def _gmsh_session(gmsh: Any) -> Iterator[None]:
-    """An own, quiet Gmsh model that leaves nothing behind."""
+    """A separate, quiet Gmsh model that is removed at the end."""
     mine = not gmsh.isInitialized()
     if mine:
-        # Gmsh would take SIGINT away from Python, and only the main thread may set a handler.
+        # Keep SIGINT with Python; only the main thread may set a handler.
         with _signals_as_before():
             gmsh.initialize(readConfigFiles=False, interruptible=False)
     options: dict[str, float] = {}

@@ -11,7 +11,7 @@ from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
 
-_FLAT = 1e-12  # area of a degenerate cell, as part of its squared sides
+_FLAT = 1e-12  # area of a degenerate cell, relative to its squared sides
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -23,7 +23,7 @@ class Mesh(Summarised):
     nodes : (N, 2) array
         Coordinates x (tangential to the ground) and y (normal to it, into the body) [m].
     cells : (M, 3) or (M, 4) integer array
-        Corner nodes of each cell, counter-clockwise; clockwise cells are turned round.
+        Corner nodes of each cell, counter-clockwise; clockwise cells are reversed.
     boundaries : mapping of name to (k, 2) integer array
         Edges, as pairs of nodes; each must be an edge of exactly one cell.
     points : mapping of name to integer or (k,) integer array
@@ -32,9 +32,8 @@ class Mesh(Summarised):
     Raises
     ------
     MeshError
-        For arrays of another shape, nodes that do not exist, cells without area or on one
-        another, nodes that no cell uses, an empty group, or a boundary edge that is not on the
-        outline or is named twice.
+        For arrays of wrong shape, unknown nodes, degenerate or overlapping cells, nodes without a
+        cell, an empty group, or a boundary edge that is not on the outline or is named twice.
     """
 
     nodes: Array
@@ -90,7 +89,7 @@ class Mesh(Summarised):
         if len(crowded):
             raise MeshError(
                 f"The edge between mesh nodes {crowded[0][0]} and {crowded[0][1]} belongs to more "
-                f"than two cells; remove cells that lie on one another."
+                f"than two cells; remove overlapping cells."
             )
         outline = {tuple(edge) for edge in np.sort(self.outline, axis=1).tolist()}
         for name, edges in boundaries.items():
@@ -115,7 +114,7 @@ class Mesh(Summarised):
 
     @cached_property
     def _cells_at_edges(self) -> Integers:
-        """For each row of ``_sides`` the number of cells that have this edge."""
+        """Number of cells at the edge of each row of ``_sides``."""
         _, edge, count = np.unique(
             np.sort(self._sides, axis=1), axis=0, return_inverse=True, return_counts=True
         )
@@ -123,10 +122,10 @@ class Mesh(Summarised):
         return cells
 
     def refined(self) -> "Mesh":
-        """The mesh with every cell cut into four; named boundaries and points keep their names.
+        """The mesh with every cell cut into four, and the same named boundaries and points.
 
-        Nodes keep their numbers; those of the edges' middles follow, then, for quadrilaterals,
-        those of the cells' centres.
+        Nodes keep their numbers; the mid-points of the edges follow, then the centres of
+        quadrilaterals.
         """
         count, corners = len(self.nodes), self.cells.shape[1]
         edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2)
@@ -177,7 +176,7 @@ class Mesh(Summarised):
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
     def boundary(self, name: str) -> Integers:
-        """Edges (k, 2) of a named boundary; MeshError lists the names there are."""
+        """Edges (k, 2) of a named boundary; MeshError for an unknown name."""
         if name not in self.boundaries:
             raise MeshError(
                 f"The mesh has no boundary named '{name}'{nearest(name, self.boundaries)}; "

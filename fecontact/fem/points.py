@@ -1,8 +1,8 @@
 """Points of interest: rows that map nodal displacements to a point's displacement and rotation.
 
-Every function returns rows (3, 2 N), sparse: displacement x, y and rotation phi of the point
-from the displacements of the body's nodes. Transposed, they spread a force at the point over
-the nodes, so that both do the same virtual work.
+Every function returns sparse rows (3, 2 N): displacement x, y and rotation phi of the point as
+linear functions of the nodal displacements. Their transpose distributes a force at the point over
+the nodes, with the same virtual work.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 @dataclass(frozen=True)
 class Patch:
-    """The part of the outline within a distance of a place; it moves as it does on average.
+    """The part of the outline within a distance of a place, with its mean motion.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Patch:
     Raises
     ------
     InputError
-        For another radius, or a place that is no pair of finite numbers.
+        For a radius that is not positive, or a place that is not a pair of finite numbers.
     """
 
     at: Annotated[str | tuple[float, float], Unit("m")]
@@ -58,7 +58,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Parts of straight edges: nodes (k, degree + 1), from s = start to s = end in 0 ... 1."""
+    """Parts of straight edges: nodes (k, degree + 1), from s = start to s = end in [0, 1]."""
 
     nodes: Integers
     start: Array
@@ -100,7 +100,7 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
 
 
 def node_rows(body: ElasticBody, node: int) -> Rows:
-    """Rows of a displacement node; its rotation is that of the adjoining elements there."""
+    """Rows of a displacement node; its rotation is the mean of the adjacent elements."""
     return Rows(node_matrix(body, np.array([node])), body.nodes[node])
 
 
@@ -198,7 +198,7 @@ def _centre(body: ElasticBody, at: str | tuple[float, float], name: str) -> Arra
 
 
 def _node_set_rows(body: ElasticBody, nodes: Integers) -> Rows:
-    """Rows of several nodes: their best-fitting rigid motion, all weighted alike."""
+    """Rows of several nodes: their best-fitting rigid motion, with equal weights."""
     import scipy.sparse as sp
 
     centre = body.nodes[nodes].mean(axis=0)

@@ -16,12 +16,12 @@ from fecontact.core.units import Unit
 
 Element = Literal["quadrilateral", "triangle"]
 
-SAME = 1e-9  # lengths that differ by less than this part of the body's size are equal
+SAME = 1e-9  # relative to the body's size: lengths that differ by less are equal
 
 
 @dataclass(frozen=True)
 class Beam:
-    """A rectangle [0, length] x [0, height] that lies on the ground with its whole bottom.
+    """A rectangle [0, length] x [0, height] whose whole bottom is the contact face.
 
     Boundaries ``contact`` (bottom), ``left``, ``right``, ``top``; points ``B`` (left end,
     mid-height) and ``C`` (top, mid-span).
@@ -53,13 +53,13 @@ class Beam:
 
 @dataclass(frozen=True)
 class Block:
-    """A rectangle [0, width] x [0, height] that touches the ground with a part of its bottom.
+    """A rectangle [0, width] x [0, height] with part of its bottom as contact face.
 
     Boundaries ``contact`` (centred part of the bottom), ``bottom`` (the rest of it, if any),
     ``left``, ``right``, ``top``; points ``B`` (left side, at ``drive_height``) and ``C`` (top,
-    middle). The default with a thickness of 0.1 m and steel has the mass of the friction
-    oscillator, 5.6 kg. A dragged block tips over when ``contact_length`` is below twice the
-    friction coefficient times ``drive_height``.
+    middle). The default, of steel and 0.1 m thick, has the mass of the friction oscillator, 5.6 kg.
+    A dragged block tips over if ``contact_length`` is below twice the friction coefficient times
+    ``drive_height``.
 
     Parameters
     ----------
@@ -101,23 +101,23 @@ class Block:
 
 @dataclass(frozen=True)
 class Pendulum:
-    """A horizontal arm, hinged at its left end, with a rectangular bob at the other.
+    """A horizontal arm, hinged at its left end, with a rectangular bob at its right end.
 
     The arm runs along x from the hinge at x = 0; the bob is centred on the arm's end,
-    x = ``arm_length``, and reaches from y = 0 to ``bob_height``, equally far above and below the
-    arm. The arm's mid-line is at y = ``bob_height`` / 2.
+    x = ``arm_length``, and extends from y = 0 to ``bob_height``. The mid-line of the arm is at
+    y = ``bob_height`` / 2.
 
     Boundaries ``contact`` (bottom of the bob), ``bob_top``, ``bob_left`` (above and below the
     arm), ``bob_right``, ``arm_top``, ``arm_bottom``, ``arm_left``; points ``pivot`` (the hinge),
     ``B`` (on the mid-line, ``drive_distance`` from the hinge) and ``C`` (top of the bob, middle).
-    With a ``hinge_radius`` the arm reaches half its height beyond the hinge, and ``pivot`` is the
-    boundary of a hole, to be held as a 'hinge'. With a ``contact_length`` the rest of the bob's
-    bottom is ``bob_bottom``.
+    With a ``hinge_radius`` the arm extends half its height beyond the hinge, and ``pivot`` is the
+    boundary of a hole, to be supported as a 'hinge'. With a ``contact_length`` the rest of the
+    bob's bottom is ``bob_bottom``.
 
-    The default is the aluminium pendulum of the impact oscillator: an arm of 0.30 m x 7.7 mm,
-    which weighs 0.122 kg at a thickness of 19.6 mm and 2700 kg/m^3. The bob is a square whose
-    area in excess of the arm's end, bob_width bob_height - bob_width arm_height / 2, is that of
-    0.051 kg, so that the mass reduced to the contact is 0.122 kg / 3 + 0.051 kg = 0.092 kg.
+    The default is the aluminium pendulum of the impact oscillator: an arm of 0.30 m x 7.7 mm, of
+    0.122 kg at a thickness of 19.6 mm and 2700 kg/m^3. The square bob adds 0.051 kg to the end of
+    the arm (area bob_width bob_height - bob_width arm_height / 2), so that the mass reduced to the
+    contact is 0.122 kg / 3 + 0.051 kg = 0.092 kg.
 
     Parameters
     ----------
@@ -130,8 +130,7 @@ class Pendulum:
     hinge_radius : float
         Radius of the hole at the hinge, below half of ``arm_height``; zero for none [m].
     contact_length : float or None
-        Length of the middle part of the bob's bottom that can touch the ground [m]; None for all
-        of it.
+        Length of the contact face, centred on the bob's bottom [m]; None for the whole bottom.
     element_size : float
         Longest side of a quadrilateral, and of the legs of a (right-angled) triangle [m].
     element : "quadrilateral" or "triangle"
@@ -139,9 +138,8 @@ class Pendulum:
     Raises
     ------
     InputError
-        For a value that is not a finite number above zero, a bob that is not higher than the
-        arm or reaches the hinge, a drive beyond the bob, a contact longer than it, or another
-        element.
+        For a value that is not a finite number above zero, a bob that is not higher than the arm or
+        reaches the hinge, a drive beyond the bob, a contact longer than it, or another element.
     """
 
     arm_length: Annotated[float, Unit("m")] = 0.3
@@ -196,10 +194,10 @@ def _require_at_most(owner: str, name: str, value: float, limit_name: str, limit
 
 @dataclass(frozen=True)
 class Grid:
-    """Lines that cut the plane into rectangles, which of these are filled, and the names.
+    """Grid lines, the rectangles between them that are filled, and their names.
 
-    ``part(x, y)`` is the name of the part of the body around a point, or None outside;
-    ``side(part, facing, x)`` names the outline of a rectangle of that part with its middle at x.
+    ``part(x, y)`` is the name of the part of the body at a point, or None outside;
+    ``side(part, facing, x)`` names a side, centred at x, of a rectangle of that part.
     """
 
     x: list[float]
@@ -218,7 +216,7 @@ class Grid:
                     yield i, j, part
 
     def divisions(self, element_size: float) -> tuple[Array, Array]:
-        """Elements along each interval of the lines x and y."""
+        """Number of elements in each interval of the grid lines in x and y."""
         x, y = (np.clip(np.ceil(np.diff(lines) / max(element_size, 1e-99) - 1e-6), 1.0, 1e99)
                 for lines in (self.x, self.y))
         return x, y
@@ -226,9 +224,9 @@ class Grid:
 
 @dataclass(frozen=True)
 class Hole:
-    """A round hole, named as a boundary, about a crossing of grid lines.
+    """A round hole, named as a boundary, centred at a crossing of grid lines.
 
-    Of each of the four rectangles around it, what is left is cut into two along its diagonal.
+    The rest of each of the four rectangles around it is cut into two along its diagonal.
     """
 
     name: str
@@ -298,7 +296,7 @@ def grid_of(shape: Shape) -> Grid:
 
 
 def _lines(first: float, last: float, *between: float) -> list[float]:
-    """Sorted grid lines; those that all but coincide with an earlier argument are left out."""
+    """Sorted grid lines without those that nearly coincide with an earlier argument."""
     kept = [first, last]
     for value in between:
         if all(abs(value - line) > SAME * (last - first) for line in kept):

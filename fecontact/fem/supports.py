@@ -13,7 +13,7 @@ KINDS = ("x", "y", "xy", "hinge")
 
 
 def check_supports(mesh: Mesh, fixed: Mapping[str, str]) -> None:
-    """Raise unless the supports name boundaries or points of the mesh and known kinds."""
+    """Raise unless all supports name boundaries or points of the mesh, and known kinds."""
     known = {*mesh.boundaries, *mesh.points}
     for name, kind in fixed.items():
         if name not in known:
@@ -25,9 +25,9 @@ def check_supports(mesh: Mesh, fixed: Mapping[str, str]) -> None:
 
 
 def fixed_dofs(fixed: Mapping[str, str], supported: Mapping[str, Integers]) -> Integers:
-    """Degrees of freedom held at zero, ascending.
+    """Degrees of freedom fixed at zero, ascending.
 
-    ``fixed`` gives the kind of each support by its name, ``supported`` its displacement nodes.
+    ``fixed`` maps the name of each support to its kind, ``supported`` to its displacement nodes.
     """
     held: list[Integers] = [np.empty(0, np.int64)]
     for name, kind in fixed.items():
@@ -41,7 +41,7 @@ def fixed_dofs(fixed: Mapping[str, str], supported: Mapping[str, Integers]) -> I
 def hinges(
     mesh: Mesh, nodes: Array, fixed: Mapping[str, str], supported: Mapping[str, Integers]
 ) -> list[tuple[Integers, Array]]:
-    """Nodes and centre (2,) [m] of each boundary that turns rigidly about its centre.
+    """Nodes and centre (2,) [m] of each boundary that rotates rigidly about its centre.
 
     ``nodes`` (N, 2) are the places of the displacement nodes [m].
     """
@@ -52,7 +52,7 @@ def hinges(
 def expansion(nodes: Array, fixed_dofs: Integers, turning: list[tuple[Integers, Array]]) -> Any:
     """All degrees of freedom from the free ones, sparse (2 N, f).
 
-    The free ones are the displacements that no support holds, then one angle per hinge.
+    The free ones are the displacements without a support, then one angle per hinge.
     """
     import scipy.sparse as sp
 
@@ -60,7 +60,7 @@ def expansion(nodes: Array, fixed_dofs: Integers, turning: list[tuple[Integers, 
     taken = [np.concatenate([2 * held, 2 * held + 1]) for held, _ in turning]
     held = np.concatenate([fixed_dofs, *taken]).astype(np.int64)
     if len(np.unique(held)) < len(held):
-        raise InputError("Two supports hold the same node, one of them a hinge; separate them.")
+        raise InputError("Two supports share a node, and one of them is a hinge; separate them.")
     free = np.setdiff1d(np.arange(size), held)
     rows, columns, values = [free], [np.arange(len(free))], [np.ones(len(free))]
     for index, (around, centre) in enumerate(turning):

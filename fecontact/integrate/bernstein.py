@@ -5,9 +5,9 @@ r"""Polynomials over a step in Bernstein form, whose coefficients bound them.
     p(s) = \sum_k b_k \binom{n}{k} s^k (1 - s)^{n - k}, \qquad
     \min_k b_k \le p(s) \le \max_k b_k \quad (0 \le s \le 1)
 
-The interpolant of a step is a polynomial of the part s of the step, and so is every sum of its
-states, such as the height of a node above flat ground. Whether such a sum changes its sign within
-the step is decided by its coefficients, and by those of its halves where they leave it open.
+The interpolant of a step is a polynomial in the normalised time s of the step, and so is every
+linear combination of states, such as the height of a node above flat ground. Its coefficients
+decide whether it changes sign within the step; if they are inconclusive, those of its halves do.
 
 References
 ----------
@@ -21,7 +21,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 
-# Parts of a step are told apart down to this, after so many halvings less two.
+# Resolution within a step, and the depth of bisection that reaches it plus two.
 FINEST = 2.0**-46
 DEPTH = 48
 NOWHERE = 2.0
@@ -47,7 +47,7 @@ def times_rest(b, degree):
 
 @helper
 def smallest(b):
-    """A bound below p, that of its coefficients."""
+    """Lower bound of p, the smallest coefficient."""
     least = b[0]
     for i in range(1, len(b)):
         least = min(least, b[i])
@@ -56,7 +56,7 @@ def smallest(b):
 
 @helper
 def value(b, s, row):
-    """p(s) by de Casteljau's algorithm; ``row`` (n + 1,) is room to work in."""
+    """p(s) by de Casteljau's algorithm; ``row`` (n + 1,) is workspace."""
     n = len(b)
     for i in range(n):
         row[i] = b[i]
@@ -78,18 +78,18 @@ def split(b, left):
 
 @helper
 def first_below(b, room):
-    """Where p first falls below zero, to the part FINEST of the step; NOWHERE if it does not.
+    """First s at which p falls below zero, to a resolution of FINEST; NOWHERE if it does not.
 
-    Zero itself is not below, and a dip that lasts less than FINEST may be left out. ``room``
-    (DEPTH, n + 1) is room to work in; b is kept.
+    Zero is not below, and a dip shorter than FINEST may be missed. ``room`` (DEPTH, n + 1) is
+    workspace; b is kept.
 
-    The step is halved, the left half first, until the coefficients of a part are of one sign or
-    the part is as short as FINEST.
+    The step is bisected, the left half first, until the coefficients of an interval have one sign
+    or the interval is as short as FINEST.
     """
     if smallest(b) >= 0.0:
         return NOWHERE
     n = len(b)
-    # The parts that are left, the earliest on top, with their widths in the last column.
+    # Stack of the remaining intervals, the earliest on top, with their widths in the last column.
     for i in range(n):
         room[0, i] = b[i]
     room[0, n] = 1.0
@@ -113,7 +113,7 @@ def first_below(b, room):
 
 @helper
 def variations(b):
-    """Changes of sign along the coefficients: at least as many as p has within the step."""
+    """Sign changes of the coefficients, an upper bound of those of p within the step."""
     count, last = 0, 0.0
     for i in range(len(b)):
         if b[i] != 0.0:
@@ -125,10 +125,10 @@ def variations(b):
 
 @helper
 def sign_changes(b, room, row, places):
-    """Fill ``places`` with where p changes its sign, ascending; how many there are.
+    """Fill ``places`` with the s at which p changes sign, ascending; return their number.
 
-    Those that lie nearer to each other than FINEST may be left out, and those that find no place.
-    ``room`` (DEPTH, n + 1) and ``row`` (n + 1,) are room to work in; b is kept.
+    Sign changes closer than FINEST may be missed, as may those beyond the length of ``places``.
+    ``room`` (DEPTH, n + 1) and ``row`` (n + 1,) are workspace; b is kept.
     """
     n = len(b)
     for i in range(n):
@@ -148,7 +148,7 @@ def sign_changes(b, room, row, places):
             if part[i] != 0.0:
                 first = part[i] if first == 0.0 else first
                 last = part[i]
-        # At the begin where p is zero there, then within.
+        # At the start if p is zero there, then within.
         if sign * first < 0.0 and found < len(places):
             places[found] = begin
             found += 1
@@ -186,7 +186,7 @@ def from_nested(c, b):
 
 @helper
 def largest(b):
-    """A bound above p, that of its coefficients."""
+    """Upper bound of p, the largest coefficient."""
     most = b[0]
     for i in range(1, len(b)):
         most = max(most, b[i])
@@ -194,7 +194,7 @@ def largest(b):
 
 
 def fit(places):
-    """Matrix that makes Bernstein coefficients of the values at n + 1 different places."""
+    """Matrix from values at n + 1 distinct points to Bernstein coefficients."""
     degree = len(places) - 1
     return np.ascontiguousarray(np.linalg.inv(np.array(
         [[comb(degree, k) * s**k * (1.0 - s) ** (degree - k) for k in range(degree + 1)]

@@ -1,18 +1,18 @@
 r"""Gaps and slip velocities of the contact nodes in the course of a step.
 
-On the interpolant of a step they are polynomials of degree four in the part s of the step, less
-what the ground adds, its height under the node or its speed. The polynomials' Bernstein
-coefficients bound them. On flat ground at constant speed the ground adds a constant, and changes
-of sign are found exactly. Otherwise its bounds are used,
+On the interpolant of a step they are polynomials of degree four in the normalised time s, minus the
+contribution of the ground, its height under the node or its speed. Their Bernstein coefficients
+bound the polynomials. On flat ground at constant speed that contribution is constant, and sign
+changes are found exactly. Otherwise its bounds are used,
 
 .. math:: |y_R(\xi) - y_R(\xi_0)| \le \max|y_R'|\,|\xi - \xi_0|, \qquad
     |V(t) - V(t_0)| \le \max|V'|\,|t - t_0|
 
-over parts of the step that are halved until the sign is decided, or they are as short as _FINEST.
+over intervals that are bisected until the sign is decided, or they are as short as _FINEST.
 
-Most steps need none of that: on the interpolant a mode departs from the straight line between its
-ends by no more than the differences of its coefficients from that line, and a node by no more than
-the sum over the modes. Of few nodes on flat ground the coefficients themselves cost less.
+Most steps need no such search: a mode deviates from the straight line between its ends by at most
+the deviation of its coefficients from that line, and a node by at most the sum over the modes. For
+few nodes on flat ground it is cheaper to evaluate the coefficients themselves.
 """
 
 from typing import Any, NamedTuple
@@ -24,17 +24,17 @@ from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import tableau
 from fecontact.laws.signatures import ground_at, signal_at
 
-# Entries of Control.ground: what bounds the ground.
+# Entries of Control.ground: bounds of the ground.
 LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)
-# Rows of courses: five coefficients, then which of them are in doubt.
+# Rows of courses: five coefficients, then a mark of doubt.
 COEFFICIENTS, DOUBT = 5, 5
-# What is looked at of a node.
+# Quantities of a node.
 SLIP, GAP = range(2)
 
 _FINEST = 2.0**-6
-# So many nodes count as few.
+# Largest number of nodes that counts as few.
 _FEW = 4
-# Changes of sign of one quantity in a step that are told apart.
+# Largest number of sign changes of one quantity in a step.
 MOST = 8
 
 
@@ -131,7 +131,7 @@ def set_ends(t, y, s, shapes, bounds, ends):
 
 @helper
 def _set_heights(travel, s, bounds, places, heights):
-    """Fill ``heights`` (n,) with those of the ground under the nodes."""
+    """Fill ``heights`` (n,) with the heights of the ground under the nodes."""
     for j in range(len(heights)):
         heights[j] = bounds[HIGHEST]
         if bounds[STEEPEST] != 0.0:
@@ -141,7 +141,7 @@ def _set_heights(travel, s, bounds, places, heights):
 
 @helper
 def keep_ends(n, room):
-    """Take the end of the step for the start of the next."""
+    """Copy the end of the step to the start of the next."""
     for k in range(2):
         for j in range(2 * n):
             room.ends[k, j] = room.nodes[k, j]
@@ -151,7 +151,7 @@ def keep_ends(n, room):
 
 @helper
 def restless(speed, h, s, shapes, control, room):
-    """Whether :func:`doubtful` may find something that matters.
+    """Whether :func:`doubtful` may be true.
 
     ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
     end; ``speed`` is that of the ground at the start.
@@ -163,7 +163,7 @@ def restless(speed, h, s, shapes, control, room):
 
 @helper
 def _range(first, last, k1, k2, k3):
-    """Smallest and largest coefficient of an interpolant, and whether they rise or fall only."""
+    """Smallest and largest coefficient of an interpolant, and whether they are monotonic."""
     a, c = 0.75 * first + 0.25 * (last + k1), 0.25 * (first + k1 + k2 + k3) + 0.75 * last
     b = 0.5 * (first + last) + k1 / 3.0 + k2 / 6.0
     low, high = min(min(first, a), min(b, c)), max(max(first, a), max(b, c))
@@ -173,7 +173,7 @@ def _range(first, last, k1, k2, k3):
 
 @helper
 def _restless_nodes(speed, h, s, shapes, control, room):
-    """The answer of :func:`doubtful`, but for slip velocities of nodes clear of the ground."""
+    """As :func:`doubtful`, without slip velocities of nodes clear of the ground."""
     levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
     n, m = len(s.gap), len(control.largest)
     spread = control.ground[QUICKEST] * h
@@ -208,7 +208,7 @@ def _restless_nodes(speed, h, s, shapes, control, room):
 
 @helper
 def _restless_modes(speed, h, s, control, room):
-    """The same for many nodes, by the modes alone."""
+    """The same for many nodes, from the modes only."""
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
     n, m = len(s.gap), len(control.largest)
@@ -254,12 +254,12 @@ def _departure(k1, k2, k3):
 
 @helper
 def doubtful(speed, h, bounds, levels, slip_scale, room):
-    """Whether forces within the step may be others than those at its ends let expect.
+    """Whether forces within the step may differ from what its ends suggest.
 
-    A gap or slip velocity may change its sign other than once on its way from start to end, or
-    a contact be twice as deep in between, or slip begin and end. ``levels`` (k, n) are the
-    penetrations at which normal forces begin; ``speed`` is that of the ground. Row DOUBT of
-    ``room.courses`` tells which are meant.
+    A gap or slip velocity may change sign more often than its end values show, a contact be twice
+    as deep in between, or slip begin and end. ``levels`` (k, n) are the penetrations at which
+    normal forces begin; ``speed`` is that of the ground. Row DOUBT of ``room.courses`` marks the
+    quantities concerned.
     """
     c = room.courses
     n = levels.shape[1]
@@ -289,7 +289,7 @@ def doubtful(speed, h, bounds, levels, slip_scale, room):
         return False
     some = 0.0
     for j in range(2 * n):
-        # A polygon that only rises or only falls bounds a curve that does.
+        # A monotonic control polygon implies a monotonic curve.
         if (spread if j < n else bounds[STEEPEST]) == 0.0 and (
                 (c[0, j] <= c[1, j] <= c[2, j] <= c[3, j] <= c[4, j])
                 or (c[0, j] >= c[1, j] >= c[2, j] >= c[3, j] >= c[4, j])):
@@ -375,7 +375,7 @@ def _changes_on_moving_ground(b, bound, course, room, places):
     bend = 0.0
     for k in range(COEFFICIENTS - 2):
         bend = max(bend, 12.0 * abs(b[k] - 2.0 * b[k + 1] + b[k + 2]))
-    # Parts that are left, the earliest on top: begin, width, own motion and ground at both ends.
+    # Stack of intervals, the earliest on top: start, width, own motion and ground at both ends.
     found, waiting = 0, 1
     room[0, 0], room[0, 1] = 0.0, 1.0
     room[0, 2], room[0, 3] = b[0] + shift, b[COEFFICIENTS - 1] + shift

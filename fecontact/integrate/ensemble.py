@@ -1,7 +1,7 @@
-"""Many runs at once: one system with many parameter sets or initial states, on all cores.
+"""Ensembles of runs: many parameter sets or initial states of one system, on all cores.
 
-Each run is one compiled call that leaves Python's lock alone, so that threads share the cores
-without copies of anything; only what is asked for of each run is kept.
+Each run is one compiled call that releases the GIL, so that threads share the cores without copying
+data; only the requested states are kept.
 """
 
 import os
@@ -38,13 +38,13 @@ class Ensemble(Summarised):
     times : (E, K) array
         [s].
     states : (E, K, 2 m + n s) array
-        y = [q, q', z]; NaN after the end of a run that could not go on.
+        y = [q, q', z]; NaN after the end of a run that failed or stopped.
     status : tuple of Status
         How each run ended.
     steps : (E,) array
         Steps of the integrator.
     events : tuple of Events, or None
-        What was watched for in each run; None if nothing was.
+        Events located in each run; None if none were requested.
     """
 
     times: Array
@@ -66,7 +66,7 @@ class Ensemble(Summarised):
 
     @property
     def finished(self) -> NDArray[np.bool_]:
-        """Which runs (E,) reached their end."""
+        """Mask (E,) of the runs that reached their end."""
         return np.array([status is Status.FINISHED for status in self.status])
 
 
@@ -82,46 +82,38 @@ def ensemble(
     workers: int | None = None,
     progress: bool | Callable[[int], None] | None = None,
 ) -> Ensemble:
-    """Run many systems, or one from many initial states, and keep their states at few times.
+    """Run many systems, or one from many initial states, and keep states at a few times.
 
-    The same numbers as single runs of :func:`fecontact.simulate` with as loose a grip on their
-    energies: powers are not integrated, which also leaves the steps to the motion alone.
+    The results are those of :func:`fecontact.simulate`, except that powers are not integrated and
+    do not limit the steps. Threads share the cores.
 
     Parameters
     ----------
     systems : ContactSystem or sequence of E ContactSystem
-        What moves. The modal bases may differ in everything but the size of the state.
+        The modal bases may differ in everything but the size of the state.
     times : (K,) or (E, K) array
-        The start of each run and the times to keep states at, ascending [s]; the first column
-        belongs to the initial states.
+        Start of each run and the times to keep states at, ascending [s].
     initial : (E, size) array, sequence of E, or one for all
-        Initial states, or what :func:`fecontact.integrate.initial_state` takes.
+        Initial states, or anything that :func:`fecontact.integrate.initial_state` takes.
     rtol : float
         Relative tolerance.
     max_step : float, optional
         Longest step [s]; see :func:`fecontact.simulate`.
     chain : int
-        Runs in a row that hand on their last state: only the first of each chain starts from its
-        initial state, as when a parameter is moved slowly. With E the whole ensemble is one chain
-        and runs on one core.
+        Length of chains of runs in which each run starts from the last state of the one before,
+        as when a parameter is moved slowly. A chain runs on one core; after a run that failed, the
+        next one starts from its own initial state.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        What to watch for, such as the passage through a Poincare section; a run that stops at one
-        has no states after it.
+        Events to locate; a run that stops at one has no states after it.
     workers : int, optional
-        Threads; default one a core.
+        Number of threads; by default one per core.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is called with the
-        number of runs that have ended, now and then.
+        True for a progress bar; a function is called with the number of completed runs.
 
     Raises
     ------
     InputError
         For states or times that do not fit the systems, and values out of range.
-
-    Notes
-    -----
-    A chain breaks where a run cannot go on; the next run then starts from its own initial state.
-    Ctrl-C ends all runs.
     """
     members, starts, instants = _members(systems, initial, times)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
@@ -179,30 +171,30 @@ def strobe(
     period: float | ArrayLike | None = None,
     **settings: Any,
 ) -> Ensemble:
-    """States once per period of the excitation, after a transient: a Poincare section in time.
+    """States once per period of the excitation, after a transient (stroboscopic map).
 
     Parameters
     ----------
     systems : ContactSystem or sequence of E ContactSystem
-        What moves.
+        The systems.
     transient_periods : int
-        Periods that are not kept.
+        Number of periods before the first state that is kept.
     keep : int
-        States kept, one per period from there on.
+        Number of states to keep, one per period.
     period : float or (E,) array, optional
-        Period of strobing [s]; default that of each system's excitation.
+        Sampling period [s]; by default that of each system's excitation.
     **settings
         As for :func:`ensemble`.
 
     Returns
     -------
     Ensemble
-        With ``keep`` states a run.
+        With ``keep`` states per run.
 
     Raises
     ------
     InputError
-        For a system without a period of its own if none is given, and as :func:`ensemble`.
+        As :func:`ensemble`, or if a system is not excited periodically and no period is given.
     """
     for name, value, least in (
             ("transient_periods", transient_periods, 0), ("keep", keep, 1)):
@@ -228,7 +220,7 @@ def strobe(
 def _members(
     systems: ContactSystem | Sequence[ContactSystem], initial: Any, times: ArrayLike,
 ) -> tuple[list[ContactSystem], Callable[[int], Array], Array]:
-    """One system and row of times for each run, and a function that gives its initial state."""
+    """System and times of each run, and a function that returns its initial state."""
     require_kind("ensemble", (ContactSystem, Sequence), systems=systems)
     instants = np.array(as_floats(times, "times"))
     single = isinstance(systems, ContactSystem)

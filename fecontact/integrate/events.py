@@ -1,4 +1,4 @@
-"""What can be watched for during a run, and the table of what was found."""
+"""Events to be located during a run, and the table of located events."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ _SENSES = {"both": 0, "rising": 1, "falling": -1}
 
 
 def event(function: Callable[..., Any]) -> CompiledLaw:
-    """Compile ``g(t, y, p) -> value`` whose changes of sign are events.
+    """Compile ``g(t, y, p) -> value`` whose sign changes are events.
 
     ``y`` = [q, q', z] is the state, ``p`` the parameters of the :class:`Event`.
 
     Raises
     ------
     InputError
-        For what is no function; when it is used, for one of another form.
+        For an object that is not a function; at its first use, if the function has another form.
     """
     if not callable(function):
         raise InputError(f"event needs a function g(t, y, p), not {function!r}.")
@@ -36,14 +36,14 @@ def event(function: Callable[..., Any]) -> CompiledLaw:
 class ContactEvents:
     """Changes of state of the contact nodes: touch-down, lift-off, stick and slip.
 
-    A node touches down when its normal force begins and lifts off when that ends; it sticks and
-    slips as :attr:`fecontact.Trajectory.contact_state` says. A node that sticks as it touches
-    down has both events at once.
+    A node touches down when its normal force begins and lifts off when that ends; for stick and
+    slip see :attr:`fecontact.Trajectory.contact_state`. A node that sticks as it touches down has
+    both events at the same time.
 
     Parameters
     ----------
     stop : str or sequence of str
-        Those at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
+        Events at whose first occurrence the run ends: 'touch-down', 'lift-off', 'stick', 'slip'.
 
     Raises
     ------
@@ -67,24 +67,24 @@ class ContactEvents:
 
 @dataclass(frozen=True)
 class Event:
-    """A function of time and state that is watched for changes of its sign.
+    """Sign changes of a function of time and state.
 
     Parameters
     ----------
     kernel : compiled function
         From :func:`event`.
     parameters : sequence of float
-        What the function gets as ``p``.
+        Parameters ``p`` of the function.
     sense : 'both', 'rising' or 'falling'
-        The changes that count.
+        Direction of the sign changes.
     stop : bool
         Whether the run ends at the first.
 
     Raises
     ------
     InputError
-        For another sense, a function that is not compiled, and parameters that are no
-        finite numbers.
+        For an unknown sense, a function that is not compiled, or parameters that are not finite
+        numbers.
     """
 
     kernel: CompiledLaw
@@ -120,20 +120,20 @@ def _plane(t, y, p):
 
 @dataclass(frozen=True)
 class Crossing:
-    """A displacement or velocity of a point that passes a value: a Poincare section.
+    """Passage of a displacement or velocity of a point through a value (Poincare section).
 
     Parameters
     ----------
     point : str or int
         'B', 'C' or a further named point; a contact node by its number from 0.
     component : 'x', 'y' or 'phi'
-        Along the ground, away from it, counter-clockwise.
+        Along the ground, away from it, or counter-clockwise.
     value : float
-        Value passed [m], [rad], [m/s], [rad/s].
+        The value [m], [rad], [m/s] or [rad/s].
     of : 'displacement' or 'velocity'
-        Which of them.
+        Quantity.
     sense : 'both', 'rising' or 'falling'
-        The passages that count.
+        Direction of the passages.
     stop : bool
         Whether the run ends at the first.
 
@@ -175,16 +175,17 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class Events:
-    """Events of a run in the order of time.
+    """Events of a run in chronological order.
 
     Attributes
     ----------
     time : (K,) array
         [s], located to round-off on the dense output of the steps.
     kind : tuple of str
-        'touch-down', 'lift-off', 'stick', 'slip', or 'event k' for the k-th of one's own from 0.
+        'touch-down', 'lift-off', 'stick', 'slip', or 'event k' for the k-th user-defined one
+        from 0.
     node : (K,) array
-        Number of the contact node from 0; -1 for events of one's own.
+        Number of the contact node from 0; -1 for user-defined events.
     states : (K, size) array
         y = [q, q', z].
     """
@@ -196,7 +197,7 @@ class Events:
 
     @classmethod
     def of_rows(cls, found: Array, states: Array) -> "Events":
-        """From rows of time, number of the kind and node."""
+        """Make events of rows of time, index of the kind, and node."""
         order = np.argsort(found[:, 0], kind="stable")
         kinds = [int(kind) for kind in found[order, 1]]
         return cls(found[order, 0],
@@ -206,18 +207,18 @@ class Events:
 
     @classmethod
     def none(cls, size: int) -> "Events":
-        """No events, of a state of so many values."""
+        """An empty table for states of ``size`` values."""
         return cls.of_rows(np.zeros((0, 3)), np.zeros((0, size)))
 
     def __len__(self) -> int:
         return len(self.time)
 
     def only(self, kind: str | None = None, node: int | None = None) -> "Events":
-        """Those of one kind, of one node, or both; InputError for what is no kind of event."""
+        """Events of one kind, of one node, or both; InputError for an unknown kind."""
         own = isinstance(kind, str) and kind.startswith("event ") and kind[6:].isdigit()
         if kind is not None and kind not in CONTACT_EVENTS and not own:
             raise InputError(f"kind = {kind!r} must be one of {choices(CONTACT_EVENTS)}, or "
-                             f"'event k' for the k-th of one's own.")
+                             f"'event k' for the k-th user-defined one.")
         keep = np.ones(len(self), dtype=bool)
         if kind is not None:
             keep &= np.array([one == kind for one in self.kind], dtype=bool)

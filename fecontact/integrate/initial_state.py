@@ -1,4 +1,4 @@
-"""Where a run starts."""
+"""Initial states of runs."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -18,7 +18,7 @@ from fecontact.system.steady_memory import settled
 
 @dataclass(frozen=True)
 class RigidStart:
-    """Start from a rigid displacement and velocity of the body.
+    """Initial rigid-body displacement and velocity.
 
     Parameters
     ----------
@@ -55,19 +55,19 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     Parameters
     ----------
     system : ContactSystem
-        The system that will run.
+        The system.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
-        At rest on the ground, with the normal forces in equilibrium and no friction; steady
-        sliding; a rigid displacement and velocity; the end of another run; a state. The internal
-        variables of friction with memory are zero, and in steady sliding those that belong to it.
+        Static equilibrium without friction; steady sliding; a rigid-body displacement and velocity;
+        the end of another run; or a state. Internal variables of friction with memory are zero, in
+        steady sliding their steady values.
     time : float
         Start of the run [s].
 
     Raises
     ------
     InputError
-        For anything else, a state of another size or with NaN, or a rigid motion that the
-        supports do not allow.
+        For an unknown kind, a state of wrong size or with NaN, or a rigid motion that the supports
+        prevent.
     AnalysisError
         If there is no equilibrium to start from.
     """
@@ -105,7 +105,7 @@ def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> 
     x, y = basis.positions.T
     target = np.stack([wanted[0] - wanted[2] * y, wanted[1] + wanted[2] * x,
                        np.full(len(x), wanted[2])], axis=1)
-    # Points without rows (a B or C that is not there) and unused components say nothing.
+    # Ignore points without rows (such as a missing B or C) and unused components.
     rows = basis.T.reshape(-1, basis.modes)[:, : basis.rigid_modes]
     used = np.abs(basis.T.reshape(-1, basis.modes)).any(axis=1)
     wanted_rows = target.reshape(-1)[used]

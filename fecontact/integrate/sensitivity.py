@@ -1,4 +1,4 @@
-"""Derivatives of a motion to its initial state and to a parameter."""
+"""Derivatives of a motion with respect to its initial state and a parameter."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ from fecontact.system.contact_system import ContactSystem
 
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
-# Part of the slip velocity over which friction rises by which the ground may be moved.
+# Largest change of ground velocity, relative to the velocity scale of friction.
 _SLIP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """A motion at K times, and how it changes with its start and a parameter.
+    """A motion at K times, and its derivatives.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Sensitivity:
     def monodromy(self) -> Array:
         """dy(t_end) / dy(t_start) (size, size): the product of the transitions.
 
-        Small multipliers are lost in a product over long times; the transitions keep them.
+        Products over long times lose small multipliers, which the single transitions keep.
         """
         result = np.eye(self.states.shape[1])
         for transition in self.transitions:
@@ -83,36 +83,34 @@ def sensitivity(
     derivative_rtol: float | None = None,
     max_step: float | None = None,
 ) -> Sensitivity:
-    """Integrate, and carry the derivatives to the initial state and a parameter along.
+    """Integrate a motion and its derivatives with respect to initial state and a parameter.
 
-    They are the derivatives of the computed steps themselves, to differences of the laws' own
-    derivatives of relative accuracy 1e-8, not of a second approximation of the equations; only
-    the choice of the steps' lengths is not differentiated. The integrator's laws are continuous,
-    so that contact and stick need no jumps.
+    The computed steps themselves are differentiated (discrete sensitivities), at fixed step sizes;
+    second derivatives of laws are found by finite differences, of relative accuracy 1e-8. Forces
+    are continuous, so that contact and stick need no jump conditions.
 
     Parameters
     ----------
     system, t_end, t_start, initial, outputs
         As for :func:`fecontact.simulate`.
     parameter : str, or (function, value), optional
-        Dotted name of a number of the system, ``"ground.speed"``; or a function that makes the
+        Dotted name of a number of the system, ``"ground.speed"``; or a function that returns the
         system for a value, and the value.
     rtol : float
         Relative tolerance of the run.
     derivative_rtol : float, optional
-        Error of one step of the derivatives as those of the motion, relative to the largest they
-        have been since the last output time; by default ten times ``rtol`` of their size at the
-        time. Whatever it is, they are exact for the steps taken; 1e-2 saves most of the steps that
-        fast modes cost which only disturbances, but not the motion have.
+        Tolerance of the derivatives per step, relative to their largest values since the last
+        output time; by default ten times ``rtol``, relative to their current values. They are exact
+        for the steps taken at any value; 1e-2 saves steps that only fast disturbances require.
     max_step : float, optional
         Longest step [s]; see :func:`fecontact.simulate`.
 
     Raises
     ------
     InputError
-        For values out of range, and parameters that do not exist or are no number.
+        For values out of range, and parameters that do not exist or are not numbers.
     AnalysisError
-        If the run could not reach its end.
+        If the run does not reach its end.
     """
     require_kind("sensitivity", ContactSystem, system=system)
     times = output_times(t_start, t_end, outputs)
@@ -139,7 +137,7 @@ def sensitivity(
 def _moved(
     system: ContactSystem, parameter: Parameter,
 ) -> tuple[ContactSystem, ContactSystem, float]:
-    """The system with the parameter moved up and down, and how far these are apart."""
+    """The system with the parameter increased and decreased, and the difference of both."""
     if isinstance(parameter, str):
         name, value = parameter, system.parameters().get(parameter, 0.0)
         if not isinstance(value, Real) or isinstance(value, bool):
@@ -164,7 +162,7 @@ def _moved(
     try:
         return system_at(value + move), system_at(value - move), 2.0 * move
     except InputError:
-        # At the end of what is allowed, or no such parameter.
+        # At a limit of the range, or an unknown parameter.
         try:
             return system_at(value + move), system_at(value), move
         except InputError:
@@ -174,10 +172,10 @@ def _moved(
 def _slip_limit(
     system: ContactSystem, system_at: Callable[[float], ContactSystem], value: float, move: float,
 ) -> float:
-    """Part of a move of the parameter that is small beside the smoothing of friction.
+    """Factor that keeps the change of the parameter small relative to the friction smoothing.
 
-    A belt of 0.2 m/s that moves by a part of 1e-5 passes all of a friction that rises over
-    1 um/s, and the difference is no derivative any more.
+    A relative change of 1e-5 of a belt speed of 0.2 m/s exceeds a velocity scale of 1 um/s, so that
+    the difference would not approximate the derivative.
     """
     try:
         shift = abs(system_at(value + move).ground.speed - system_at(value).ground.speed)

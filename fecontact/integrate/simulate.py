@@ -1,4 +1,4 @@
-"""Running a contact system in time."""
+"""Time integration of a contact system."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -20,10 +20,10 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION, POWERS
 from fecontact.system.model_limits import warn_of_limits
 
-# Starts deeper than so many penetration scales are warned of.
+# Initial penetration, in penetration scales, beyond which to warn.
 _DEEP = 100.0
-# Growth of energy without a source, relative to the largest energy, that is an error, and the
-# output times that are looked at for it.
+# Spurious energy growth, relative to the largest energy, that is an error, and the number of output
+# times that are checked.
 _GROWTH, _LOOKS = 1e-2, 200
 # Shortest run [s], and in spacings of floating-point numbers at its times.
 _SHORTEST, _SPACINGS = 1e-100, 1e5
@@ -42,54 +42,42 @@ def simulate(
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> Trajectory:
-    r"""Integrate a contact system in time.
+    """Integrate a contact system in time.
 
     Parameters
     ----------
     system : ContactSystem
-        What moves.
-    t_end : float
-        End of the run [s].
-    t_start : float, optional
-        Its start [s]; default the end of the run that it continues, else zero.
+        The system.
+    t_end, t_start : float
+        End and start of the run [s]; by default it starts where the run that it continues ends, or
+        at zero.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
-        Where it starts; see :func:`fecontact.integrate.initial_state`.
+        Initial state; see :func:`fecontact.integrate.initial_state`.
     outputs : int or (N,) array
-        Number of equally spaced output times, both ends included, or the times themselves,
-        ascending, the first ``t_start``, the last ``t_end``.
+        Number of equally spaced output times, both ends included, or ascending times [s].
     solver : Rodas5P, SetValued, Scipy or CVODE
-        The compiled integrator, the default; friction without smoothing and rigid stops; stiff
-        solvers of scipy and SUNDIALS, as references. Each takes the options that are its own.
+        Default integrator; set-valued friction and rigid stops; stiff reference solvers.
     rtol : float
-        Relative tolerance; absolute ones follow from it, the penetration scale of the normal law
-        and the width of the friction smoothing.
+        Relative tolerance; absolute ones follow from it and the scales of the contact laws.
     max_step : float, optional
-        Longest step [s]; by default, and at most, a part of the shortest period of drive, loads
-        and waves. Touches and slips within a step are found without it by Rodas5P.
+        Longest step [s]; at most a fraction of the shortest period of drive, loads and waves.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        For Rodas5P: what to watch for, located within the steps and kept in
-        :attr:`Trajectory.events`; the run ends at those that say so.
+        Located within the steps of Rodas5P and stored in :attr:`Trajectory.events`.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is called with the time
-        reached [s] now and then.
+        True for a progress bar; a function is called with the time reached [s].
 
     Returns
     -------
     Trajectory
-        Also of a run that ended early: by Ctrl-C, or because the solver could not go on; its
-        ``status`` says which.
+        Also if the run ended early, by Ctrl-C or because the solver failed; see its ``status``.
+        Each of its ``limits_exceeded`` is a ModelWarning.
 
     Raises
     ------
     InputError
-        For values out of range, and a checkpoint of another run.
+        For values out of range, or a checkpoint of another run.
     AnalysisError
         If there is no equilibrium to start from.
-
-    Warns
-    -----
-    ModelWarning
-        For each of :attr:`Trajectory.limits_exceeded`.
     """
     if not isinstance(system, ContactSystem):
         raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")
@@ -103,8 +91,8 @@ def simulate(
     require_max_step(max_step)
     require_solver(solver)
     if events is not None and not solver.locates_events:
-        raise InputError(f"Events are located by Rodas5P() alone, not by {solver!r}; leave them "
-                         f"out, or find what happened between the outputs afterwards.")
+        raise InputError(f"Events are located only by Rodas5P(), not by {solver!r}; leave them "
+                         f"out, or evaluate the outputs of the run.")
     watched = as_events(events)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory):
@@ -126,7 +114,7 @@ def simulate(
 
 
 def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
-    """The status of a run that has come to its end, by its energies at some output times."""
+    """Status of a completed run after a check of its energies at some output times."""
     some = np.unique(np.linspace(0, len(run.time) - 1, min(len(run.time), _LOOKS)).astype(int))
     histories = ("time", "modal_coordinates", "modal_velocities", "work", "memory",
                  "held_normal_force", "held_friction_force")
@@ -144,14 +132,14 @@ def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
 
 
 def _row_size(system: ContactSystem) -> float:
-    """Memory for an output time [bytes]: states and work, copied once, and contact quantities."""
+    """Memory per output time [bytes]: two copies of states and work, and contact quantities."""
     n = system.basis.contact_nodes
     states = 2 * system.basis.modes + n * system.memory
     return 8.0 * (2 * (states + len(POWERS) + n) + 10 * n)
 
 
 def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
-    """Warn of a start so deep in the ground that a wrong unit is more likely than a wish."""
+    """Warn of an initial penetration so deep that a wrong unit is likely."""
     depth = float(system.contact_history(np.array([time]), state[None])[0, :, PENETRATION].max())
     scale = system.penetration_scale
     if depth > _DEEP * scale:
@@ -161,7 +149,7 @@ def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
 
 
 def require_max_step(max_step: Any) -> None:
-    """InputError for what is no longest step: neither None nor a time above zero."""
+    """Raise InputError unless ``max_step`` is None or a finite time above zero."""
     if max_step is not None and not (isinstance(max_step, Real) and not isinstance(max_step, bool)
                                      and 0.0 < float(max_step) < np.inf):
         raise InputError(f"max_step = {max_step!r} must be a finite time above zero [s]; leave it "
@@ -181,17 +169,17 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
         raise InputError(f"t_end = {t_end!r} must be a finite time after t_start = {t_start!r}.")
     latest = max(abs(t_start), abs(t_end))
     if t_end - t_start < max(_SHORTEST, _SPACINGS * float(np.spacing(latest))):
-        raise InputError(f"t_end = {t_end!r} is too near t_start = {t_start!r} for steps in "
-                         f"between: floating-point numbers cannot tell their times apart; end "
-                         f"later.")
+        raise InputError(f"t_end = {t_end!r} is too close to t_start = {t_start!r}: "
+                         f"floating-point numbers cannot resolve steps between them; choose a "
+                         f"later end.")
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         if outputs < 2:
             raise InputError(f"outputs = {outputs} must be at least 2.")
         times = np.linspace(t_start, t_end, int(outputs))
         if not (np.diff(times) > 0.0).all():
             raise InputError(f"outputs = {outputs} are too many from t_start = {t_start!r} to "
-                             f"t_end = {t_end!r}: floating-point numbers cannot tell so many "
-                             f"times apart; end later or take fewer outputs.")
+                             f"t_end = {t_end!r}: floating-point numbers cannot resolve so "
+                             f"many times; end later or take fewer outputs.")
         return times
     try:
         times = np.array(outputs, dtype=float)

@@ -1,4 +1,4 @@
-"""What the smoothing of friction, or the compliance of a stop, changes in a run."""
+"""Effect of friction smoothing, or of the compliance of stops, on a run."""
 
 from dataclasses import dataclass, replace
 
@@ -22,19 +22,18 @@ class SmoothingCost:
     Attributes
     ----------
     orbit_difference : float
-        Largest difference of the displacement :attr:`component` in the second half of the run, in
-        units of its amplitude there (half of its range, set-valued).
+        Largest difference of the displacement :attr:`component` in the second half of the run,
+        relative to its amplitude there (half of its range in the set-valued run).
     component : str
-        The displacement that was compared: the one with the largest amplitude of all of B and of
-        the contact nodes, such as ``x of contact node 0``.
+        The compared displacement, that of largest amplitude of B and the contact nodes, such as
+        ``x of contact node 0``.
     amplitude : float
         Its amplitude [m].
     break_away_smoothed, break_away : float
-        Friction force that the contact can take before it slides, in units of the normal force:
-        the maximum of the smoothed curve, and the limit of stick without smoothing; those of the
-        contact node where they differ most.
+        Break-away friction force per normal force: maximum of the smoothed curve, and stick limit
+        without smoothing, at the contact node where they differ most.
     sentence : str
-        All of it for people.
+        Summary in a sentence.
     """
 
     orbit_difference: float
@@ -63,18 +62,18 @@ def smoothing_cost(
     t_end : float
         End of both runs [s]; some periods of the motion.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m,) array
-        Where both start; see :func:`fecontact.integrate.initial_state`.
+        Initial state of both; see :func:`fecontact.integrate.initial_state`.
     outputs : int
         Number of times at which the runs are compared, at least 20.
     rtol : float
         Relative tolerance of both.
     solver : SetValued
-        Of the set-valued run.
+        Solver of the set-valued run.
 
     Raises
     ------
     InputError
-        As by the two runs, or if one of them ended early.
+        As :func:`fecontact.simulate`, or if one of the runs ended early.
     AnalysisError
         If there is no equilibrium to start from.
     """

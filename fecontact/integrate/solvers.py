@@ -1,4 +1,4 @@
-"""Solvers of runs: each with the options that are its own, and one method that integrates."""
+"""Solvers of runs: classes of their options with a method ``run``."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -19,12 +19,12 @@ from fecontact.system.contact_system import ContactSystem
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a solver is to integrate.
+    """Input of a solver.
 
     Attributes
     ----------
     system : ContactSystem
-        What moves.
+        The system.
     state : (2 m + n s,) array
         y = [q, q', z] at the first time.
     times : (N,) array
@@ -34,9 +34,9 @@ class Task:
     max_step : float or None
         Longest step [s].
     events : sequence of ContactEvents, Crossing and Event
-        What to watch for; empty unless the solver ``locates_events``.
+        Events to locate; empty unless the solver ``locates_events``.
     progress : callable or None
-        To be called with the time reached [s] now and then.
+        Called occasionally with the time reached [s].
     """
 
     system: ContactSystem
@@ -49,15 +49,14 @@ class Task:
 
 
 class Solver(ABC):
-    """What integrates a system in time; a frozen dataclass of its options.
+    """Base class of solvers: frozen dataclasses of their options.
 
     Attributes
     ----------
     locates_events : bool
-        Whether it locates what :func:`fecontact.simulate` is told to watch for.
+        Whether it locates the ``events`` of :func:`fecontact.simulate`.
     smooth : bool
-        Whether forces are functions of the state, so that energy which grows without work is an
-        error.
+        Whether forces are functions of the state, so that energy growth without work is an error.
     """
 
     locates_events: ClassVar[bool] = False
@@ -66,11 +65,11 @@ class Solver(ABC):
     @property
     @abstractmethod
     def name(self) -> str:
-        """What ``solver`` is in study files and in the statistics of a run."""
+        """Name of the solver in study files and in the statistics of a run."""
 
     @abstractmethod
     def run(self, task: Task) -> Solution:
-        """Integrate; what was computed until then, if the run ends early."""
+        """Integrate; if the run ends early, return the results up to then."""
 
 
 @dataclass(frozen=True)
@@ -80,15 +79,15 @@ class Rodas5P(Solver):
     Parameters
     ----------
     checkpoint : path, optional
-        A file that keeps a long run every minute and when it is interrupted. If it is there, the
-        run goes on from it, to the same numbers; at the end it is removed.
+        File to which the run is saved every minute and on interruption. If it exists, the run is
+        resumed from it with bit-for-bit the same results; it is removed at the end.
     keep_checkpoint : bool
-        Leave the file there at the end, to be removed once the run is written.
+        Keep the file at the end, to be removed once the run is written.
 
     Raises
     ------
     InputError
-        If the checkpoint is no path.
+        If the checkpoint is not a path.
 
     References
     ----------
@@ -135,7 +134,7 @@ class SetValued(Solver):
         |R_j| \le \mu(0^+) F_j \ \text{ where } v_j = 0, \qquad
         R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
 
-    Friction laws have to have a ``smoothing_slope``, whose limit this is.
+    This is the limit of infinite ``smoothing_slope``, which friction laws must have.
 
     Parameters
     ----------
@@ -145,7 +144,7 @@ class SetValued(Solver):
     static_coefficient : float or (n,) sequence, optional
         Limit of \|R\|/F in stick [-], for all contact nodes or each; default that of the law.
     scheme : 'auto', 'events' or 'stepping'
-        From event to event, for few nodes, or by implicit steps, for any number of them.
+        Event-driven, for few nodes, or time-stepping, for any number of nodes.
 
     Raises
     ------
@@ -194,7 +193,7 @@ class SetValued(Solver):
             task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
             static_coefficient=self.static_coefficient, scheme=self.scheme,
             longest=longest_step(task.system, task.times, task.max_step), progress=task.progress)
-        # With what the run was told, it can be repeated.
+        # Options in the statistics make the run reproducible.
         told = {"restitution": self.restitution, "static_coefficient": self.static_coefficient}
         return replace(found, statistics=found.statistics | told)
 
@@ -206,12 +205,12 @@ class Scipy(Solver):
     Parameters
     ----------
     method : 'Radau', 'BDF' or 'LSODA'
-        Its name there.
+        Name of the method in scipy.
 
     Raises
     ------
     InputError
-        For another one.
+        For another method.
     """
 
     method: str = "Radau"
@@ -238,7 +237,7 @@ class Scipy(Solver):
 
 @dataclass(frozen=True)
 class CVODE(Solver):
-    """CVODE of SUNDIALS by scikit-sundae, which has to be installed, as a reference."""
+    """CVODE of SUNDIALS, as a reference; requires scikit-sundae."""
 
     @property
     def name(self) -> str:
@@ -253,7 +252,7 @@ class CVODE(Solver):
                          max_step=task.max_step, progress=task.progress)
 
 
-# What functions take unless they are told otherwise.
+# Default solver of all functions.
 RODAS5P, SET_VALUED = Rodas5P(), SetValued()
 
 SOLVERS: dict[str, Solver] = {solver.name: solver for solver in (
@@ -261,12 +260,12 @@ SOLVERS: dict[str, Solver] = {solver.name: solver for solver in (
 
 
 def solver_by_name(name: str, options: Mapping[str, Any]) -> Solver:
-    """A solver by its name in files; options that are None are left at their defaults.
+    """Solver by its name in files; options that are None keep their defaults.
 
     Raises
     ------
     InputError
-        For another name, options of other solvers, and values out of range.
+        For an unknown name, options of other solvers, and values out of range.
     """
     if name not in SOLVERS:
         raise InputError(f"solver = {name!r} must be one of {choices(SOLVERS)}"
@@ -275,7 +274,7 @@ def solver_by_name(name: str, options: Mapping[str, Any]) -> Solver:
     for key, value in given.items():
         owners = [other for other, solver in SOLVERS.items() if key in _options(solver)]
         if name not in owners:
-            raise InputError(f"{key} = {value!r} is for solver = {choices(owners)} alone, not "
+            raise InputError(f"{key} = {value!r} is only for solver = {choices(owners)}, not "
                              f"'{name}'; leave it out.")
     return replace(SOLVERS[name], **given)  # type: ignore[type-var]
 
@@ -285,7 +284,7 @@ def _options(solver: Any) -> set[str]:
 
 
 def require_solver(solver: Any) -> None:
-    """InputError for what is no solver, such as its name or its class."""
+    """Raise InputError for anything but a solver, such as its name or class."""
     if not isinstance(solver, Solver):
         shown = solver.__name__ if isinstance(solver, type) else repr(solver)
         raise InputError(f"solver = {shown} must be Rodas5P(), SetValued(), Scipy('Radau') or "

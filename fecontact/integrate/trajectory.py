@@ -1,4 +1,4 @@
-"""What a run returns: modal histories, and everything that follows from them."""
+"""Results of a run: modal histories and quantities derived from them."""
 
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
@@ -19,7 +19,7 @@ from fecontact.system.kernels import POWERS
 
 
 class Status(Enum):
-    """How a run ended; the value is the sentence for people."""
+    """How a run ended; the value is a sentence for display."""
 
     FINISHED = "The run reached its end."
     EVENT = "The run ended at an event."
@@ -54,8 +54,8 @@ class Energies:
     kinetic, elastic, drive_spring, contact : (N,) arrays
         Stored: in motion, in the modes, in the springs at B, in the contact.
     drive_work, ground_work, belt_work, load_work : (N,) arrays
-        Put in: by the moving ends of the springs at B, by the ground lifting the body, by the
-        ground dragging it along, by the load at C.
+        Put in: by the driven ends of the springs at B, by the ground lifting the body, by the
+        ground dragging it along, by the loads.
     modal_damping, dashpots, contact_damping, friction : (N,) arrays
         Lost: in the modes, in the dashpots at B, in the contact's normal damping, by friction
         between body and ground.
@@ -103,7 +103,7 @@ class Energies:
 
     @property
     def _unexplained(self) -> Array:
-        # Energies beyond all numbers give NaN here, and the run a status that says so.
+        # Energies that overflow give NaN here, and a corresponding status.
         with np.errstate(over="ignore", invalid="ignore"):
             return self.stored - self.stored[0] - self.work + self.lost
 
@@ -115,7 +115,7 @@ class Energies:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What a solver has computed at N output times, and of a run that ended early the last state.
+    """Results of a solver at N output times; of a run that ended early, also the last state.
 
     Attributes
     ----------
@@ -125,18 +125,18 @@ class Solution:
         y = [q, q', z].
     work : (N, 8) array
         Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
-        [J]. What impacts on rigid stops take is with ``contact_damping``.
+        [J]. Energy lost in impacts on rigid stops is part of ``contact_damping``.
     status : Status
         How the run ended.
     statistics : mapping
-        Counts of steps, rejected steps, events and the like, seconds, a message of the solver.
+        Numbers of steps, rejected steps, events and so on, seconds, message of the solver.
     node_friction_work : (N, n) array or None
-        Energy that friction at each node has taken since the first time [J].
+        Energy dissipated by friction at each node since the first time [J].
     normal_force, friction_force : (N, n) arrays or None
-        F and R of each node [N] where they do not follow from the state, as in set-valued
-        contact; F without the impulses of rigid stops.
+        F and R of each node [N] if they do not follow from the state, as in set-valued contact;
+        F without the impulses of rigid stops.
     events : Events or None
-        What was watched for, in the order of time.
+        Located events in chronological order.
     """
 
     time: Array
@@ -167,17 +167,17 @@ class Trajectory(Summarised):
     status : Status
         How the run ended.
     statistics : mapping
-        Counts of the integrator: steps, right-hand sides, Jacobians, factorisations, seconds.
+        Counts of the integrator: steps, right-hand sides, Jacobians, factorisations; seconds.
     memory : (N, n s) array or None
         Internal variables z of friction with memory, node by node; None without memory.
     node_friction_work : (N, n) array or None
-        Energy lost by friction at each node [J], where the integrator has kept it; see
+        Energy lost by friction at each node [J], if the integrator stores it; see
         :attr:`friction_work`.
     held_normal_force, held_friction_force : (N, n) arrays or None
-        Forces of set-valued contact [N], which hold nodes in place and do not follow from the
-        state; None where laws give the forces.
+        Forces of set-valued contact [N], which do not follow from the state; None if laws give the
+        forces.
     events : Events or None
-        What was watched for, in the order of time; None if nothing was.
+        Located events in chronological order; None if none were requested.
     """
 
     system: ContactSystem
@@ -194,7 +194,7 @@ class Trajectory(Summarised):
     events: Events | None = None
 
     def summary(self) -> list[tuple[str, str]]:
-        """Status, time span and the system; nothing that would take time to compute."""
+        """Status, time span and system; nothing that is costly to compute."""
         steps = self.statistics.get("steps")
         facts = [
             ("status", self.status.name.lower().replace("_", " ")),
@@ -213,14 +213,14 @@ class Trajectory(Summarised):
                           *(() if self.memory is None else (self.memory,))])
 
     def between(self, t_start: float | None = None, t_end: float | None = None) -> "Trajectory":
-        """The output times from ``t_start`` to ``t_end``, both included where they are times.
+        """Part of the run with the output times from ``t_start`` to ``t_end``, both included.
 
-        Work and losses count from the first of them, as in a run that began there.
+        Work and losses count from the first of them, as in a run that started there.
 
         Parameters
         ----------
         t_start, t_end : float, optional
-            [s]; the ends of the run by default.
+            [s]; by default the ends of the run.
 
         Raises
         ------
@@ -270,8 +270,8 @@ class Trajectory(Summarised):
         if isinstance(point, str | int | np.integer):
             return basis.T[basis.point_index(point if isinstance(point, str) else int(point))]
         if basis.mode_shapes is None:
-            raise InputError(f"The point {point} cannot be found: the modal basis holds no shapes "
-                             f"over the body; use a named point or a contact node.")
+            raise InputError(f"The point {point} cannot be found: the modal basis holds no mode "
+                             f"shapes; use a named point or a contact node.")
         distance = np.linalg.norm(basis.mode_shapes.nodes - np.asarray(point, dtype=float), axis=1)
         nearest_node = int(np.argmin(distance))
         reach = np.ptp(basis.mode_shapes.nodes, axis=0).max()
@@ -316,10 +316,10 @@ class Trajectory(Summarised):
 
     @property
     def friction_work(self) -> Array:
-        """Energy (N, n) that friction at each node has taken since the first time [J].
+        """Energy (N, n) absorbed by friction at each node since the first time [J].
 
-        That of friction with memory comes back in part. From the integrator where it has kept it,
-        else by the trapezoidal rule over the output times.
+        Friction with memory returns part of it. From the integrator if stored, else by the
+        trapezoidal rule over the output times.
         """
         if self.node_friction_work is not None:
             return self.node_friction_work
@@ -330,16 +330,16 @@ class Trajectory(Summarised):
     def wear_depth(self, coefficient: float, width: float) -> Array:
         """Depth (N, n) worn off the body at each node since the first time [m].
 
-        Archard's law in terms of friction work: volume = coefficient times work, spread over the
-        area that belongs to the node.
+        Archard's law in terms of friction work: volume = coefficient times work, distributed over
+        the area of the node.
 
         Parameters
         ----------
         coefficient : float
-            Volume worn off per friction work [m3/J]: Archard's k [m2/N] over the coefficient of
+            Wear volume per friction work [m3/J]: Archard's k [m2/N] divided by the coefficient of
             friction.
         width : float
-            Width of the contact face across the plane [m].
+            Out-of-plane width of the contact face [m].
 
         Raises
         ------
@@ -361,7 +361,7 @@ class Trajectory(Summarised):
     def contact_state(self) -> NDArray[np.int8]:
         """State (N, n) of the contact nodes, values of :class:`ContactState`.
 
-        Open without normal force; stick below the slip velocity at which friction is largest.
+        Open without normal force; sticking below the slip velocity of largest friction.
         """
         stick = self.system.sticks(self.slip_velocity, self.normal_force, self.friction_force)
         state = np.where(stick, ContactState.STICK, ContactState.SLIP)
@@ -369,10 +369,10 @@ class Trajectory(Summarised):
 
     @cached_property
     def limits_exceeded(self) -> tuple[str, ...]:
-        """Sentences on where the run leaves what the model holds for.
+        """Messages about states outside the range of validity of the model.
 
-        Displacements beyond the body's own size, penetrations beyond a hundred times the height
-        of the roughness; :func:`fecontact.simulate` gives them as a ModelWarning each.
+        Displacements beyond the body's size, penetrations beyond a hundred times the roughness
+        height; :func:`fecontact.simulate` issues a ModelWarning for each.
         """
         from fecontact.system.model_limits import limits_exceeded
 
@@ -380,7 +380,7 @@ class Trajectory(Summarised):
 
     @cached_property
     def energies(self) -> Energies:
-        """Energies, work and losses of the run; not finite where they are beyond all numbers."""
+        """Energies, work and losses of the run; not finite where they overflow."""
         with np.errstate(over="ignore", invalid="ignore"):
             return self._energies()
 

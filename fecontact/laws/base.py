@@ -1,6 +1,6 @@
 """Base classes of the laws of contact nodes, and the ranges of their parameters.
 
-:mod:`fecontact.laws.signatures` says what the functions of laws take and give.
+:mod:`fecontact.laws.signatures` defines arguments and results of their functions.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,14 +24,14 @@ PerNode = TypeAliasType("PerNode", float | tuple[float, ...])
 
 @dataclass(frozen=True)
 class Bound:
-    """Values that a parameter may have, as part of its annotation: ``Annotated[PerNode, Bound]``.
+    """Range of a parameter, as part of its annotation: ``Annotated[PerNode, Bound]``.
 
     Attributes
     ----------
     allowed : str
-        The values in words: ``parameter = -1.0 must be {allowed}``.
+        The range in words: ``parameter = -1.0 must be {allowed}``.
     holds : callable
-        Whether each number of an array is one of them.
+        Whether each number of an array is within the range.
     """
 
     allowed: str
@@ -49,12 +49,12 @@ UpToOne = Annotated[PerNode, Bound("above zero and at most 1", lambda x: (x > 0.
 
 @cache
 def _annotations(law: Any) -> Mapping[str, tuple[Any, tuple[Bound, ...]]]:
-    """Types of a law's parameters, and the ranges that their annotations name."""
+    """Types and ranges of a law's parameters, from their annotations."""
     try:
         hints = get_type_hints(law, include_extras=True)
     except NameError as error:
-        raise InputError(f"{law.__name__}: an annotation cannot be understood ({error}); use names "
-                         f"that the module of the law knows.") from None
+        raise InputError(f"{law.__name__}: an annotation cannot be resolved ({error}); use names "
+                         f"that are defined in the module of the law.") from None
     return {name: (getattr(hint, "__origin__", hint) if get_origin(hint) is Annotated else hint,
                    tuple(item for item in getattr(hint, "__metadata__", ())
                          if isinstance(item, Bound)))
@@ -63,10 +63,10 @@ def _annotations(law: Any) -> Mapping[str, tuple[Any, tuple[Bound, ...]]]:
 
 @dataclass(frozen=True)
 class NodeLaw:
-    """A law whose parameters may differ from contact node to contact node.
+    """A law whose parameters may differ between contact nodes.
 
-    A subclass describes its own fields; those described by its bases, and the errors below, are
-    added to its docstring.
+    A subclass describes only its own fields; the descriptions of inherited fields and the errors
+    below are added to its docstring.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class NodeLaw:
 
     kernel: ClassVar[CompiledLaw]
     extensive: ClassVar[frozenset[str]] = frozenset()
-    # Parameters whose lists are not one value per node.
+    # Parameters that are lists, but not of one value per node.
     shared_fields: ClassVar[frozenset[str]] = frozenset()
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
@@ -113,7 +113,7 @@ class NodeLaw:
                 self.require(one.allowed, one.holds, entry.name)
 
     def node_count(self) -> int | None:
-        """Number of contact nodes for which parameters are given one by one; None if for none.
+        """Number of values of the parameters given per contact node; None if there are none.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class NodeLaw:
         return next(iter(sizes.values()), None)
 
     def table(self, share: Array) -> Array:
-        """Parameters (n, k) of n nodes; ``share`` (n,) is each node's part of the face."""
+        """Parameters (n, k) of n nodes; ``share`` (n,) is each node's fraction of the face."""
         columns = []
         for entry in fields(self):
             given = getattr(self, entry.name)
@@ -163,16 +163,16 @@ class NormalLaw(NodeLaw):
 
     @property
     def penetration_scale(self) -> float:
-        """Penetration [m] over which the law changes its character, the smallest of all nodes.
+        """Characteristic penetration of the law [m], the smallest of all nodes.
 
-        Tolerances of time integration and starting values of equilibria follow from it.
+        It determines tolerances of time integration and starting values of equilibria.
         """
         raise NotImplementedError
 
     def onsets(self, nodes: int) -> Array:
-        """Penetrations (k, n) of n nodes at which a force begins or ends [m]; here zero.
+        """Penetrations (k, n) of n nodes at which a force begins or ends [m]; zero by default.
 
-        The time integrator looks for touches between its steps there.
+        The time integrator locates them within its steps.
         """
         return np.zeros((1, nodes))
 
@@ -208,8 +208,8 @@ class FrictionLaw(NodeLaw):
     def stick_velocity(self, nodes: int) -> Array:
         """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
 
-        It is where the friction force is largest for a given normal force; where it has no
-        maximum, and for laws with memory, ten times :attr:`velocity_scale`.
+        The slip velocity of the largest friction force at a given normal force; ten times
+        :attr:`velocity_scale` if there is no maximum, and for laws with memory.
         """
         if self.memory:
             return np.full(nodes, 10.0 * self.velocity_scale)

@@ -1,4 +1,4 @@
-"""Checks of a law: derivatives, signs and energy over the range in which it changes."""
+"""Checks of a law: derivatives, signs and energy over its relevant range."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -22,9 +22,9 @@ _FRICTION_PLACES = np.array([(v, F) for v in (-1.0, -1e-3, 0.0, 1e-6, 1e-3, 1.0)
 
 @lru_cache(maxsize=256)
 def require_sound(law: NormalLaw | FrictionLaw) -> None:
-    """Raise :class:`InputError` if a law does not return finite numbers, as many as it must.
+    """Raise :class:`InputError` unless a law returns the required number of finite values.
 
-    The message says what it returned, and where.
+    The message gives the returned values and the arguments.
     """
     name = type(law).__name__
     normal = isinstance(law, NormalLaw)
@@ -73,21 +73,21 @@ _SIZES = np.geomspace(1e-4, 1e4, 97)
 _SIGNED = np.concatenate([-_SIZES[::-1], [0.0], _SIZES])
 _FORCES = np.array([0.3, 14.0])
 _STEP, _SIDE = 1e-3, 1e-6
-_LOSS = 1e-4  # part of the work of a cycle that its integration may get wrong
+_LOSS = 1e-4  # relative error allowed in the integrated work of a cycle
 
 
 def check_law(law: NormalLaw | FrictionLaw) -> None:
-    """Check a law of one's own: its derivatives, its signs and its energy.
+    """Check the derivatives, signs and energy of a user-defined law.
 
-    Penetrations are tried up to ten penetration scales, slip velocities up to 1e4 velocity scales,
-    internal variables up to three times their scales, for the parameters of each contact node:
+    For the parameters of each contact node, at penetrations up to ten penetration scales, slip
+    velocities up to 1e4 velocity scales and internal variables up to three times their scales:
 
-    - the values are finite;
-    - the derivatives are those of differences, at a corner between those of its two sides;
-    - normal laws do not pull at u > 0, their elastic force F(u, 0) does not fall, their damping
-      takes energy, and the stored energy is the integral of F(u, 0), never negative;
+    - values are finite;
+    - derivatives agree with finite differences, at a kink with either side or a value between;
+    - normal laws do not pull at u > 0, their elastic force F(u, 0) does not decrease, their damping
+      dissipates energy, and the stored energy is the integral of F(u, 0) and not negative;
     - friction is zero without normal force; without memory it opposes the slip velocity, with
-      memory no cycle of slip gives energy off.
+      memory every cycle of slip dissipates energy.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def check_law(law: NormalLaw | FrictionLaw) -> None:
     Raises
     ------
     InputError
-        For the first of these that a law does not keep, with the place and the values.
+        For the first check that fails, with arguments and values.
     """
     require_sound(law)
     nodes = law.node_count() or 1
@@ -157,7 +157,7 @@ def _check_energy(law: NormalLaw, share: Array) -> None:
         _require(law, "u", edges[:, None], error, np.column_stack([energy, work]),
                  "must be equal: stored_energy and the integral of F(u, 0)")
         falls = energy >= -1e-9 * np.abs(energy).max()
-        # Below u = 0 a constant force or one that reaches out stores less than at u = 0.
+        # A constant force, or one that extends to u < 0, stores less there than at u = 0.
         _require(law, "u", edges[:, None], (edges < 0.0) | falls, energy,
                  "must not be negative: stored_energy")
 
@@ -188,7 +188,7 @@ def _check_memory(law: FrictionLaw, p: Array, share: float) -> None:
     F = share * rng.choice([0.2, 1.0, 14.0], count)
     v = law.velocity_scale * rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-4.0, 2.0, count)
     v[::10] = 0.0
-    # Internal variables of springs grow with F, those of bristles do not.
+    # Internal variables of springs scale with F, those of bristles do not.
     grown = np.where(rng.random(count) < 0.5, 1.0, F / share)
     z = law.state_scale * rng.uniform(-3.0, 3.0, (count, s)) * grown[:, None]
     names = tuple(f"z[{i}]" for i in range(s))

@@ -1,4 +1,4 @@
-"""Sequences of numbers and two-column files, checked."""
+"""Checked reading of sequences of numbers and two-column files."""
 
 import re
 from pathlib import Path
@@ -11,12 +11,12 @@ from fecontact.core.types import Array
 
 
 def numbers(owner: str, name: str, given: Any, least: int = 0) -> tuple[float, ...]:
-    """A sequence as a tuple of finite floats.
+    """Convert a sequence to a tuple of finite floats.
 
     Raises
     ------
     InputError
-        For anything else, with the place of the value, or for fewer than ``least`` values.
+        For a value that is not finite, with its index, or fewer than ``least`` values.
     """
     try:
         array = np.asarray(given, dtype=float)
@@ -45,9 +45,9 @@ def require_growing(owner: str, name: str, values: tuple[float, ...]) -> None:
 
 
 def require_resolved(owner: str, first: str, x: Array, second: str, y: Array) -> None:
-    """Raise :class:`InputError` where curves through the points would leave the floating range.
+    """Raise :class:`InputError` if curves through the points could overflow.
 
-    That is unless x grows by at least 1e-60 from point to point, and both are within 1e60.
+    x must increase by at least 1e-60 between points, and both be within -1e60 to 1e60.
     """
     for shown, value in ((first, float(x[0])), (first, float(x[-1])),
                          (second, float(y[np.argmax(np.abs(y))]))):
@@ -61,7 +61,7 @@ def require_resolved(owner: str, first: str, x: Array, second: str, y: Array) ->
 
 
 def require_closed(owner: str, name: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    """The values with the last equal to the first, which they must be but for rounding."""
+    """The values with the last set to the first, from which it may differ by rounding only."""
     if abs(values[-1] - values[0]) > 1e-9 * np.ptp(values):
         raise InputError(f"{owner}: {name} must end as it begins to be repeated, but begins with "
                          f"{values[0]:g} and ends with {values[-1]:g}; add the first value again "
@@ -72,18 +72,18 @@ def require_closed(owner: str, name: str, values: tuple[float, ...]) -> tuple[fl
 def read_or_given(
     owner: str, file: str | None, *, least: int, **columns: tuple[float, ...]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Two sequences of the same length, the first growing, from a file or as given.
+    """Two sequences of equal length, the first ascending, from a file or as given.
 
     Raises
     ------
     InputError
-        Unless exactly one of both is there, and can be used.
+        Unless exactly one of both is given and valid.
     """
     (first, x), (second, y) = columns.items()
     if file is not None:
         if np.size(x) or np.size(y):
-            raise InputError(f"{owner}: file = {file!r} cannot stand beside {first} and {second}; "
-                             f"give the file or the two lists.")
+            raise InputError(f"{owner}: file = {file!r} cannot be combined with {first} and "
+                             f"{second}; give the file or the two lists.")
         x, y = (tuple(column.tolist()) for column in read_columns(owner, file, (first, second)))
         owner = f"{owner}: file = '{file}'"
     x, y = numbers(owner, first, x, least), numbers(owner, second, y)
@@ -97,17 +97,17 @@ def read_or_given(
 def read_columns(
     owner: str, file: str | Path, names: tuple[str, ...], *, first_optional: bool = False
 ) -> tuple[Array, ...]:
-    """Columns of numbers from a text or CSV file, one for each name.
+    """Read columns of numbers from a text or CSV file, one for each name.
 
-    Columns are separated by semicolons, tabs, commas or blanks; where semicolons or tabs
-    separate them, or a number is quoted, a comma in it is a decimal comma. Lines before the first
-    that holds just the numbers are a header; ``#`` starts a comment. Text that is not UTF-8 is
-    taken as Latin-1. With ``first_optional`` the file may lack the first column in all lines.
+    Columns are separated by semicolons, tabs, commas or blanks; with semicolons or tabs, or in a
+    quoted number, a comma is a decimal comma. Lines before the first line of numbers are a header;
+    ``#`` starts a comment. Text that is not UTF-8 is read as Latin-1. With ``first_optional`` the
+    file may lack the first column.
 
     Raises
     ------
     InputError
-        For a file that cannot be read, with the line that is wrong.
+        For a file that cannot be read, with the faulty line.
     """
     lines = _text(owner, file).splitlines()
     widths = {len(names), len(names) - first_optional}

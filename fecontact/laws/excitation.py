@@ -24,7 +24,7 @@ class Drive:
 
     .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin w_E t
 
-    acts on the body in -x, and likewise in y; u_x may be another motion. The dashpots feel the
+    acts on the body in -x, and likewise in y; u_x may be another motion. The dashpots act on the
     absolute velocity of B.
 
     Parameters
@@ -38,7 +38,7 @@ class Drive:
     angular_frequency : float
         w_E, zero or above [rad/s].
     motion_x, motion_y : Signal, optional
-        u_x(t), u_y(t) [m], instead of the harmonic with an amplitude.
+        u_x(t), u_y(t) [m], instead of the harmonic motion.
 
     Raises
     ------
@@ -69,25 +69,25 @@ class Drive:
                 continue
             _require_signal("Drive", f"motion_{component}", motion)
             if amplitude != 0.0:
-                raise InputError(f"Drive: amplitude_{component} = {amplitude!r} cannot stand "
-                                 f"beside motion_{component}; give one of them.")
+                raise InputError(f"Drive: amplitude_{component} = {amplitude!r} cannot be "
+                                 f"combined with motion_{component}; give one of them.")
         if self.motion_x is not None and self.motion_y is not None and self.angular_frequency:
             raise InputError(f"Drive: angular_frequency = {self.angular_frequency!r} has no "
                              f"effect beside motion_x and motion_y; leave it out.")
 
     @property
     def motions(self) -> tuple[Signal, Signal]:
-        """Motions of the springs' far ends in x and y [m]."""
+        """Motions of the driven ends of the springs in x and y [m]."""
         w = self.angular_frequency
         return (self.motion_x or Harmonic(self.amplitude_x, w),
                 self.motion_y or Harmonic(self.amplitude_y, w))
 
     @property
     def frequency_hz(self) -> float:
-        """Frequency of the excitation [Hz]; zero where it has none.
+        """Frequency of the excitation [Hz]; zero without one.
 
-        That of a harmonic motion with an amplitude, or else the lower one of the motions that are
-        given; where none is given, w_E / (2 pi).
+        That of the harmonic motion if it has an amplitude, else the lower one of motion_x and
+        motion_y, else w_E / (2 pi).
         """
         given = [motion for motion in (self.motion_x, self.motion_y) if motion is not None]
         harmonic = self.angular_frequency > 0.0 and (self.amplitude_x or self.amplitude_y)
@@ -99,7 +99,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class PointLoad:
-    """Force or moment on the body at a point, given in time.
+    """Time-dependent force or moment on the body at a point.
 
     Parameters
     ----------
@@ -108,12 +108,12 @@ class PointLoad:
     component : 'x', 'y' or 'phi'
         A force along +x, along +y (away from the ground), or a moment counter-clockwise.
     signal : Signal
-        Its value in time [N], [N m].
+        Its history [N], [N m].
 
     Raises
     ------
     InputError
-        For another component, or what is no point or no signal.
+        For an unknown component, or an invalid point or signal.
     """
 
     point: str | int = "C"
@@ -135,7 +135,7 @@ class PointLoad:
 
 @dataclass(frozen=True)
 class Load:
-    """Constant load ``[0, -normal, 0]`` on the body at C (4.1-6), and loads given in time.
+    """Constant load ``[0, -normal, 0]`` on the body at C (4.1-6), and time-dependent loads.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Load:
     Raises
     ------
     InputError
-        For values that are not finite, or forces of another kind.
+        For values that are not finite, or forces that are not PointLoad.
     """
 
     normal: Annotated[float, Unit("N")] = 0.0

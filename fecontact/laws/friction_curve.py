@@ -1,6 +1,6 @@
 """The friction curve R/F over slip velocity of laws without memory, and its extremes.
 
-They are answered by sampling the compiled law, so they hold for every law, also for users' own.
+They are found by sampling the compiled law, so that user-defined laws work as well.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from fecontact.laws.signatures import friction_at
 
 
 class Curve(Protocol):
-    """What is asked of a friction law here: its compiled function, parameters and scale."""
+    """A friction law as needed here: compiled function, parameters and velocity scale."""
 
     kernel: ClassVar[CompiledLaw]
 
@@ -58,7 +58,7 @@ def coefficient(law: Curve, velocity: Array | float, normal_force: float = 1.0) 
     velocity : (...) array or float
         With parameters per node, (n,) of them, velocities broadcast against (n,).
     normal_force : float
-        F [N]; the result depends on it only in laws whose force is not proportional to F.
+        F [N]; it matters only if the friction force is not proportional to F.
 
     Returns
     -------
@@ -75,8 +75,8 @@ def slope(law: Curve, velocity: Array | float, normal_force: float = 1.0) -> Arr
 def largest_coefficient(law: Curve, normal_force: float = 1.0) -> tuple[Array, Array]:
     """Largest maximum of R/F over slip velocity, and the velocity where it lies [m/s].
 
-    Where R/F has no maximum the velocity is infinite, and the coefficient is the value that R/F
-    tends to, infinite with a viscous term.
+    Without a maximum the velocity is infinite, and the coefficient is the limit of R/F, which is
+    infinite with a viscous term.
 
     Returns
     -------
@@ -89,8 +89,8 @@ def largest_coefficient(law: Curve, normal_force: float = 1.0) -> tuple[Array, A
 def velocity_of_minimum(law: Curve, normal_force: float = 1.0) -> Array:
     """Smallest slip velocity (n,) at which R/F has a minimum [m/s], infinite without one.
 
-    Between the maximum and it friction falls with slip velocity, and steady sliding may be
-    unstable.
+    Between the maximum and this minimum friction decreases with slip velocity, and steady sliding
+    may be unstable.
     """
     def smallest(single: Curve, row: Array) -> list[float]:
         minima = _turning_points(single, row, normal_force, falling_before=True)
@@ -116,7 +116,7 @@ def _stick_velocity(law: Curve, nodes: int) -> Array:
     return found
 
 
-# Many short runs may share a law.
+# Many short runs may use the same law.
 _kept_stick_velocity = lru_cache(maxsize=64)(_stick_velocity)
 
 
@@ -174,7 +174,7 @@ def _sampled(law: Curve, v: Array, F: float, row: Array) -> Array:
 
 
 def _nodes(law: Curve) -> int:
-    """Number of nodes for which parameters are given one by one, else 1."""
+    """Number of nodes with parameters of their own, else 1."""
     given = (getattr(law, entry.name) for entry in fields(cast(Any, law)))
     return max((len(value) for value in given if isinstance(value, tuple)), default=1)
 
@@ -186,7 +186,7 @@ def _table(law: Curve, nodes: int) -> Array:
 def _per_node(
     law: Curve, nodes: int, answer: Callable[[Curve, Array], list[float]]
 ) -> Array:
-    """Answers (n, ...) from the law of one node and its parameters, once for equal nodes."""
+    """Results (n, ...) from the law and parameters of one node, computed once for equal nodes."""
     rows, first, inverse = np.unique(_table(law, nodes), axis=0, return_index=True,
                                      return_inverse=True)
     answers = []

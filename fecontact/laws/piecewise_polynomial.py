@@ -10,10 +10,10 @@ from fecontact.core.types import Array
 
 @helper
 def piecewise(x, p, first):
-    """Value and two derivatives at x of what :func:`piecewise_parameters` put into p[first:].
+    """Value and two derivatives at x of a curve from :func:`piecewise_parameters` in p[first:].
 
-    Outside knots that are not repeated the end values hold; on a knot derivatives are those of
-    the piece that starts there.
+    Outside the knots a curve that is not repeated keeps its end values; derivatives at a knot are
+    those of the piece that starts there.
     """
     n = int(p[first])
     knots = first + 2
@@ -24,7 +24,7 @@ def piecewise(x, p, first):
         x = start + x if x >= 0.0 else end + x
         inside = True
     x = min(max(x, start), end)
-    # Equal steps are found at once, others by halving.
+    # Direct index for equal steps, else bisection.
     k = min(max(int((x - start) / (end - start) * n), 0), n - 1)
     if not p[knots + k] <= x < p[knots + k + 1]:
         k, high = 0, n
@@ -69,7 +69,7 @@ def curve_range(curve: Any) -> tuple[float, float]:
 def equivalent_period(curve: Any) -> float | None:
     """Period of the harmonic with the range and the steepest slope of a ``PPoly``; None if flat.
 
-    Not below two of the shortest distance between knots, which no sampled curve resolves.
+    At least twice the shortest distance between knots, the resolution of a sampled curve.
     """
     low, high = curve_range(curve)
     steepest = float(_steepest(curve).max())
@@ -89,23 +89,23 @@ def _steepest(curve: Any) -> Array:
     return np.abs([(3.0 * c[0] * s + 2.0 * c[1]) * s + c[2] for s in (0.0, widths, turn)]).max(0)
 
 
-# Steps that a smooth curve takes in its period.
+# Steps per period of a smooth curve.
 _STEPS_PER_PERIOD = 20.0
 
 
 def steep_pieces(curve: Any) -> tuple[float | None, Array]:
     """Equivalent period of a ``PPoly`` without its steep pieces, and the ends of these.
 
-    Steps that end with a steep piece need not be short for its sake. What counts as steep is
-    chosen so that a run along the curve takes the fewest steps; the period is None if no piece is
-    left.
+    Steps end at the ends of steep pieces, which therefore do not limit the step elsewhere. The
+    threshold of steepness minimises the number of steps along the curve; the period is None if no
+    piece is left.
     """
     low, high = curve_range(curve)
     slopes, widths = _steepest(curve), np.diff(curve.x)
     order = np.argsort(-slopes)
     with np.errstate(divide="ignore", invalid="ignore"):
         periods = np.maximum(np.pi * (high - low) / slopes[order], 2.0 * widths[order])
-    # Of what is left, the shortest; a piece that is taken out adds up to two breaks.
+    # The shortest of the remaining pieces; each piece removed adds up to two breaks.
     shortest = np.append(np.minimum.accumulate(periods[::-1])[::-1], np.inf)
     if high == low:
         shortest[:] = np.inf

@@ -1,4 +1,4 @@
-"""Names of the laws in study files: ``law = "lugre"``, or a law of the user's own file."""
+"""Names of the laws in study files: ``law = "lugre"``, or a law from a user's file."""
 
 import os
 import sys
@@ -87,17 +87,17 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
     }
 
 
-# The parts of a contact system that tables describe.
+# Parts of a contact system that are described by tables.
 PART_CLASSES: Mapping[str, type] = {
     "normal": NormalLaw, "friction": FrictionLaw, "ground": Ground, "drive": Drive, "load": Load,
 }
 
-# The law of a table that names none.
+# The law of a table without a name.
 _DEFAULTS: dict[type, str] = {NormalLaw: "rough-surface", FrictionLaw: "exponential"}
 
 
 def is_kind(hint: Any) -> bool:
-    """Whether a type is a kind of law, whose laws are told apart by name."""
+    """Whether a type is a kind of law, whose laws are selected by name."""
     return isinstance(hint, type) and hint in law_names()
 
 
@@ -107,7 +107,7 @@ def law_class(kind: type, name: Any, where: str) -> type:
     Raises
     ------
     InputError
-        If there is no such law (with those that there are), file or class.
+        If there is no such law, file or class; the message lists the laws.
     """
     names = law_names()[kind]
     if name is None and kind not in _DEFAULTS:
@@ -137,8 +137,8 @@ def own_law(kind: Any, name: str, where: str) -> type:
         if (loaded := _loaded(file, title)) is not None and issubclass(loaded, kind):
             return loaded
         raise UntrustedError(
-            f"{where} is code in a file, which is not run unadvised; if you trust {path}, say "
-            f"--trust (trust=True).")
+            f"{where} is code in a file, which is not run without permission; if you trust {path}, "
+            f"say --trust (trust=True).")
     module = user_module(path, f"{where}: ")
     laws = {cls.__name__: cls for cls in vars(module).values()
             if isinstance(cls, type) and issubclass(cls, kind)
@@ -159,9 +159,9 @@ _trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted", default=None
 
 @contextmanager
 def trusting(files: bool | Iterable[Path]) -> Iterator[None]:
-    """Let laws be loaded from all files of Python, from none, or from those named alone.
+    """Allow laws from all Python files, from none, or from the named ones only.
 
-    Others raise :class:`UntrustedError`, unless their module is loaded already.
+    Others raise :class:`UntrustedError`, unless their module is already loaded.
     """
     allowed = None if files is True else frozenset(
         str(file.resolve()) for file in files or ())
@@ -173,7 +173,7 @@ def trusting(files: bool | Iterable[Path]) -> Iterator[None]:
 
 
 def law_files(table: Any) -> set[Path]:
-    """Files of Python that the laws of a table name."""
+    """Python files of the laws in a table."""
     if isinstance(table, list | tuple):
         return {file for item in table for file in law_files(item)}
     if not isinstance(table, Mapping):
@@ -197,7 +197,7 @@ def _loaded(file: str, title: str) -> type | None:
 
 
 def name_of(law: Any) -> str | None:
-    """The name of a law's class: None for what is no law of a kind, and for a default."""
+    """The name of a law's class; None for a default, and for objects that are not laws."""
     cls = type(law)
     for kind, names in law_names().items():
         if isinstance(law, kind):
@@ -206,14 +206,14 @@ def name_of(law: Any) -> str | None:
                     return None if _DEFAULTS.get(kind) == name else name
             file = getattr(sys.modules.get(cls.__module__), "__file__", None)
             if file is None or "." in cls.__qualname__:
-                raise InputError(f"The law {cls.__name__} cannot be written down: define it in a "
-                                 f"Python file, outside of functions.")
+                raise InputError(f"The law {cls.__name__} cannot be stored: define it at the top "
+                                 f"level of a Python file.")
             return f"{file}:{cls.__name__}"
     return None
 
 
 def with_folder(table: Any, folder: Path) -> Any:
-    """A table in which files of laws and their data are named from the current folder."""
+    """A table with files of laws and data named relative to the current folder."""
     if isinstance(table, list):
         return [with_folder(item, folder) for item in table]
     if not isinstance(table, Mapping):
@@ -222,9 +222,9 @@ def with_folder(table: Any, folder: Path) -> Any:
 
 
 def movable(table: Any, folder: Path, root: Path) -> Any:
-    """A table in which files of laws below ``root`` are named from a folder, not absolutely.
+    """A table with files of laws below ``root`` named relative to a folder.
 
-    The reverse of :func:`with_folder`; ``root`` can then be moved with all that is in it.
+    The reverse of :func:`with_folder`; ``root`` can then be moved with its contents.
     """
     if isinstance(table, list):
         return [movable(item, folder, root) for item in table]

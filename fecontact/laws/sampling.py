@@ -1,4 +1,4 @@
-"""Laws evaluated at many places at once, through their compiled functions."""
+"""Vectorised evaluation of laws through their compiled functions."""
 
 import numpy as np
 from numba import types
@@ -43,7 +43,7 @@ def friction_values(address: int, p: Array, v: Array, F: Array) -> Array:
 def memory_values(address: int, p: Array, v: Array, F: Array, z: Array) -> Array:
     """R and its derivatives, then z' and theirs, (k, 1 + s, 3 + s), at z (k, s); with memory.
 
-    The columns are the value and its derivatives to v, F and z.
+    The columns are the value and its derivatives with respect to v, F and z.
     """
     out = np.full((len(v), 1 + z.shape[1], 3 + z.shape[1]), np.nan)
     _memory(address, _floats(v), _floats(F), _floats(z), p, out)
@@ -63,18 +63,18 @@ def stored_energy(
     """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u.
 
     Gauss-Legendre quadrature with 16 points in each interval between 0 and 1, 3, 9, 27, ... times
-    the scale; laws with joints elsewhere give a closed form instead.
+    the scale; laws with kinks elsewhere have a closed form instead.
 
     Parameters
     ----------
     address : int
         Address of the compiled function of the law.
     penetration : (..., n) array
-        u of the contact nodes [m]. Below zero the energy is that of the way from 0 down to u.
+        u of the contact nodes [m]; below zero the integral is taken from 0 down to u.
     parameters : (n, k) array
         Parameters of the law at each node.
     scale : float
-        Penetration over which the law changes its character [m].
+        Characteristic penetration of the law [m].
     """
     given = np.asarray(penetration, dtype=float)
     rows = np.ascontiguousarray(given.reshape(-1, len(parameters)))
@@ -106,7 +106,7 @@ _CYCLES, _STEPS = 6, 1000
 
 @kernel(types.void(i8, vector, f8, vector, vector, f8, vector))
 def _cycles(address, p, F, travel, z, step, work):
-    """Fill work with R v dt of every step: z by implicit Euler, forces at the middle of it."""
+    """Fill work with R v dt of every step: z by implicit Euler, forces at mid-step."""
     s = len(z)
     force, rates = np.empty(3 + s), np.empty((s, 3 + s))
     A, residual, after = np.empty((s, s)), np.empty(s), np.empty(s)
@@ -139,10 +139,10 @@ def cycle_work(
     address: int, memory: int, p: Array, normal_force: float, speed: float,
     reach: float,
 ) -> tuple[Array, Array]:
-    """Work (6,) of friction in each of six cycles of slip from z = 0 [J], and that of its size.
+    """Work (6,) of friction in each of six cycles of slip from z = 0 [J], and its absolute value.
 
-    The cycles are of two harmonics with the largest velocity ``speed`` [m/s]; the first one
-    has the amplitude ``reach`` [m]. Passive friction never gives off more than it has taken.
+    Each cycle has two harmonics and the largest velocity ``speed`` [m/s]; the first one has the
+    amplitude ``reach`` [m]. Passive friction never returns more energy than it has absorbed.
     """
     t = np.linspace(0.0, _CYCLES, _CYCLES * _STEPS + 1)
     travel = -(np.cos(2.0 * np.pi * t) + 0.4 * np.cos(6.0 * np.pi * t + 1.0))

@@ -1,7 +1,7 @@
 """Functions of laws: their signatures, signs and units, and how they are compiled.
 
-A law is a frozen dataclass of its parameters together with a scalar function, written once in
-plain Python and compiled. The functions allocate nothing and raise nothing.
+A law is a frozen dataclass of its parameters with a scalar function in plain Python, which is
+compiled. The functions must not allocate or raise.
 
 ===========  ==========================  =========================================================
 kind         function                    returns
@@ -19,20 +19,18 @@ with memory  rates)``                    the s derivatives dR/dz, and ``rates`` 
 ground       ``f(xi, p)``                y, y', y'': height [m], or factor of the friction force,
                                          at the abscissa xi of the ground's own frame [m] and its
                                          derivatives
-signal       ``f(t, p)``                 value and rate of what is given in time: travel of the
-                                         ground [m], displacement of the drive [m], load [N]
+signal       ``f(t, p)``                 value and rate of a function of time: travel of the ground
+                                         [m], displacement of the drive [m], load [N]
 ===========  ==========================  =========================================================
 
 ``p`` holds the parameters in the order of the dataclass's fields; for normal and friction laws
-it is that of the contact node. A parameter given as one number holds for every node; an extensive
-one (stiffness, damping) is then the total of the contact face and is shared by tributary length.
-A parameter given as a sequence has one value per node and is not shared. A parameter that is a
-name out of a few holds for every node; ``p`` has its index among
-:attr:`fecontact.laws.base.NodeLaw.choices`.
+those of the contact node. A parameter given as one number applies to every node; an extensive one
+(stiffness, damping) is then the total of the contact face, distributed by tributary length. A
+parameter given as a sequence has one value per node and is not distributed. A parameter with named
+choices applies to every node; ``p`` holds its index in :attr:`NodeLaw.choices`.
 
-Internal variables of friction with memory are states of the system, integrated with it. Their
-rates must be continuous where R depends on them; at F = 0, where it does not, they fall back to
-zero.
+Internal variables of friction with memory are states of the system. Their rates must be continuous
+where R depends on them; at F = 0, where it does not, they decay to zero.
 """
 
 import inspect
@@ -62,7 +60,7 @@ MEMORY_FORM = "f(v, F, z, p, force, rates)"
 
 
 def _compiled(signature: Any, form: str, function: Any, arguments: int) -> CompiledLaw:
-    """A law of a function, the arguments of which are counted before it is compiled."""
+    """Make a law of a function after checking its number of arguments."""
     if not inspect.isfunction(function):
         raise InputError(f"A law must be a Python function {form}, not "
                          f"{type(function).__name__}.")
@@ -75,8 +73,8 @@ def _compiled(signature: Any, form: str, function: Any, arguments: int) -> Compi
 def normal_law(function: Callable[..., Any]) -> CompiledLaw:
     """Decorator of a function ``f(u, v, p) -> F, dF/du, dF/dv``, compiled at its first use.
 
-    Arguments, results, units and signs stand at the top of the module. InputError for another
-    number of arguments; at the first use for other results, or what cannot be compiled.
+    The docstring of this module lists arguments, results, units and signs. InputError for a wrong
+    number of arguments; at the first use, if results are wrong or the function cannot be compiled.
     """
     return _compiled(NORMAL, NORMAL_FORM, function, 3)
 
@@ -84,8 +82,8 @@ def normal_law(function: Callable[..., Any]) -> CompiledLaw:
 def friction_law(function: Callable[..., Any]) -> CompiledLaw:
     """Decorator of a function ``f(v, F, p) -> R, dR/dv, dR/dF``, compiled at its first use.
 
-    Arguments, results, units and signs stand at the top of the module. InputError for another
-    number of arguments; at the first use for other results, or what cannot be compiled.
+    The docstring of this module lists arguments, results, units and signs. InputError for a wrong
+    number of arguments; at the first use, if results are wrong or the function cannot be compiled.
     """
     return _compiled(FRICTION, FRICTION_FORM, function, 3)
 
@@ -98,7 +96,7 @@ def ground_profile(function: Callable[..., Any]) -> CompiledLaw:
 def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
     """Decorator of a function ``f(v, F, z, p, force, rates)`` that fills force and rates.
 
-    As :func:`friction_law`.
+    Otherwise as :func:`friction_law`.
     """
     return _compiled(MEMORY, MEMORY_FORM, function, 6)
 

@@ -1,4 +1,4 @@
-"""Frequencies and contact compliance as the mesh is refined and modes are added."""
+"""Convergence of frequencies and contact compliance with mesh and number of modes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,22 +15,22 @@ from fecontact.reduction.report import BasisReport
 
 @dataclass(frozen=True, eq=False)
 class ModeConvergence:
-    """What refinement and further modes change; ``str(...)`` is a table.
+    """Effect of mesh refinement and of further modes; ``str(...)`` is a table.
 
     Attributes
     ----------
     unknowns : (L,) array
-        Degrees of freedom of each mesh; each has the cells of the one before cut into four.
+        Degrees of freedom of each mesh; each refinement cuts every cell into four.
     frequencies_hz : (L, k) array
         The lowest elastic frequencies on each mesh [Hz].
     compliance : (L, 2) array
-        Elastic displacement in x and y per unit force there, the mean over the contact nodes,
-        of the whole finite-element body on each mesh [m/N].
+        Elastic displacement in x and y per unit force at the same node, mean over the contact nodes
+        of the full finite-element body, on each mesh [m/N].
     modes : (K,) array
         Numbers of modes, on the given mesh.
     missing : (K, 2) array
-        Part of the contact nodes' compliance in x and y that is missing with so many modes, at
-        the worst node.
+        Largest fraction of a contact node's compliance in x and y that is missing with these
+        numbers of modes.
     """
 
     unknowns: Integers
@@ -65,21 +65,21 @@ def mode_convergence(
     levels: int = 3,
     progress: bool | Callable[[int, int], None] | None = None,
 ) -> ModeConvergence:
-    """Refine the mesh of a body, and add modes on its own mesh.
+    """Study the convergence of a modal basis with the mesh and the number of modes.
 
     Parameters
     ----------
     body : ElasticBody
-        On its coarsest mesh.
+        The body on its coarsest mesh.
     build : callable
         ``build(body, modes)``, the modal basis to study.
     modes : int
-        Number of modes; half, this, twice and four times as many are tried.
+        Number of modes; half, one, two and four times as many are compared.
     levels : int
         Number of meshes, at least two.
     progress : bool or callable, optional
         True for a progress bar on a terminal or in a notebook; a function is called with the
-        number of bases done, and of all.
+        numbers of completed and of all bases.
     """
     require_kind("mode_convergence", ElasticBody, body=body)
     require_kind("mode_convergence", Callable, build=build)  # type: ignore[arg-type]

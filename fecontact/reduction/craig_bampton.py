@@ -1,10 +1,10 @@
-"""Craig-Bampton reduction: fixed-interface modes and constraint modes, diagonalised again.
+"""Craig-Bampton reduction: fixed-interface modes and constraint modes, diagonalised.
 
 The interface is the set of rows W of the points (displacements x and y of B, C and the contact
-nodes). Fixed-interface modes vibrate with W u = 0; a constraint mode is the static shape of one
-unit displacement of the interface with all others at zero. A body with rigid modes gets, beside
-these, its responses to interface forces that only its inertia balances, so that its static
-compliance at the interface is exact as well.
+nodes). Fixed-interface modes satisfy W u = 0; a constraint mode is the static deflection for a unit
+value of one interface displacement, with all others zero. For a body with rigid modes the responses
+to interface forces balanced by inertia are added, so that its static compliance at the interface is
+exact as well.
 """
 
 from typing import Any
@@ -25,7 +25,7 @@ def craig_bampton(system: FreeSystem, rows: Any, count: int) -> tuple[Array, Arr
     system : FreeSystem
         The body.
     rows : sparse (k, f) array
-        The interface; rows that depend on others, or do not move, are left out.
+        The interface; dependent and motionless rows are left out.
     count : int
         Number of fixed-interface modes, zero or more.
 
@@ -49,7 +49,7 @@ def craig_bampton(system: FreeSystem, rows: Any, count: int) -> tuple[Array, Arr
 
 
 def _independent(flexibility: Flexibility) -> Array:
-    """Combinations (k, p) of the rows that are independent and of like compliance."""
+    """Independent combinations (k, p) of the rows, scaled to similar compliance."""
     motion = np.asarray(flexibility.rows @ flexibility.system.rigid)
     elastic = flexibility.compliance
     part = np.trace(elastic) / max(float((motion**2).sum()), 1e-300)
@@ -68,8 +68,8 @@ def _fixed_interface_modes(
     """Shapes (f, count) of the lowest modes that do not move the interface.
 
     ``held`` (f, p) are the interface's forces, ``deflections`` (f, p) the elastic response to
-    them, ``motion`` (p, r) what the rigid modes do to the interface. The response to a load is
-    that of the free body, with the interface's forces and the rigid motion that keep it still.
+    them, ``motion`` (p, r) the interface displacements of the rigid modes. The response to a load
+    is that of the free body with the interface forces and rigid motion that fix the interface.
     """
     from scipy.sparse.linalg import LinearOperator, eigsh
 

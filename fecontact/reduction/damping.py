@@ -16,7 +16,7 @@ from fecontact.core.units import Unit
 class Rayleigh:
     """Damping matrix ``mass_factor * M + stiffness_factor * K``.
 
-    Its damping ratio is ``mass_factor / (2 w) + stiffness_factor w / 2``; rigid modes keep the
+    The damping ratio is ``mass_factor / (2 w) + stiffness_factor w / 2``; rigid modes have the
     absolute damping ``mass_factor``.
 
     Parameters
@@ -67,14 +67,14 @@ def modal_damping(
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
         One damping ratio for all modes, one per mode, Rayleigh factors, a loss factor, or the
         full matrix.
-        A ratio D gives ``2 D w``, so that it does nothing to rigid modes.
+        A ratio D gives ``2 D w``, which is zero for rigid modes.
     angular_frequencies : (m,) array
         [rad/s].
 
     Raises
     ------
     InputError
-        For negative ratios, values that are not finite, or another number of values than modes.
+        For negative ratios, values that are not finite, or a wrong number of values.
     """
     count = len(angular_frequencies)
     if isinstance(damping, Rayleigh):

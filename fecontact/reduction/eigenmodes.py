@@ -1,4 +1,4 @@
-"""Vibration modes of the finite-element body: rigid ones exactly, elastic ones by Lanczos."""
+"""Vibration modes of the finite-element body: exact rigid modes, elastic ones by Lanczos."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +14,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.factorisation import Factors, factorised
 
-# Below this size, and for a large share of all modes, the dense solver is quicker and as exact.
+# Below this size, and for a large share of all modes, the dense solver is faster.
 _DENSE = 600
 
 
@@ -29,7 +29,7 @@ class FreeSystem:
     rigid : (f, r) array
         Mass-normalised rigid modes: ``K rigid = 0``.
     component_mass : sparse (f / 2, f / 2) array, optional
-        Mass of one component, where x and y alternate and have the same.
+        Mass of one component, if x and y alternate and have equal mass.
     """
 
     stiffness: Any
@@ -48,13 +48,13 @@ class FreeSystem:
             free = E.indices
             K, M = (a[free][:, free].tocsc() for a in (body.stiffness, body.mass))
             return cls(K, M, rigid[free])
-        # The columns of E have no row in common, so that E^T E is diagonal.
+        # The columns of E have disjoint rows, so that E^T E is diagonal.
         return cls((E.T @ body.stiffness @ E).tocsc(), (E.T @ body.mass @ E).tocsc(),
                    (E.T @ rigid) / E.multiply(E).sum(axis=0)[:, None])
 
     @cached_property
     def held(self) -> Integers:
-        """Degrees of freedom not supported (f - r,): the other r hold the body isostatically."""
+        """Degrees of freedom (f - r,) left when r others support the body isostatically."""
         from scipy.linalg import qr
 
         size, rigid = self.rigid.shape
@@ -65,7 +65,7 @@ class FreeSystem:
 
     @cached_property
     def factors(self) -> Factors:
-        """Factors of the stiffness of the isostatically held body, which is positive definite."""
+        """Factors of the positive definite stiffness of the isostatically supported body."""
         K = self.stiffness
         if len(self.held) < K.shape[0]:
             K = K[self.held][:, self.held]
@@ -78,13 +78,13 @@ class FreeSystem:
 
     @cached_property
     def mass_product(self) -> Any:
-        """``M x`` of displacements x (f,), as quick as may be."""
+        """Fast product ``M x`` with displacements x (f,)."""
         from scipy.sparse.linalg import LinearOperator
 
         if self.component_mass is None:
-            # By rows, the product is quicker.
+            # The product is faster by rows.
             return self.mass.T
-        # Both components at once, as the two parts of complex numbers.
+        # Both components at once, as real and imaginary part.
         both = self.component_mass.astype(complex)
         return LinearOperator(
             self.mass.shape, lambda x: (both @ x.reshape(-1).view(complex)).view(float),
@@ -97,8 +97,8 @@ class FreeSystem:
     def deflection(self, forces: Array) -> Array:
         """Elastic static response (f,) or (f, k) to forces.
 
-        Forces that are not self-balancing are balanced by the inertia of the rigid motion that
-        they cause; the response is mass-orthogonal to the rigid modes.
+        Forces that are not in equilibrium are balanced by the inertia of the rigid motion that they
+        cause; the response is mass-orthogonal to the rigid modes.
         """
         balanced = forces - self.inertia @ (self.rigid.T @ forces)
         deflection = np.zeros_like(balanced)
@@ -109,7 +109,7 @@ class FreeSystem:
 def eigenfrequencies_hz(body: ElasticBody, count: int = 20) -> Array:
     """The lowest eigenfrequencies (m,) of a body [Hz], exactly zero for rigid modes.
 
-    Raises as :func:`eigenmodes`.
+    Raises the errors of :func:`eigenmodes`.
     """
     require_kind("eigenfrequencies_hz", ElasticBody, body=body)
     return eigenmodes(body, count)[0] / (2.0 * np.pi)
@@ -118,16 +118,16 @@ def eigenfrequencies_hz(body: ElasticBody, count: int = 20) -> Array:
 def eigenmodes(body: ElasticBody, count: int) -> tuple[Array, Array]:
     """The lowest angular frequencies (m,) [rad/s] and mass-normalised shapes (2 N, m).
 
-    Rigid modes that the supports leave are built from the geometry: frequency exactly zero,
-    translation in x, in y, rotation (counter-clockwise). The elastic modes follow with ascending
-    frequency; a mode's first largest component is positive.
+    Rigid modes follow from the geometry: frequency exactly zero, translation in x, in y, rotation
+    (counter-clockwise). Elastic modes follow in order of frequency; the first of the largest
+    components of each is positive.
 
     Raises
     ------
     InputError
-        For less than one mode, or more than there are unknowns.
+        For less than one mode, or more modes than unknowns.
     AnalysisError
-        If a computed mode misses ``|K s - w^2 M s| < 1e-10 |K| |s|``.
+        If a computed mode violates ``|K s - w^2 M s| < 1e-10 |K| |s|``.
     """
     w, free_shapes = free_modes(FreeSystem.of(body), count)
     shapes = body.expansion @ free_shapes
@@ -137,10 +137,10 @@ def eigenmodes(body: ElasticBody, count: int) -> tuple[Array, Array]:
 
 
 def rigid_modes(body: ElasticBody) -> Array:
-    """Mass-normalised rigid modes (2 N, r) that the supports leave, r = 0 ... 3.
+    """Mass-normalised rigid modes (2 N, r) that the supports allow, r = 0 ... 3.
 
-    Translation in x, in y, and a counter-clockwise rotation about the place where the lines of
-    the held displacements meet, about the centre of mass where they leave it open.
+    Translation in x, in y, and a counter-clockwise rotation about the intersection of the lines of
+    the fixed displacements, or about the centre of mass if that is undetermined.
     """
     M = body.mass
     x, y = body.nodes.T
@@ -185,8 +185,8 @@ def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
 def strain_energies(body: ElasticBody, shapes: Array) -> Array:
     """Strain energies (m,) [J] of displacement fields (2 N, m), from the strains in the elements.
 
-    The product with K would lose the digits by which the stiffest cells exceed the body as a
-    whole: all of them, for a slender body with cells strongly graded into its corners.
+    The product with K would lose as many digits as the stiffest cells exceed the body as a whole,
+    which may be all for a slender body with strongly graded cells.
     """
     basis = body.basis
     slopes = np.ascontiguousarray([function[0].grad for function in basis.basis])
@@ -201,7 +201,7 @@ def strain_energies(body: ElasticBody, shapes: Array) -> Array:
 
 @kernel(types.void(block, matrix, types.Array(types.int64, 2, "C"), matrix, vector, vector))
 def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):
-    """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions to x and to y."""
+    """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions in x and y."""
     elements, points = dx.shape
     corners, modes = nodes.shape[1], len(energies)
     direct, lateral, shear = elasticity
@@ -211,7 +211,7 @@ def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):
         for p in range(points):
             strains[:] = 0.0
             for k in range(1, corners):
-                # Only differences count: rigid displacements may be much larger.
+                # Subtract a node: rigid displacements may be much larger than differences.
                 x, y = slopes[2 * k, e, p], slopes[2 * k + 1, e, p]
                 node, first = 2 * nodes[e, k], 2 * nodes[e, 0]
                 for i in range(modes):
@@ -229,8 +229,8 @@ def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):
 def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     """Squares of the lowest non-zero angular frequencies and their mass-normalised shapes.
 
-    Inverse Lanczos iteration with the elastic static response, which leaves out the rigid modes
-    exactly; the dense solver for few unknowns.
+    Inverse Lanczos iteration with the elastic static response, which excludes rigid modes exactly;
+    the dense solver for few unknowns.
     """
     K, M = system.stiffness, system.mass
     size = K.shape[0]
@@ -238,7 +238,7 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
         from scipy.linalg import eigh
 
         inertia = M @ system.rigid
-        # Lift the rigid modes above all others instead of removing them.
+        # Shift the rigid modes above all others instead of removing them.
         lifted = K.toarray() + (inertia @ inertia.T) * _largest(K, M)
         squares, shapes = eigh(lifted, M.toarray(), subset_by_index=[0, count - 1])
     else:
@@ -260,7 +260,7 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
         raise AnalysisError(
             f"The eigenmodes are not accurate: the residual is {error:.1e} of |K| |mode|, and the "
             f"lowest squared frequency {squares[0]:.3g}; look for nearly degenerate cells or parts "
-            f"that hang on a single node."
+            f"connected by a single node."
         )
     return squares, shapes
 
@@ -273,15 +273,15 @@ def backward_error(K: Any, M: Any, squares: Array, shapes: Array) -> Array:
 
 
 def _largest(K: Any, M: Any) -> float:
-    """An upper bound of the largest squared frequency, from element-like diagonal ratios."""
+    """Upper bound of the largest squared frequency, from ratios of diagonals."""
     return float(10.0 * (K.diagonal() / M.diagonal()).max())
 
 
 def fixed_signs(shapes: Array) -> Array:
     """Signs (m,) that make the first of the largest components of each column positive.
 
-    Components within one per cent of the largest count as equal to it, so that round-off
-    between the two ends of a symmetric body does not decide.
+    Components within one per cent of the largest count as equal to it, so that the sign of a
+    symmetric mode does not depend on round-off.
     """
     size = np.abs(shapes)
     first = np.argmax(size >= 0.99 * size.max(axis=0), axis=0)

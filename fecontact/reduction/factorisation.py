@@ -39,8 +39,8 @@ class SuperLUFactors:
     def triangle(self) -> tuple[Any, Array, Integers]:
         """L, D and the order; AnalysisError if pivoting has made the factors unsymmetric."""
         if (self.factors.perm_r != self.factors.perm_c).any():
-            raise AnalysisError("The stiffness of the held body is not positive definite; look "
-                                "for nearly degenerate cells.")
+            raise AnalysisError("The stiffness of the supported body is not positive definite; "
+                                "look for nearly degenerate cells.")
         return self.factors.L, self.factors.U.diagonal(), self.factors.perm_r
 
 
@@ -70,14 +70,14 @@ def factorised(matrix: Any) -> Factors:
     """
     import scipy.sparse as sp
 
-    trouble = "The stiffness of the held body is singular; look for parts that hang on one node."
+    trouble = ("The stiffness of the supported body is singular; look for parts connected by one "
+               "node.")
     try:
         from sksparse.cholmod import CholmodNotPositiveDefiniteError, analyze
     except ImportError:
         from scipy.sparse.linalg import splu
 
-        # Positive definite: no pivoting is needed, and the fill of an ordering for symmetric
-        # matrices is kept.
+        # Positive definite matrices need no pivoting, which keeps the fill of the ordering.
         try:
             return SuperLUFactors(splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A",
                                        diag_pivot_thresh=0.0, options={"SymmetricMode": True}))
@@ -95,13 +95,13 @@ def factorised(matrix: Any) -> Factors:
 _index = types.Array(types.int32, 1, "C")
 _flags = types.Array(types.boolean, 1, "C")
 
-# Columns treated at once: enough to vectorise, few enough for the cache.
+# Columns per block: enough to vectorise, few enough for the cache.
 _BLOCK = 32
 
 
 @kernel(types.void(_index, _index, vector, matrix, _flags), nogil=True)
 def _forward(indptr, indices, data, x, active):
-    """Solve L x = b in place, L unit lower triangular by columns; zero rows are passed over."""
+    """Solve L x = b in place, L unit lower triangular by columns; zero rows are skipped."""
     n, width = x.shape
     for j in range(n):
         if active[j]:
@@ -130,9 +130,9 @@ def _backward(indptr, indices, data, x):
 class SymmetricFactors:
     """Substitutions with the factors ``A = P^T L D L^T P`` of a positive definite matrix.
 
-    The forward substitution of sparse right-hand sides touches only the rows that they reach,
-    a small part for loads on a boundary. It alone gives ``W A^-1 W^T`` for all of them; the
-    backward substitution is done for the few combinations that are wanted in full.
+    Forward substitution of sparse right-hand sides touches only the rows that they reach, a small
+    fraction for loads on a boundary. It suffices for ``W A^-1 W^T``; backward substitution is done
+    only for the few combinations that are needed in full.
     """
 
     def __init__(self, factors: Factors) -> None:
@@ -142,7 +142,7 @@ class SymmetricFactors:
         self.diagonal, self.order = np.asarray(diagonal), order
 
     def forward_substitute(self, rows: Any) -> tuple[Integers, Array]:
-        """``D^-1/2 L^-1 P W^T`` of sparse rows W (k, n): the places of its non-zero rows (r,)
+        """``D^-1/2 L^-1 P W^T`` of sparse rows W (k, n): the indices of its non-zero rows (r,)
         and these rows (r, k).
         """
         size, count = len(self.order), rows.shape[0]

@@ -1,4 +1,4 @@
-"""The modal basis of a mass and a stiffness matrix that come from another program."""
+"""Modal bases from mass and stiffness matrices of other programs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,18 +16,18 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.null_space import lowest_vectors, null_space, relative_energies
 from fecontact.reduction.restriction import Restriction, stack_restriction
 
-# Up to this size all modes are kept where no number is given.
+# Up to this size all modes are kept by default.
 _ALL = 2000
-# As in fecontact.reduction.eigenmodes: here the dense solver is quicker and as exact.
+# Below this size the dense solver is faster, as in fecontact.reduction.eigenmodes.
 _DENSE = 600
-# Abaqus writes 1e36 on the diagonal of the stiffness where a boundary condition holds.
+# Abaqus writes 1e36 on the diagonal of the stiffness for boundary conditions.
 _HELD = 1e35
 _ASYMMETRY = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A square symmetric matrix as given: its entries, and how to speak of it and its rows."""
+    """A square symmetric matrix as given: entries, and names of matrix and rows for messages."""
 
     name: str
     matrix: Any
@@ -57,31 +57,30 @@ def basis_from_matrices(
     contact_x: ArrayLike | None = None,
     tributary: ArrayLike | None = None,
 ) -> ModalBasis:
-    """Basis of given matrices, for bodies meshed elsewhere or chains of masses.
+    """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
-    Rigid modes are the displacements that the stiffness does not resist; they get the
-    frequency zero. The first of the largest components of each mode is positive.
+    Rigid modes are displacements without strain energy, of frequency exactly zero. The first of the
+    largest components of each mode is positive.
 
     Parameters
     ----------
     mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
         Symmetric; the mass positive definite [kg], the stiffness positive semi-definite
-        [N/m]. Degrees of freedom with a stiffness of 1e35 or more on the diagonal are held.
+        [N/m]. Degrees of freedom with a diagonal stiffness of 1e35 or more are fixed.
     rows : mapping
-        ``contact``: displacements x, y and rotation of each of the n contact nodes from the d
-        degrees of freedom, as (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several
-        contact groups a mapping of their names to such rows. ``B``, ``C``
-        and further named points: dense or sparse (3, d); B and C are zero when left out.
-        Two rows, x and y, in the place of three mean no rotation.
-        :func:`fecontact.reduction.rows_from_dofs` makes them from numbers.
+        ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
+        the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
+        groups a mapping of their names to such rows. ``B``, ``C`` and further named points: dense
+        or sparse (3, d); B and C default to zero. Two rows, x and y, instead of three mean no
+        rotation. See :func:`fecontact.reduction.rows_from_dofs`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
         Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
         given degrees of freedom, dense, sparse or AssembledMatrix [N s/m].
     modes : int, optional
-        Number m of modes, the rigid ones included, lowest first; all, up to d = 2000.
+        Number m of modes, lowest first, rigid ones included; by default all, up to d = 2000.
     rigid : int, optional
-        Number of rigid modes, for stiffness matrices that carry few digits or were
-        condensed; found from the stiffness when left out.
+        Number of rigid modes, for stiffness matrices with few digits or after condensation; by
+        default determined from the stiffness.
     contact_x, tributary : (n,) arrays, optional
         Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes
         [m].
@@ -89,8 +88,8 @@ def basis_from_matrices(
     Raises
     ------
     InputError
-        For matrices that are not square, of one size, finite, symmetric or definite as
-        required, and for rows of another width.
+        For matrices that are not square, of equal size, finite, symmetric or definite as required,
+        and for rows of wrong width.
     AnalysisError
         If the modes cannot be computed accurately.
     """
@@ -119,7 +118,7 @@ def assembled_basis(
     w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
     tributary: ArrayLike | None,
 ) -> ModalBasis:
-    """The basis of modes (d, m) without geometry, at the rows."""
+    """Modal basis of modes (d, m) without geometry, from rows of the points."""
     n = rows.contact_nodes
     T = np.asarray(rows.restriction @ shapes).reshape(-1, 3, len(w))
     positions = np.zeros((len(T), 2))
@@ -136,7 +135,7 @@ def assembled_basis(
 
 
 def given_matrix(kind: str, given: Any) -> Given:
-    """A dense, sparse or read matrix as a sparse one.
+    """Convert a dense, sparse or assembled matrix to a sparse one.
 
     Raises
     ------
@@ -194,7 +193,7 @@ def _named(given: Given) -> set[tuple[int, ...]]:
 
 
 def _inside(given: Given) -> str:
-    """The name within a sentence."""
+    """The name as used within a sentence."""
     return given.name[0].lower() + given.name[1:]
 
 
@@ -214,7 +213,7 @@ def _damping_matrix(damping: Any, mass: Given) -> Any:
 
 
 def _symmetric(given: Given) -> Given:
-    """The symmetric part of a matrix that is symmetric but for its last digits."""
+    """The symmetric part of a matrix that is symmetric up to rounding."""
     import scipy.sparse as sp
 
     difference = sp.coo_array(abs(given.matrix - given.matrix.T))
@@ -297,7 +296,7 @@ def _dense_elastic(K: Any, M: Any, R: Array, count: int) -> tuple[Array, Array]:
 
     mass, lifted = M.toarray(), K.toarray()
     if R.shape[1]:
-        # The rigid modes are lifted above all others.
+        # Shift the rigid modes above all others.
         top = eigh(lifted, mass, eigvals_only=True, subset_by_index=[len(mass) - 1] * 2)[0]
         inertia = M @ R
         lifted += 2.0 * top * (inertia @ inertia.T)
@@ -310,7 +309,7 @@ def _dense_elastic(K: Any, M: Any, R: Array, count: int) -> tuple[Array, Array]:
 
 
 def _per_node(name: str, values: ArrayLike, n: int) -> Array:
-    """One value for each contact node, a single one for all."""
+    """One value per contact node, from one each or one for all."""
     array = np.asarray(values, dtype=float)
     if array.shape not in ((), (n,)):
         raise InputError(f"{name} must have one value for each of the {n} contact nodes, not shape "

@@ -1,4 +1,4 @@
-"""Modal bases from modes computed or measured elsewhere, and the scaling of these."""
+"""Modal bases from given mode shapes, and the normalisation of these."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _EQUAL = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Normalisation:
-    """How mode shapes are scaled, and whether they are mass-orthogonal.
+    """Scaling and mass-orthogonality of mode shapes.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Normalisation:
     worst_off_diagonal : float
         Largest ``|s_i^T M s_j|`` of two shapes after both are scaled to unit modal mass.
     worst_pair : (int, int)
-        The two modes i < j that it belongs to, counted from 0; (0, 0) for a single mode.
+        These two modes i < j, counted from 0; (0, 0) for a single mode.
     """
 
     name: str
@@ -41,19 +41,19 @@ class Normalisation:
 
 
 def normalisation(shapes: ArrayLike, mass: Any) -> Normalisation:
-    """Find out how mode shapes are scaled.
+    """Determine how mode shapes are scaled.
 
     Parameters
     ----------
     shapes : (d, m) array
-        One mode a column.
+        One mode per column.
     mass : dense or sparse (d, d) array, or AssembledMatrix
         [kg].
 
     Raises
     ------
     InputError
-        For arrays that do not fit or are not finite, and shapes without mass.
+        For arrays of wrong shape or with values that are not finite, and shapes without mass.
     """
     S = _shapes(shapes)
     given = given_matrix("mass", mass)
@@ -92,35 +92,35 @@ def basis_from_modes(
     contact_x: ArrayLike | None = None,
     tributary: ArrayLike | None = None,
 ) -> ModalBasis:
-    """Basis of modes that were computed elsewhere or measured.
+    """Modal basis from computed or measured mode shapes.
 
-    The shapes are scaled to unit modal mass, ordered by frequency, and their signs fixed;
-    :func:`normalisation` says how they were scaled.
+    The shapes are scaled to unit modal mass, sorted by frequency, and given fixed signs;
+    :func:`normalisation` determines their original scaling.
 
     Parameters
     ----------
     shapes : (d, m) array
-        Real mode shapes, one a column.
+        Real mode shapes, one per column.
     rows : mapping
         As for :func:`~fecontact.basis_from_matrices`.
     frequencies_hz, angular_frequencies : (m,) array
         One of the two [Hz, rad/s]; exactly zero for rigid modes.
     mass : dense or sparse (d, d) array, or AssembledMatrix
-        Mass matrix [kg], to find the scale of the shapes and check that they are orthogonal.
+        Mass matrix [kg], for the scale of the shapes and a check of their orthogonality.
     modal_mass : float or (m,) array
-        In the place of a mass matrix: the shapes' modal masses, 1 for mass-normalised shapes.
+        Modal masses, instead of a mass matrix; 1 for mass-normalised shapes.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
         Ratios in the order of the shapes, Rayleigh factors, a loss factor, or the modal
         damping matrix of the mass-normalised shapes [1/s].
     orthogonality : float
-        Largest product ``|s_i^T M s_j|`` of two mass-normalised shapes that is accepted.
+        Largest accepted product ``|s_i^T M s_j|`` of two mass-normalised shapes.
     contact_x, tributary : (n,) arrays, optional
         As for :func:`~fecontact.basis_from_matrices`.
 
     Raises
     ------
     InputError
-        For arrays that do not fit, and for shapes that are complex or not mass-orthogonal.
+        For arrays of wrong shape, and for shapes that are complex or not mass-orthogonal.
     """
     S = _shapes(shapes)
     d, m = S.shape
@@ -175,7 +175,7 @@ def _frequencies(hz: ArrayLike | None, angular: ArrayLike | None, m: int) -> Arr
 
 
 def _reordered(damping: Damping, order: Integers, signs: Array) -> Damping:
-    """Damping of the modes in their new order and with their new signs."""
+    """Damping of the modes after reordering and sign changes."""
     if isinstance(damping, (LossFactor, Rayleigh)):
         return damping
     values = np.asarray(damping, dtype=float)

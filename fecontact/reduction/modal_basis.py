@@ -14,14 +14,14 @@ from fecontact.core.units import Summarised, listed, span
 
 @dataclass(frozen=True, eq=False)
 class ModeShapes:
-    """Modes over the whole body: what is needed to draw it and to load it anywhere.
+    """Mode shapes over the whole body, for plots and for loads at any point.
 
     Attributes
     ----------
     nodes : (N, 2) array
         Reference places of the displacement nodes [m].
     cells : (M, 3) or (M, 4) integer array
-        First-order cells between these nodes (each finite element is cut into four).
+        First-order cells between these nodes (four per finite element).
     outline : (k, 2) integer array
         Edges on the outline, as pairs of nodes.
     shapes : (N, 2, m) array
@@ -29,9 +29,9 @@ class ModeShapes:
     stress : (N, 4, m) array
         Stresses xx, yy, zz, xy of the modes, averaged at the nodes [Pa per unit coordinate].
     restriction : sparse (3 P, 2 N) array
-        Displacements and rotation of the P points from those of the nodes (node by node, x then
-        y), so that ``T = restriction @ shapes``; its transpose spreads a force at a point over
-        the body.
+        Displacements and rotation of the P points from those of the nodes (node by node, x then y),
+        so that ``T = restriction @ shapes``; its transpose distributes a force at a point over the
+        nodes.
     """
 
     nodes: Array
@@ -44,14 +44,14 @@ class ModeShapes:
 
 @dataclass(frozen=True, eq=False)
 class ReductionQuality:
-    """How a basis relates to the finite-element body that it came from.
+    """Quality of a basis compared with its finite-element body.
 
     Attributes
     ----------
     mass : float
         Mass of the body [kg].
     vibration_modes : int
-        Number of leading modes that are eigenmodes of the body; the others complete them.
+        Number of leading modes that are eigenmodes of the body.
     residuals : (m,) array
         ``|K s - w^2 M s| / (|K| |s|)`` of each mode s; small for eigenmodes only.
     orthogonality : float
@@ -59,8 +59,8 @@ class ReductionQuality:
     participation : (2, m) array
         ``s^T M 1`` for translations in x and in y [kg^(1/2)]; its square is the effective mass.
     compliance : (P, 2) array
-        Elastic displacement of each point in x and y per unit force there, of the whole body
-        (inertia balances what the supports do not) [m/N].
+        Elastic displacement of each point in x and y per unit force there, of the full body (loads
+        are balanced by supports and inertia) [m/N].
     """
 
     mass: float
@@ -90,22 +90,22 @@ class ModalBasis(Summarised):
     positions : (P, 2) array
         Reference places of these points [m].
     tributary : (n,) array
-        Length of the contact face that each contact node stands for [m].
+        Length of the contact face represented by each contact node [m].
     extra : tuple of str
         Names of the points after the contact nodes.
     mode_shapes : ModeShapes or None
-        Modes over the whole body; None for a basis without geometry.
+        Mode shapes over the whole body; None for a basis without geometry.
     quality : ReductionQuality or None
-        How the basis relates to the body; None for a basis without one.
+        Comparison with the body; None for a basis without one.
     groups : tuple of (str, int)
-        Names of the contact groups and their numbers of nodes, in the order of the nodes; one
-        group 'contact' of all when left out.
+        Names of the contact groups and their numbers of nodes, in the order of the nodes; by
+        default one group 'contact'.
 
     Raises
     ------
     InputError
-        For arrays of another shape, values that are not finite, tributary lengths that are not
-        positive, and groups that do not make up the contact nodes.
+        For arrays of wrong shape, values that are not finite, tributary lengths that are not
+        positive, and groups that do not add up to the contact nodes.
     """
 
     angular_frequencies: Array
@@ -131,7 +131,7 @@ class ModalBasis(Summarised):
         groups = tuple((str(name), int(count)) for name, count in self.groups)
         groups = groups or (("contact", len(self.tributary)),)
         if sum(count for _, count in groups) != len(self.tributary):
-            raise InputError(f"Modal basis: the contact groups {groups} do not make up the "
+            raise InputError(f"Modal basis: the contact groups {groups} do not add up to the "
                              f"{len(self.tributary)} contact nodes.")
         object.__setattr__(self, "groups", groups)
         m = len(self.angular_frequencies)
@@ -206,7 +206,7 @@ class ModalBasis(Summarised):
     def point_index(self, point: str | int) -> int:
         """Index into ``T`` of B, C, a further named point, or a contact node by its number.
 
-        InputError if there is none, with those that there are.
+        InputError for an unknown point.
         """
         require_kind("A point", (str, int), point=point)
         if isinstance(point, bool):
@@ -237,7 +237,7 @@ class ModalBasis(Summarised):
         ----------
         dashpots : mapping of point to (b_x, b_y)
             Points by name, contact nodes by number; damping in x and in y, zero or above
-            [N s/m]. ``b row^T row`` is added to the modal damping matrix, which they make full.
+            [N s/m]. ``b row^T row`` is added to the modal damping matrix, which becomes full.
 
         Raises
         ------
@@ -259,10 +259,10 @@ class ModalBasis(Summarised):
         return replace(self, damping=damping)
 
     def select(self, modes: Sequence[int]) -> "ModalBasis":
-        """A copy with the given modes alone, by number from 0, each once and in ascending order.
+        """A copy with the given modes only, by number from 0, in ascending order.
 
-        A block's tilting, say, is left out by leaving out its rigid rotation. Raises InputError
-        for a mode that does not exist.
+        For example, leaving out the rigid rotation of a block prevents tilting. InputError for a
+        mode that does not exist.
         """
         require_kind("select", (Sequence, np.ndarray), modes=modes)
         chosen = np.unique(as_integers(modes, "The modes to select"))

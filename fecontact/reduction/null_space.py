@@ -1,6 +1,6 @@
-"""Rigid modes of a stiffness matrix without geometry: the displacements it does not resist.
+"""Rigid modes of a stiffness matrix without geometry: displacements without strain energy.
 
-A displacement r is rigid if its strain energy is lost in the round-off of the sums that make it:
+A displacement r is rigid if its strain energy is below the round-off of its computation:
 ``r^T K r <= 1e-15 |r|^T |K| |r|``. An elastic mode below this limit could not be computed from
 the matrix either.
 """
@@ -14,7 +14,7 @@ from fecontact.core.types import Array, Integers
 
 _ROUND_OFF = 1e-15
 _DENSE = 600
-# More rigid modes than half of this are taken for a mistake.
+# More than half this number of rigid modes is an error.
 _MANY = 1000
 
 
@@ -26,16 +26,16 @@ def relative_energies(K: Any, shapes: Array) -> Array:
 
 
 def lowest_vectors(K: Any, M: Any, name: str, rigid: int | None) -> Array:
-    """Approximate null space (d, r) of K: as many vectors as asked for, or as it has.
+    """Approximate null space (d, r) of K, of given or detected dimension.
 
     Parameters
     ----------
     K, M : sparse (d, d) arrays
         Symmetric; M positive definite.
     name : str
-        What to call K in messages.
+        Name of K in messages.
     rigid : int or None
-        Number of vectors; None for those that K does not resist.
+        Number of vectors; None to detect it.
 
     Raises
     ------
@@ -60,11 +60,10 @@ def lowest_vectors(K: Any, M: Any, name: str, rigid: int | None) -> Array:
 
 
 def null_space(K: Any, M: Any, vectors: Array) -> Array:
-    """Mass-normalised null space (d, r) of K from approximate vectors of it (d, r).
+    """Mass-normalised null space (d, r) of K from approximate vectors (d, r).
 
-    As many degrees of freedom as there are vectors hold the body isostatically; the null space
-    is the static response to their unit displacements. It depends on the matrices alone, not on
-    the vectors that start it.
+    r degrees of freedom support the body isostatically; the null space is the static response to
+    their unit displacements. It depends on the matrices only, not on the starting vectors.
     """
     d, count = vectors.shape
     if not count:
@@ -86,7 +85,7 @@ def null_space(K: Any, M: Any, vectors: Array) -> Array:
 
 
 def symmetric_factors(matrix: Any) -> Any:
-    """Factors of a sparse symmetric matrix, the pivots on its diagonal."""
+    """Factors of a sparse symmetric matrix with pivots on its diagonal."""
     from scipy.sparse.linalg import splu
 
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
@@ -94,7 +93,7 @@ def symmetric_factors(matrix: Any) -> Any:
 
 
 def _supports(vectors: Array) -> Integers:
-    """Degrees of freedom (r,) that hold r vectors (d, r), the first of nearly equal ones."""
+    """Degrees of freedom (r,) that fix r vectors (d, r); the first of nearly equal ones."""
     left = vectors.copy()
     chosen = []
     for _ in range(vectors.shape[1]):
@@ -118,12 +117,12 @@ def _dense(K: Any, M: Any, rigid: int | None, name: str) -> tuple[Array, Array]:
 
 
 def _sparse(K: Any, M: Any, rigid: int | None, name: str) -> tuple[Array, Array]:
-    """Lowest eigenpairs by inverse iteration of a block, which finds multiple ones, too."""
+    """Lowest eigenpairs by block inverse iteration, which also finds multiple ones."""
     d = K.shape[0]
     largest = float((K.diagonal() / M.diagonal()).max())
     if largest <= 0.0 and K.nnz and abs(K).max() > 0.0:
         raise _not_definite(name, "its diagonal is not positive anywhere")
-    # Well above round-off, below the squares of the frequencies that can be told from it.
+    # Well above round-off, below the squares of frequencies that can be resolved.
     shift = (largest or 1.0) * (1e-13 if rigid is None else 1e-8)
     factors = symmetric_factors((K + shift * M).tocsc())
     negative = int(np.count_nonzero(factors.U.diagonal() < 0.0))
@@ -141,7 +140,7 @@ def _sparse(K: Any, M: Any, rigid: int | None, name: str) -> tuple[Array, Array]
     if d <= _MANY:
         return _dense(K, M, rigid, name)
     raise InputError(f"{name} leaves more than {_MANY // 2} displacements without resistance; "
-                     f"leave out the degrees of freedom that nothing is fastened to.")
+                     f"leave out degrees of freedom without stiffness.")
 
 
 def _ritz(K: Any, M: Any, vectors: Array) -> tuple[Array, Array]:

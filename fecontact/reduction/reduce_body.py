@@ -40,36 +40,34 @@ def modal_basis(
     body : ElasticBody
         The finite-element body.
     modes : int
-        Number of modes, the rigid ones included, lowest first.
+        Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground; its outward normal must point down, to -y. Several
-        boundaries are as many contact groups, which may have laws of their own.
+        Boundary that touches the ground, its outward normal pointing to -y. Each of several
+        boundaries is a contact group, which may have its own laws.
     contact_nodes : int or 'all', or one of them for each boundary
-        Number of equal segments of the contact boundary, each with a node in its middle that
-        moves with the segment's mean displacement; or every displacement node of the
-        boundary.
+        Number of equal segments of the boundary, each with a contact node at its centre that moves
+        with the segment's mean displacement; 'all' takes every displacement node of the boundary.
     B, C : place, optional
-        Excitation and load point: the name of a point or boundary of the mesh, (x, y), or
-        :class:`~fecontact.Patch`. Default: the mesh's point of that name; without
-        one, the rows are zero.
+        Excitation and load point: the name of a point or boundary of the mesh, (x, y), or a
+        :class:`~fecontact.Patch`. Default: the mesh's point of that name, else zero
+        rows.
     points : mapping of name to place, optional
         Further points to observe.
-    damping : float, (m,) sequence, Rayleigh or (m, m) array
-        See :func:`fecontact.reduction.damping.modal_damping`; modes that complete the given number
-        take the last ratio.
+    damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
+        See :func:`fecontact.reduction.damping.modal_damping`. Residual vectors and constraint modes
+        take the last ratio of a sequence.
     reduction : 'vibration', 'residual' or 'craig-bampton'
-        The lowest vibration modes alone; these completed by residual vectors of forces at
-        B, C and the contact nodes, so that static deflections there are right; or that many
-        fixed-interface modes with constraint modes.
+        Vibration modes alone; vibration modes and residual vectors of forces at B, C and the
+        contact nodes, for exact static deflections there; or fixed-interface and constraint modes.
     tolerance : float
-        For 'residual': the part of its own static compliance that may be missing at any of
-        these points, in x or y. Zero keeps all residual vectors; the larger, the fewer.
+        For 'residual': largest fraction of its static compliance that may be missing at any of
+        these points, in x or y. Zero keeps all residual vectors.
 
     Raises
     ------
     InputError, MeshError
-        For names that do not exist, places outside the body, an upward contact face, more
-        modes than unknowns, more contact nodes than the boundary has.
+        For unknown names, places outside the body, an upward contact face, more modes than
+        unknowns, or more contact nodes than the boundary has.
     """
     import scipy.sparse as sp
 
@@ -80,7 +78,7 @@ def modal_basis(
     for name in points:
         require_kind("points", str, name=name)
         if name in ("B", "C"):
-            raise InputError(f"points: '{name}' is a name of its own; give it as {name}=...")
+            raise InputError(f"points: the name '{name}' is reserved; use {name}=... instead.")
     if reduction not in get_args(Reduction):
         raise InputError(f"reduction = {reduction!r} must be one of {choices(get_args(Reduction))}"
                          f"{nearest(str(reduction), get_args(Reduction))}.")
@@ -92,7 +90,7 @@ def modal_basis(
     restriction = sp.csr_array(sp.vstack(
         [*(row.matrix for row in named), face.matrix, *(row.matrix for row in further)]))
     system = FreeSystem.of(body)
-    # Forces act at B, C and the contact nodes in x and y; the rotation carries none.
+    # Forces act at B, C and the contact nodes in x and y; there are no moments.
     loaded = np.flatnonzero(np.arange(restriction.shape[0]) % 3 < 2)
     flexibility = Flexibility(system, sp.csr_array(restriction[loaded] @ body.expansion))
     w, free_shapes, vibration = _modes(system, flexibility, modes, reduction, tolerance,
@@ -129,7 +127,7 @@ def _modes(
     system: FreeSystem, flexibility: Flexibility, count: int, reduction: Reduction,
     tolerance: float, used: int,
 ) -> tuple[Array, Array, int]:
-    """Frequencies, shapes and the number of true eigenmodes among them."""
+    """Frequencies, shapes and number of the eigenmodes among them."""
     if reduction == "craig-bampton":
         w, shapes = craig_bampton(system, flexibility.rows[:used], count)
         return w, shapes, system.rigid.shape[1]
@@ -138,7 +136,7 @@ def _modes(
         return w, shapes, count
     if count < system.rigid.shape[1]:
         raise InputError(f"modes = {count} must be at least the number of rigid modes, "
-                         f"{system.rigid.shape[1]}, to be completed by residual vectors.")
+                         f"{system.rigid.shape[1]}, for reduction = 'residual'.")
     more, completing = residual_modes(flexibility.of_first(used), w, shapes, tolerance)
     return np.concatenate([w, more]), np.hstack([shapes, completing]), count
 
@@ -161,7 +159,7 @@ def _quality(
 
 def linear_cells(body: ElasticBody) -> Integers:
     """First-order cells between all displacement nodes, counter-clockwise."""
-    # Indices are 64-bit integers in files too.
+    # 64-bit indices, as in files.
     dofs = body.basis.element_dofs.astype(np.int64)
     if body.degree == 1:
         cells = dofs.T

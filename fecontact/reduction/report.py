@@ -8,7 +8,7 @@ import numpy as np
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
 
-# Errors of static compliance below this need no remedy; contact laws are known less well.
+# Acceptable error of static compliance, below the uncertainty of contact laws.
 _GOOD = 0.1
 
 
@@ -16,7 +16,7 @@ _GOOD = 0.1
 class BasisReport:
     """Figures of merit of a basis; ``str(report)`` is a table with a recommendation.
 
-    The figures that compare with the finite-element body are NaN for a basis without one.
+    Figures that need the finite-element body are NaN for a basis without one.
     """
 
     basis: ModalBasis
@@ -31,7 +31,7 @@ class BasisReport:
 
     @cached_property
     def compliance_error(self) -> Array:
-        """Part (P, 2) of each point's elastic compliance, in x and in y, that the basis lacks.
+        """Fraction (P, 2) of each point's elastic compliance in x and y missing in the basis.
 
         Zero for points and directions that do not deflect.
         """
@@ -39,7 +39,7 @@ class BasisReport:
         if quality is None:
             return np.full((len(self.basis.T), 2), np.nan)
         whole = quality.compliance
-        # Compliances are differences of rigid parts: smaller ones are round-off.
+        # Compliances are differences of rigid contributions; smaller ones are round-off.
         real = whole > 1e-10 * whole.max(initial=0.0)
         error = 1.0 - np.divide(self.basis.elastic_compliance, whole, out=np.ones_like(whole),
                                 where=real)
@@ -47,7 +47,7 @@ class BasisReport:
 
     @property
     def contact_error(self) -> Array:
-        """The same (n, 2) at the contact nodes."""
+        """:attr:`compliance_error` (n, 2) of the contact nodes."""
         return self.compliance_error[2 : 2 + self.basis.contact_nodes]
 
     @property
@@ -68,13 +68,13 @@ class BasisReport:
 
     @property
     def time_step(self) -> float:
-        """A twentieth of the shortest period [s], what resolving every mode takes."""
+        """A twentieth of the shortest period [s], which resolves every mode."""
         highest = self.highest_frequency_hz
         return 0.05 / highest if highest > 0.0 else np.inf
 
     @property
     def recommendation(self) -> str:
-        """What to do about the basis, one or two sentences."""
+        """Recommendation in one or two sentences."""
         if self.basis.quality is None:
             return ("The basis came without a body, so its compliance at the contact cannot be "
                     "judged; compare it with a static solution of the full model.")

@@ -1,4 +1,4 @@
-"""Residual vectors: the static response at the points that the kept modes leave out.
+"""Residual vectors: the static response at the points that the kept modes lack.
 
 A force pattern f over the rows W of the points loads the free degrees of freedom with
 ``W^T f``. Beside the kept modes Phi with squared frequencies L, the elastic static response is
@@ -39,7 +39,7 @@ class Flexibility:
 
     @cached_property
     def _balance(self) -> tuple[Array, Array]:
-        """Response (f, r) of the held body to the rigid modes' inertia, and W rigid (k, r)."""
+        """Response (f, r) of the supported body to rigid-body inertia, and W rigid (k, r)."""
         system = self.system
         response = np.zeros_like(system.rigid)
         if system.rigid.shape[1]:
@@ -67,7 +67,7 @@ class Flexibility:
 
 
 def modal_compliance(rows: Any, w: Array, shapes: Array) -> Array:
-    """Part (k, k) of the elastic compliance at the rows that modes (f, m) give [m/N]."""
+    """Contribution (k, k) of modes (f, m) to the elastic compliance at the rows [m/N]."""
     at_rows = np.asarray(rows @ shapes[:, w > 0.0]) / w[w > 0.0]
     return np.asarray(at_rows @ at_rows.T)
 
@@ -75,9 +75,9 @@ def modal_compliance(rows: Any, w: Array, shapes: Array) -> Array:
 def leading_patterns(whole: Array, kept: Array, tolerance: float) -> Array:
     """Force patterns (k, p) whose residual vectors leave no more than ``tolerance``.
 
-    They are the leading singular vectors of the residual compliance ``whole - kept`` (k, k),
-    each row scaled by the square root of its whole elastic compliance; p is the least number for
-    which the part of any row's own compliance that is missing is at most ``tolerance`` of it.
+    They are the leading singular vectors of the residual compliance ``whole - kept`` (k, k), each
+    row scaled by the square root of its full elastic compliance; p is the smallest number for which
+    no row lacks more than the fraction ``tolerance`` of its own compliance.
     """
     own = np.diag(whole)
     scale = np.where(own > 0.0, 1.0, 0.0) / np.sqrt(np.where(own > 0.0, own, 1.0))
@@ -125,7 +125,7 @@ def diagonalised(system: FreeSystem, vectors: Array) -> tuple[Array, Array]:
     inverse, turned = inverse[::-1], turned[:, ::-1]
     shapes = vectors @ (span @ (turned / np.sqrt(inverse)))
     if inverse[0] * values[-1] > 1e6 * inverse[-1] * values[kept][0]:
-        # One symmetric step squares what round-off has left of the orthogonality.
+        # One symmetric step squares the error of orthogonality.
         gram = shapes.T @ (system.mass @ shapes)
         shapes = shapes @ (1.5 * np.eye(len(gram)) - 0.5 * gram)
     return 1.0 / inverse, shapes * fixed_signs(shapes)

@@ -1,4 +1,4 @@
-"""Rows of the points of interest over degrees of freedom that come from another program."""
+"""Rows of the points of interest over degrees of freedom of another program."""
 
 import operator
 from collections.abc import Mapping, Sequence
@@ -43,7 +43,7 @@ def rows_from_dofs(
     C: Place | None = None,
     points: Mapping[str, Place] | None = None,
 ) -> dict[str, Any]:
-    """Rows for :meth:`basis_from_matrices` from numbers of degrees of freedom.
+    """Rows for :func:`fecontact.basis_from_matrices` from numbers of degrees of freedom.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ def rows_from_dofs(
         Number of degrees of freedom, counted from 0.
     contact : sequence of (ix, iy) or (ix, iy, iphi)
         Degrees of freedom that are the displacements x and y (and the rotation) of each contact
-        node; None or -1 for one that the model does not have: the row is then zero.
+        node; None or -1 for one that the model lacks, which gives a zero row.
     B, C : (ix, iy) or (ix, iy, iphi), optional
-        Excitation and load point, likewise; left out, they do not move.
-    points : mapping of name to such places, optional
+        Excitation and load point, likewise; zero rows by default.
+    points : mapping of name to (ix, iy) or (ix, iy, iphi), optional
         Further points to observe.
 
     Returns
@@ -65,7 +65,7 @@ def rows_from_dofs(
     Raises
     ------
     InputError
-        For degrees of freedom that are not there, and places of another form.
+        For degrees of freedom out of range, and points of another form.
     """
     require_kind("rows_from_dofs", (Sequence, np.ndarray), contact=contact)
     if not len(contact):
@@ -85,7 +85,7 @@ def stack_restriction(rows: Mapping[str, Any], d: int) -> Restriction:
     Raises
     ------
     InputError
-        If ``contact`` is missing, or a block has another shape.
+        If ``contact`` is missing, or a block has a wrong shape.
     """
     import scipy.sparse as sp
 

@@ -50,38 +50,33 @@ def sweep(
 
     ``sweep("study.toml", {"ground.speed": [0.1, 0.2], "friction.decay": Span(1.0, 9.0, 5)})``
 
-    Each case gives the same numbers as ``study.with_(**changes).run()``, to the last bit, and is
-    identified by the hash of its resolved study. Finished batches are stored in ``folder``, so
-    that an interrupted sweep can be resumed. A failed case has its reason in the table; the other
-    cases still run.
+    Each case gives bit for bit the numbers of ``study.with_(**changes).run()``. Cases that fail
+    have their reason in the table and do not stop the others; finished ones are kept, also after
+    Ctrl-C, so that a sweep can be resumed. See docs/sweeps.md.
 
     Parameters
     ----------
     study : Study or path
-        The study that the cases vary.
+        The study that all cases share.
     axes : mapping, optional
-        Varied parameters by dotted names, each with a list of values, a
-        :class:`~fecontact.study.Span` or a
-        :class:`~fecontact.study.Distribution`; by default ``[sweep.axes]``.
+        Parameters by dotted names, each with a list of values, a :class:`fecontact.study.Span` or a
+        :class:`fecontact.study.Distribution`; by default those of ``[sweep.axes]``.
     executor : concurrent.futures.Executor, optional
-        Executor of the batches, such as that of a Dask client, mpi4py.futures, executorlib or a
-        thread pool; by default processes on this machine, which end with the sweep.
+        Runs the batches: threads, the executor of a Dask client, of mpi4py.futures or executorlib;
+        by default processes on this machine.
     folder : path, optional
-        Folder of finished cases; by default ``NAME-sweep`` in the results folder of the study.
-    resume : bool
-        Continue a sweep that is in the folder instead of refusing the folder.
-    overwrite : bool
-        Remove a sweep that is in the folder first.
+        Where finished cases are kept; by default ``NAME-sweep`` among the results of the study.
+    resume, overwrite : bool
+        Continue the sweep in the folder, or remove it; otherwise an existing one is an error.
     retry : bool
-        Repeat failed cases.
+        Compute failed cases again.
     workers : int, optional
         Number of processes on this machine; by default one per core.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is called with the
-        numbers of finished, failed and all cases.
+        True for a progress bar; a function is called with the numbers of finished, failed and all
+        cases.
     **settings
-        Values that override keys of ``[sweep]``; see
-        :class:`~fecontact.study.SweepSettings`.
+        Other values for the keys of ``[sweep]``; see :class:`fecontact.study.SweepSettings`.
 
     Returns
     -------
@@ -90,13 +85,9 @@ def sweep(
 
     Raises
     ------
-    InputError
-        If a parameter or summary does not exist, an axis is empty or does not suit the method, or
-        the folder holds a sweep, is in use by another sweep, or cannot be written.
-    AnalysisError
-        If the executor fails; finished cases are kept.
-    KeyboardInterrupt
-        After Ctrl-C; finished cases are kept.
+    InputError, AnalysisError
+        If a parameter or summary is unknown, an axis is empty or does not suit the method, the
+        folder holds a sweep, is in use or cannot be written, or the executor cannot go on.
     """
     study = study if isinstance(study, Study) else Study.read(study)
     worker_count(workers)

@@ -1,4 +1,4 @@
-"""Arrays of a contact system, as its compiled kernels take them."""
+"""Arrays of a contact system for its compiled kernels."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -76,7 +76,7 @@ def system_arrays(
 
 
 def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
-    """InputError for a drive or load that could do no work, as no mode moves its point that way."""
+    """Raise InputError for a drive or load in a direction in which no mode moves its point."""
     acting: list[tuple[str, str | int, str]] = [
         (f"Drive: {name} = {value!r}", "B", axis)
         for axis, name, value in (("x", "stiffness_x", drive.stiffness_x),
@@ -105,7 +105,7 @@ def _law_table(law_groups: Iterable[LawGroup]) -> tuple[Integers, Array]:
 
 
 def _rows(parameters: list[Array]) -> Array:
-    """Parameters of several functions as one array, filled up with zeros."""
+    """Parameters of several functions as one array, padded with zeros."""
     table = np.zeros((len(parameters), max((len(row) for row in parameters), default=1)))
     for index, row in enumerate(parameters):
         table[index, : len(row)] = row

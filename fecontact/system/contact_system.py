@@ -24,7 +24,7 @@ from fecontact.system import kernels
 from fecontact.system.arrays import require_motion, system_arrays
 from fecontact.system.gap import Gap, gap_values
 
-NO_NORMAL_LAW = ("{}, the law of the normal force, which no default can replace; give a rough "
+NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a rough "
                  "surface with its stiffness and roughness_height, or another law: `fecontact "
                  "laws` lists them, `fecontact laws rough-surface` says how to choose.")
 
@@ -46,9 +46,9 @@ def needs_friction(basis: ModalBasis) -> bool:
 class ContactSystem(Summarised):
     """Reduced equations of an elastic body in contact with moving ground, (4.1-1) to (4.1-23).
 
-    ``q'' + D q' + w^2 q = T^T f`` with, at B, the drive's springs and dashpots, at C and other
-    points the loads, and at contact node j ``[-R_j, F_j, 0]`` from the normal and the friction
-    law. Immutable; see :meth:`with_`.
+    ``q'' + D q' + w^2 q = T^T f``, where f are the forces of the drive's springs and dashpots at B,
+    the loads at C and other points, and ``[-R_j, F_j, 0]`` at contact node j from the normal and
+    the friction law. Immutable; see :meth:`with_`.
 
     Attributes
     ----------
@@ -56,8 +56,8 @@ class ContactSystem(Summarised):
     normal : normal law, or mapping of contact group to normal law
         Normal force F (on the body, upwards) from penetration and its rate.
     friction : friction law, or mapping of contact group to friction law
-        Friction force R (on the body, against the slip velocity). Without one there is no
-        friction, which is refused where a contact node can move along the ground.
+        Friction force R (on the body, against the slip velocity). Required if a contact node can
+        move along the ground.
     ground : Ground
         Profile and motion of the ground.
     drive : Drive
@@ -65,20 +65,20 @@ class ContactSystem(Summarised):
     load : Load
         Loads at C and other points.
     gap : float, (n,) sequence, Crown or function of x
-        Initial distance g_j of the contact nodes from flat ground, zero or above [m]; kept as
+        Initial distance g_j of the contact nodes from flat ground, zero or above [m]; stored as
         numbers.
 
     Raises
     ------
     InputError
-        Without a normal law, or a friction law where it matters; for a part of another kind, laws
-        for groups that the basis lacks, parameters or gaps of another number than there are contact
-        nodes, laws that :func:`require_sound` refuses, and drives and loads at places that no mode
-        moves in their direction.
+        Without a normal law, or a required friction law; for a part of wrong type, laws for unknown
+        contact groups, parameters or gaps that do not match the number of contact nodes, laws that
+        :func:`require_sound` refuses, and drives or loads in a direction in which no mode moves
+        their point.
     """
 
     basis: ModalBasis
-    # Required, with a sentence that says more than Python's own.
+    # Required; the error message is more helpful than Python's own.
     normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
     friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]
     ground: Ground = field(default_factory=Ground)
@@ -95,8 +95,8 @@ class ContactSystem(Summarised):
             object.__setattr__(self, "friction", ConstantFriction(0.0))
         for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} cannot serve as "
-                                 f"{name}; it must be a {kind.__name__}.")
+                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} must be a "
+                                 f"{kind.__name__}.")
         for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
             given = getattr(self, name)
             if isinstance(given, Mapping):
@@ -104,8 +104,8 @@ class ContactSystem(Summarised):
                 object.__setattr__(self, name, MappingProxyType(dict(given)))
             for one in getattr(self, name).values() if isinstance(given, Mapping) else (given,):
                 if not isinstance(one, law):
-                    raise InputError(f"ContactSystem: {name} = {one!r} cannot serve as {name}; it "
-                                     f"must be a {law.__name__}.")
+                    raise InputError(f"ContactSystem: {name} = {one!r} must be a "
+                                     f"{law.__name__}.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
         for part in (self.law_groups("normal"), self.law_groups("friction")):
             for _, share, one in part:
@@ -145,10 +145,10 @@ class ContactSystem(Summarised):
         ]
 
     def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
-        """Contact nodes that share a law: their place, each one's part of their face, the law.
+        """Groups of contact nodes with a common law: slice, share of each node, law.
 
-        The total of an extensive parameter is that of the whole face for a single law, and that
-        of the group for a law of a contact group.
+        Extensive parameters are totals of the whole face for a single law, and totals of the group
+        for the law of a contact group.
         """
         given, tributary = getattr(self, kind), self.basis.tributary
         if not isinstance(given, Mapping):
@@ -162,7 +162,7 @@ class ContactSystem(Summarised):
 
     @property
     def share(self) -> Array:
-        """Part (n,) of the contact face that belongs to each node; their sum is one."""
+        """Fraction (n,) of the contact face of each node; their sum is one."""
         return self.basis.tributary / self.basis.tributary.sum()
 
     @property
@@ -177,7 +177,7 @@ class ContactSystem(Summarised):
 
     @property
     def penetration_scale(self) -> float:
-        """Smallest penetration over which a normal law changes its character [m]."""
+        """Smallest characteristic penetration of the normal laws [m]."""
         return min(law.penetration_scale for _, _, law in self.law_groups("normal"))
 
     @property
@@ -194,16 +194,16 @@ class ContactSystem(Summarised):
         return scales.reshape(-1)
 
     def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
-        """Times between two [s] at which something given in time has a kink, ascending."""
+        """Times between two [s] at which drive, loads or ground motion have kinks, ascending."""
         given: tuple[Any, ...] = (
             *self.drive.motions, *(force.signal for force in self.load.forces), self.ground)
         return tuple(sorted({time for source in given
                              for time in source.breakpoints(start, end)}))
 
     def shortest_period(self, start: float, end: float) -> float:
-        """Shortest period of drive, loads, belt and waves under the body [s]; infinite without any.
+        """Shortest period of drive, loads, belt and waves under the body [s]; infinite if none.
 
-        Waves pass at the largest speed of the ground between two times [s].
+        Waves pass at the largest speed of the ground between the two times [s].
         """
         given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
         given += [force.signal for force in self.load.forces]
@@ -232,7 +232,7 @@ class ContactSystem(Summarised):
 
     @cached_property
     def arrays(self) -> kernels.SystemArrays:
-        """The system as the compiled kernels take it."""
+        """The system as arrays for the compiled kernels."""
         return system_arrays(
             self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
             self.drive, self.load, np.asarray(self.gap, dtype=float))
@@ -254,7 +254,7 @@ class ContactSystem(Summarised):
 
         The columns are normal force [N], friction force [N], penetration [m], its rate [m/s],
         slip velocity [m/s] and the rate of the ground's height under the node [m/s]. InputError
-        for states of another shape.
+        for states of wrong shape.
         """
         times = np.ascontiguousarray(times, dtype=float)
         states = np.ascontiguousarray(states, dtype=float)
@@ -274,7 +274,7 @@ class ContactSystem(Summarised):
         Raises
         ------
         InputError
-            If there is no such parameter (with those that exist), or the value is out of range.
+            If a parameter does not exist, or a value is out of range.
         """
         for name in changes:
             if "." in name and _inner_name(name).partition(".")[0] not in PARTS:
@@ -288,7 +288,7 @@ class ContactSystem(Summarised):
     def parameters(self) -> dict[str, Any]:
         """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
 
-        Those of a contact group's laws are called ``contact.NAME.normal.stiffness``.
+        Parameters of the laws of a contact group: ``contact.NAME.normal.stiffness``.
         """
         return {_outer_name(self, f"{part}.{name}"): value
                 for part in PARTS

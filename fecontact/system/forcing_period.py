@@ -17,12 +17,12 @@ _REPEATING = (Harmonic, Harmonics)
 
 
 def common_period(system: ContactSystem) -> float | None:
-    """Common period [s] of all that is given in time; None for an autonomous system.
+    """Common period [s] of drive, loads and ground; None for an autonomous system.
 
     Raises
     ------
     AnalysisError
-        If something is not periodic, or the periods have no common multiple up to 1000 of the
+        If one of them is not periodic, or the periods have no common multiple up to 1000 times the
         longest.
     """
     require_kind("common_period", ContactSystem, system=system)
@@ -42,8 +42,8 @@ def common_period(system: ContactSystem) -> float | None:
                                 f"that repeat.")
         periods.append(1.0 / source.frequency_hz)
     if ground.motion is not None:
-        raise AnalysisError("ground.motion gives a speed that changes in time; periodic orbits "
-                            "are computed for constant speed.")
+        raise AnalysisError("ground.motion makes the speed depend on time; periodic orbits are "
+                            "computed for constant speed.")
     shapes = [("ground.friction_variation", ground.friction_variation)]
     if ground.wavy:
         shapes.append(("ground.profile", ground.profile or Sine(ground.amplitude,
@@ -55,20 +55,20 @@ def common_period(system: ContactSystem) -> float | None:
 
 
 def forcing_period(system: ContactSystem) -> float:
-    """Period of what excites a system, that of :func:`common_period` [s].
+    """Period of the excitation of a system [s], see :func:`common_period`.
 
     Raises
     ------
     InputError
-        If nothing depends on time.
+        If the system is autonomous.
     AnalysisError
         As :func:`common_period`.
     """
     require_kind("forcing_period", ContactSystem, system=system)
     period = common_period(system)
     if period is None:
-        raise InputError("Nothing excites the system in time, so it has no period; give period, or "
-                         "a drive that repeats.")
+        raise InputError("The system has no time-dependent excitation, and so no period; give "
+                         "period, or a periodic drive.")
     return period
 
 
@@ -79,7 +79,7 @@ def _repeat_length(name: str, shape: Profile) -> float:
         return float(shape.length)
     if isinstance(shape, MeasuredProfile) and shape.periodic:
         return float(shape.abscissa_scale * (shape.abscissa[-1] - shape.abscissa[0]))
-    raise AnalysisError(f"{name} does not repeat; periodic orbits need ground that does, such as "
+    raise AnalysisError(f"{name} is not periodic; periodic orbits need periodic ground, such as "
                         f"a Sine, a FourierSeries or a periodic MeasuredProfile.")
 
 

@@ -22,8 +22,8 @@ from fecontact.core.units import Unit
 class Crown:
     """Gap below a face that is an arc of a circle, bulging towards the ground.
 
-    ``g(x) = R - sqrt(R^2 - (x - centre)^2)``, from the circle itself: the chords of a mesh with
-    edges of length h miss it by h^2 / (8 R), which is easily the height of the roughness.
+    ``g(x) = R - sqrt(R^2 - (x - centre)^2)``, exactly: a mesh with edges of length h would deviate
+    by h^2 / (8 R), easily as much as the roughness.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Crown:
     Raises
     ------
     InputError
-        For a radius that is not positive, and when it is used, one that a contact node exceeds.
+        For a radius that is not positive or, on use, is exceeded by a contact node.
     """
 
     radius: Annotated[float, Unit("m")]
@@ -64,7 +64,7 @@ def gap_values(gap: Gap, abscissae: Array) -> float | tuple[float, ...]:
     Raises
     ------
     InputError
-        For another number of values than nodes, or a value that is negative or not finite.
+        For a wrong number of values, or a value that is negative or not finite.
     """
     try:
         given = gap(abscissae) if callable(gap) else gap

@@ -1,6 +1,6 @@
 """Limits of the model: small displacements, shallow penetration.
 
-A wrong unit, or a load that nothing carries, shows in these first.
+They reveal wrong units and unsupported loads.
 """
 
 import warnings
@@ -15,20 +15,20 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
 
 # Penetration of a rough surface, in roughness heights, beyond which a wrong unit or stiffness is
-# likelier than a wish: its asperities are long crushed.
+# likely, since all asperities would be crushed.
 DEEPEST = 100.0
 
-# Output times that are looked at together.
+# Output times per batch.
 _BLOCK = 4096
 
 
 def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple[str, ...]:
-    """Sentences on where states leave what the model holds for; none if they do not.
+    """Messages about states outside the range of validity of the model; empty if there are none.
 
     Parameters
     ----------
     system : ContactSystem
-        What moves.
+        The system.
     times : (N,) array
         [s].
     states : (N, 2 m + n s) array
@@ -37,15 +37,15 @@ def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple
     Notes
     -----
     Displacements of B, C, the contact nodes and further points are compared with the extent of
-    these points and of the mesh, if there is one. How far all of them have moved along the ground
-    together does not count: a body may slide as far as it likes.
+    these points and of the mesh, if there is one. Common motion along the ground does not count: a
+    body may slide any distance.
     """
     found = (_too_far(system, states), _too_deep(system, times, states))
     return tuple(sentence for sentence in found if sentence)
 
 
 def warn_of_limits(sentences: Iterable[str], what: str) -> None:
-    """Give a ModelWarning for each of the sentences; ``what`` begins them: 'In this run'."""
+    """Issue a ModelWarning for each sentence, beginning with ``what``: 'In this run'."""
     for sentence in sentences:
         warnings.warn(f"{what} {sentence}", ModelWarning, stacklevel=3)
 
@@ -57,7 +57,7 @@ def _too_far(system: ContactSystem, states: Array) -> str | None:
     if basis.mode_shapes is not None:
         places = np.vstack([places, basis.mode_shapes.nodes])
     size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
-    # Masses without places have no size to compare with.
+    # Masses without positions have no size to compare with.
     if size == 0.0:
         return None
     rows = basis.T[used, :2].reshape(-1, basis.modes).T
@@ -71,8 +71,8 @@ def _too_far(system: ContactSystem, states: Array) -> str | None:
     if farthest <= size:
         return None
     return (f"points of the body move by {farthest:.2g} m, more than its own size of {size:.2g} m; "
-            f"displacements have to stay small, so look whether something holds the body and "
-            f"whether the units of loads and stiffnesses are right.")
+            f"displacements must be small, so check the supports of the body and the units of "
+            f"loads and stiffnesses.")
 
 
 def _too_deep(system: ContactSystem, times: Array, states: Array) -> str | None:
@@ -96,5 +96,4 @@ def _too_deep(system: ContactSystem, times: Array, states: Array) -> str | None:
         return None
     return (f"contact node {node} is {worst * worst_height:.2g} m deep in the ground, "
             f"{worst:.2g} times its roughness height of {worst_height:.2g} m; above {DEEPEST:g} "
-            f"times the asperities are crushed, so look whether load, stiffness and units are "
-            f"right.")
+            f"times the asperities are crushed, so check load, stiffness and units.")

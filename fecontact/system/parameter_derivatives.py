@@ -1,8 +1,8 @@
 """Compiled derivatives of a contact system's equations with respect to a parameter.
 
-What the equations are linear in, or differentiate by themselves, goes by the chain rule; only a law
-whose own parameters move is differenced, at the state and the forces as they are. The system is
-given as arrays s, and the rates of all of them with the parameter as arrays r of the same form.
+The chain rule covers all linear terms and the derivatives that laws return; only the dependence of
+a law on its own parameters is found by finite differences, at fixed state and forces. The system is
+given as arrays s, and their derivatives with respect to the parameter as arrays r of the same form.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from fecontact.core.compiled import helper
 from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 
-# Differences of fourth order: places in steps, and weights in twelfths of a step.
+# Fourth-order differences: offsets in steps, and weights in twelfths of a step.
 _PLACES = np.array([1.0, -1.0, 2.0, -2.0])
 _WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0])
 
@@ -36,7 +36,7 @@ class LawsBeside(NamedTuple):
 
 @helper
 def _beside(parameters, rates, h):
-    """Laws' parameters (4, k, p) at the places of the differences; (0, k, p) if none moves."""
+    """Laws' parameters (4, k, p) at the offsets of the differences; (0, k, p) if none varies."""
     k, p = parameters.shape
     count = 4 if h > 0.0 and moves(rates) else 0
     out = np.empty((count, k, p))
@@ -104,7 +104,7 @@ def given_rates(t, s, r, laws, load):
 
 @helper
 def _ground_rates(address, xi, beside, h):
-    """Derivatives of a ground law's value and slope at one place."""
+    """Derivatives of a ground law's value and slope at one abscissa."""
     value, slope = 0.0, 0.0
     for k in range(len(beside)):
         a, b, _ = ground_at(address)(xi, beside[k, 0])
@@ -142,7 +142,7 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
             + _ground_rates(s.friction_scale, place, laws.friction_scale, h)[0])
     R_F = force[2]
     if s.memory[j] == 0 and F == 0.0 and F_p != 0.0:
-        # Friction is not asked for without a normal force, but is about to begin.
+        # Friction is zero without a normal force, but may be about to begin.
         R_F = friction_at(s.friction[j])(slip, 0.0, s.friction_parameters[j])[2]
     R_p = force[1] * shifts[2] + R_F * pressing_p
     for i in range(s.memory[j]):

@@ -1,4 +1,4 @@
-"""Labels of parameters with their units, from the annotations of the classes that have them."""
+"""Labels of parameters with units, from the annotations of their classes."""
 
 import re
 from collections.abc import Iterator
@@ -12,10 +12,10 @@ from fecontact.system.contact_system import ContactSystem
 
 
 def parameter_label(name: str, owner: type = ContactSystem) -> str:
-    """A parameter's name as the label of an axis, with its unit where there is one.
+    """Axis label of a parameter, with its unit if it has one.
 
-    ``ground.speed`` becomes ``ground speed [m/s]``. Names that are no parameters of ``owner``, a
-    dataclass, and those whose unit differs from law to law, stay without.
+    ``ground.speed`` becomes ``ground speed [m/s]``. Names that are not parameters of the dataclass
+    ``owner``, or whose unit depends on the law, get no unit.
     """
     inner = re.sub(r"^contact\.[^.]+\.", "", name)
     units = _units(owner).get(inner, frozenset())
@@ -25,7 +25,7 @@ def parameter_label(name: str, owner: type = ContactSystem) -> str:
 
 @cache
 def _units(owner: type) -> dict[str, frozenset[str]]:
-    """Units of each dotted name; several or none where the laws do not agree on one."""
+    """Units of each dotted name; several or none if laws differ."""
     found: dict[str, set[str]] = {"gap": {"m"}}
     for entry, hint in get_type_hints(owner).items():
         section = entry.removesuffix("_settings")
@@ -37,14 +37,14 @@ def _units(owner: type) -> dict[str, frozenset[str]]:
 
 
 def _units_of(cls: type) -> dict[str, str]:
-    """Units that the annotations of a class's fields name; empty for fields without one."""
+    """Units from the annotations of a class's fields; empty strings for fields without one."""
     return {name: next((item.symbol for item in getattr(hint, "__metadata__", ())
                         if isinstance(item, Unit)), "")
             for name, hint in get_type_hints(cls, include_extras=True).items()}
 
 
 def _classes(hint: Any, place: str) -> Iterator[tuple[str, type]]:
-    """Dotted names and classes of all parts of a type: dataclasses, what they hold, laws."""
+    """Dotted names and classes of all parts of a type: nested dataclasses and laws."""
     if is_kind(hint):
         for law in law_names()[hint].values():
             yield place, law

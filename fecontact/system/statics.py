@@ -1,4 +1,4 @@
-"""Equilibria: a body resting on the ground, and steady sliding."""
+"""Static equilibria at rest and in steady sliding."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from fecontact.system.jacobian import jacobian
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.steady_memory import settled
 
-# Part of the load that may be out of balance, however large the rounding of other forces is.
+# Largest out-of-balance fraction of the load, regardless of the rounding of other forces.
 _UNBALANCED = 1e-6
 
 
@@ -32,30 +32,30 @@ def static_equilibrium(
 ) -> Array:
     """Modal coordinates q (m,) of an equilibrium under the constant load.
 
-    Solves ``w^2 q = T^T f`` with the drive and the loads at their means, by Newton's method, with
-    continuation in the load where Newton's method alone does not get there.
+    Solves ``w^2 q = T^T f`` with drive and loads at their mean values by Newton's method, with
+    continuation in the load if it does not converge.
 
     Parameters
     ----------
     system : ContactSystem
         Its ground is flat for steady sliding.
     friction : bool
-        With friction, steady sliding: x' = 0 and slip velocity -V at every node; needs flat
-        ground. Without, the body at rest on the ground as it stands at ``time``.
+        True for steady sliding on flat ground: x' = 0 and slip velocity -V at every node. False for
+        rest without friction on the ground as it is at ``time``.
     time : float
-        Moment at which the ground is taken as it stands and moves [s].
+        Time at which position and speed of the ground are evaluated [s].
 
     Raises
     ------
     AnalysisError
-        If there is no equilibrium: it names the direction in which nothing holds the body, or
-        says that the load lifts or tips it; and for steady sliding on wavy ground.
+        If there is no equilibrium, naming the unsupported direction of motion or the load that
+        lifts or tips the body; and for steady sliding on wavy ground.
 
     Warns
     -----
     ModelWarning
-        If the body moves by more than its own size, or is pressed into the ground by more than a
-        hundred times the height of its roughness.
+        If the body moves by more than its own size, or penetrates the ground by more than a hundred
+        times the roughness height.
     """
     require_kind("static_equilibrium", ContactSystem, system=system)
     require_finite("static_equilibrium", time=time)
@@ -66,7 +66,7 @@ def static_equilibrium(
 
 
 def equilibrium(system: ContactSystem, friction: bool, time: float) -> Array:
-    """As :func:`static_equilibrium`, for callers that look at the limits of the model later."""
+    """As :func:`static_equilibrium`, without checking the limits of the model."""
     ground = system.ground
     if friction and ground.wavy:
         raise AnalysisError("There is no steady sliding on wavy ground; start from rest or "
@@ -108,7 +108,7 @@ class _Balance:
         size = 2 * m + n * states
         self._rate, self._matrix = np.empty(size), np.empty((size, size))
         self._state = np.zeros(size)
-        # Stiffness of a face that is pressed well in, and its force on undisplaced nodes.
+        # Stiffness of the fully closed contact, and its force at zero displacement.
         far = np.full(n, max(10.0 * scale, 2.0 * self._penetration(scale)))
         values, self.face_stiffness = self.normal(far)
         undisplaced = np.empty((n, kernels.STATE_COLUMNS))
@@ -122,8 +122,8 @@ class _Balance:
         self.scale[self.scale == 0.0] = 1.0
 
     def _penetration(self, scale: float) -> float:
-        """Penetration of the whole face at which it carries the load, at most 1e6 scales."""
-        # In the direction of the contact nodes' mean rise, the load does this work.
+        """Uniform penetration under which the face carries the load, at most 1e6 scales."""
+        # Work of the load in a unit mean rise of the contact nodes.
         rise = self.arrays.Ty.mean(axis=0)
         wanted = abs(float(self.load @ rise)) / max(float(rise @ rise), 1e-300)
         depth = scale
@@ -140,7 +140,7 @@ class _Balance:
         return force, slope
 
     def force(self, q: Array, load: float) -> Array:
-        """Out-of-balance force (m,) under a part of the load."""
+        """Out-of-balance force (m,) under a fraction of the load."""
         m = len(q)
         part = self.arrays._replace(constant_load=load * self.load)
         kernels.right_hand_side(self._time, self._settled(q), part, self._rate)
@@ -163,14 +163,14 @@ class _Balance:
         return self._state
 
     def guess(self, load: float) -> Array:
-        """Equilibrium of a face that is all in contact, and that could also pull."""
+        """Equilibrium of a face in full contact that could also pull."""
         arrays = self.arrays
         stiffness = arrays.stiffness + (arrays.Ty.T * self.face_stiffness) @ arrays.Ty
         force = load * self.load + arrays.Ty.T @ self.face_force
         return self._solve(stiffness, force, 1e-10)
 
     def solve(self, q: Array, load: float) -> Array | None:
-        """Newton's method with a shift that grows when a step does not help; None if it fails."""
+        """Newton's method with a shift that increases after failed steps; None if it fails."""
         shift = 1e-10
         force = self.force(q, load)
         best = self._size(force)
@@ -196,10 +196,10 @@ class _Balance:
         return None
 
     def descend(self, q: Array, load: float) -> Array:
-        """Newton steps, each as long as the body is pushed along it.
+        """Newton steps with line search, each as long as the force acts along the step.
 
-        Without friction there is a convex potential, which falls to its minimum this way, however
-        far the ground is and whichever nodes come into contact. Ends where it does not go on.
+        Without friction the potential is convex and decreases to its minimum, for any distance of
+        the ground and any nodes coming into contact. Stops if there is no progress.
         """
         for _ in range(200):
             force = self.force(q, load)
@@ -224,7 +224,7 @@ class _Balance:
         return q
 
     def _upright(self, q: Array) -> Array:
-        """Stiffness (m, m) at q, symmetric: of ground that is level under each node."""
+        """Symmetric stiffness (m, m) at q, for ground that is level under each node."""
         arrays = self.arrays
         self._state[: len(q)] = q
         state = np.empty((len(arrays.gap), kernels.STATE_COLUMNS))
@@ -233,7 +233,7 @@ class _Balance:
         return np.asarray(arrays.stiffness + (arrays.Ty.T * slope) @ arrays.Ty)
 
     def loose(self, q: Array) -> Array | None:
-        """Direction (m,) in which the body is pushed at q and nothing holds it, if there is one."""
+        """Direction (m,) of an unbalanced force at q without any stiffness, or None."""
         root = np.sqrt(self.scale)
         scaled = -self.gradient(q) / np.outer(root, root)
         _, values, rows = np.linalg.svd(scaled)
@@ -253,8 +253,8 @@ class _Balance:
     def _noise(self, q: Array, load: float) -> float:
         """Size of the out-of-balance force that counts as rounding.
 
-        A body that runs away under a load that nothing balances has larger and larger forces with
-        their rounding; the load itself may not disappear in it.
+        A body that drifts away under an unsupported load has growing forces and rounding errors,
+        which must stay below the load itself.
         """
         arrays = self.arrays
         terms = np.abs(arrays.stiffness) @ np.abs(q) + np.abs(load * self.load)
@@ -265,9 +265,9 @@ class _Balance:
 
 
 def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
-    """The system's arrays with the means of drive and loads as constant loads.
+    """The system's arrays with the mean values of drive and loads as constant loads.
 
-    Of what is given in time only what is constant has a mean to speak of.
+    Only constant signals contribute; time-dependent ones are taken to have zero mean.
     """
     arrays = system.arrays
     load = arrays.constant_load.copy()
@@ -282,7 +282,7 @@ def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
 
 
 def _continued(problem: _Balance) -> Array | None:
-    """Follow the equilibrium from a small load up, halving the step in load where it fails."""
+    """Follow the equilibrium from a small load, halving the load step on failure."""
     load, step = 1e-3, 0.1
     q = problem.solve(problem.guess(load), load)
     if q is None:

@@ -17,7 +17,7 @@ from fecontact.system.kernels import (
 
 @kernel(types.void(f8, vector, SYSTEM))
 def _settle(t, y, s):
-    """Move the z of each node to where z' = 0, by implicit Euler steps that grow without end."""
+    """Bring z of each node to z' = 0 by implicit Euler steps of increasing length."""
     n = len(s.Tx)
     states = s.memory.max()
     force, rates = np.empty(3 + states), np.empty((states, 3 + states))
@@ -41,9 +41,9 @@ def _settle(t, y, s):
 
 
 def settled(t: float, y: Array, arrays: SystemArrays) -> Array:
-    """The state y with the internal variables that belong to its slip velocities and forces.
+    """The state y with the steady internal variables for its slip velocities and forces.
 
-    Where nothing slips they stay as they are.
+    They are unchanged at nodes without slip.
     """
     state = np.array(y, dtype=float)
     if arrays.memory.any():

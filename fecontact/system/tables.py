@@ -43,6 +43,6 @@ def system_from_tables(
 def system_parts(
     tables: Mapping[str, Any], where: str, names: Iterable[str]
 ) -> dict[str, Any]:
-    """Those of the parts of :func:`system_tables` that are named."""
+    """The named parts of :func:`system_tables`."""
     return {part: from_table(PART_CLASSES[part], tables.get(part, {}), f"{where}: [{part}]")
             for part in names if part in tables or part != "normal"}

@@ -323,7 +323,7 @@ def test_forcing_periods():
         contact_field(odd, []).forcing_period(np.empty(0))
     trace = wavy.with_(**{
         "ground.profile": MeasuredProfile((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.5, 0.0))})
-    with pytest.raises(AnalysisError, match=r"ground\.profile does not repeat"):
+    with pytest.raises(AnalysisError, match=r"ground\.profile is not periodic"):
         contact_field(trace, []).forcing_period(np.empty(0))
     rough = trace.with_(ground=replace(trace.ground, friction_variation=Sine(0.1, 2.0),
                                        profile=replace(trace.ground.profile, periodic=True)))

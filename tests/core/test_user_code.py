@@ -82,5 +82,5 @@ def test_what_is_not_in_the_file_is_named_with_what_is(tmp_path):
 def test_files_that_are_not_trusted_are_not_run(tmp_path):
     path = tmp_path / "own.py"
     path.write_text("raise SystemExit\n")
-    with trusting(False), pytest.raises(InputError, match="not run unadvised"):
+    with trusting(False), pytest.raises(InputError, match="not run without permission"):
         own_law(FrictionLaw, f"{path}:Mine", "here")

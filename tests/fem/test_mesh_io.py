@@ -413,7 +413,7 @@ def test_vtu_as_text(tmp_path: Path) -> None:
     path.write_text(VTU)
     assert read_mesh(path).area == 2.0
     path.write_text(VTU.replace(">9<", ">6<"))  # a strip of triangles
-    with pytest.raises(MeshError, match="elements of a kind that meshio leaves out"):
+    with pytest.raises(MeshError, match="elements of a kind that meshio does not read"):
         read_mesh(path)
 
 
@@ -630,7 +630,7 @@ def nodes_and(cells: str) -> str:
         ("a.inp", "*SYSTEM\n0,0,0,1,1,0\n*NODE\n1,0,0\n", r"local coordinate system \(\*SYSTEM"),
         ("a.inp", "*INCLUDE, INPUT=b.inp\n", r"includes another one \(\*INCLUDE\)"),
         ("a.inp", "*PART\n*NODE\n1,0,0\n*PART\n", "holds 2 parts; export the elastic body alone"),
-        ("a.inp", "*INSTANCE\n 0, 0.5, 0\n", r"moves its part in \*INSTANCE"),
+        ("a.inp", "*INSTANCE\n 0, 0.5, 0\n", r"displaces its part in \*INSTANCE"),
         ("a.inp", "*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n*NSET, NSET=N\nM\n",
          "refers to a set 'M' that it does not hold"),
         ("a.inp", "*NODE\n1,0,0\n*ELEMENT\n1,1,1,1\n", r"as Abaqus, .* \(it lacks 'TYPE'\)"),

@@ -209,7 +209,7 @@ def test_loads_at_points():
     (Drive, {"stiffness_x": "stiff"}, "stiffness_x = 'stiff'"),
     (Drive, {"amplitude_x": "wide"}, "amplitude_x = 'wide'"),
     (Load, {"normal": "heavy"}, "normal = 'heavy'"),
-    (Ground, {"amplitude": 1e-3, "profile": Flat()}, r"amplitude = 0\.001 cannot stand beside pr"),
+    (Ground, {"amplitude": 1e-3, "profile": Flat()}, r"amplitude = 0\.001 cannot be combined with"),
     (Ground, {"profile": "sine"}, "Ground: profile = 'sine' must be a Profile"),
     (Ground, {"motion": Constant(1.0)}, "motion = .* must be a GroundMotion"),
     (Ground, {"friction_variation": 0.1}, r"friction_variation = 0\.1 must be a Profile"),

@@ -327,7 +327,7 @@ def test_smallest_and_largest_traces_have_curves():
     (lambda: MeasuredProfile((0, 1, 2), (0, float("nan"), 2)),
      r"heights\[1\] = nan must be finite; repair"),
     (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), file="a.csv"),
-     "cannot stand beside abscissa and heigh"),
+     "cannot be combined with abscissa and heigh"),
     (lambda: MeasuredProfile(), "abscissa has 0 values; at least 3"),
     (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic=True),
      "begins with 0 and ends with 2; add"),

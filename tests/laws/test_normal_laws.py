@@ -248,7 +248,7 @@ def test_energy_of_a_body_far_above_the_surface():
     (lambda: MeasuredSurface(1e6, R, bearing=(0.1, 1.0, 1.0)), "start with 0"),
     (lambda: MeasuredSurface(1e6, R, bearing=(0.0, 1.0)), "at least three"),
     (lambda: MeasuredSurface(1e6, R, -1.0), r"MeasuredSurface: damping = -1\.0 must be zero or"),
-    (lambda: MeasuredSurface(1e6, bearing=(0.0, 0.2, 1.0), file="x.txt"), "cannot stand beside"),
+    (lambda: MeasuredSurface(1e6, bearing=(0.0, 0.2, 1.0), file="x.txt"), "cannot be combined"),
     (lambda: MeasuredSurface(1e6, R, bearing=(0.0, 0.2, 1.0), depths=(0.0, 1.0)),
      r"depths = \[0\.0, 1\.0\] must be as many numbers as bearing"),
     (lambda: MeasuredSurface(1e6, R, depths=(0.0, 1.5, 1.0)), "growing from 0 to 1"),

@@ -165,11 +165,11 @@ def test_header_of_one_column(tmp_path):
 
 
 @pytest.mark.parametrize(("values", "message"), [
-    ({"bearing": (0.0, 0.2, 1.0)}, "'x.txt' cannot stand beside bearing, which it gives"),
-    ({"bearing": ((0.0,), (0.2, 1.0))}, "cannot stand beside bearing"),
-    ({"depths": (0.0, 0.2, 1.0)}, "cannot stand beside depths"),
-    ({"roughness_height": 1e-6}, "cannot stand beside roughness_height"),
-    ({"roughness_height": (1e-6, 2e-6)}, "cannot stand beside roughness_height"),
+    ({"bearing": (0.0, 0.2, 1.0)}, "'x.txt' cannot be combined with bearing, which it determines"),
+    ({"bearing": ((0.0,), (0.2, 1.0))}, "cannot be combined with bearing"),
+    ({"depths": (0.0, 0.2, 1.0)}, "cannot be combined with depths"),
+    ({"roughness_height": 1e-6}, "cannot be combined with roughness_height"),
+    ({"roughness_height": (1e-6, 2e-6)}, "cannot be combined with roughness_height"),
     ({"scale": 0.0}, r"MeasuredSurface: scale = 0\.0 must be"),
     ({"file": None, "scale": 1e-6}, "scale = 1e-06 has no effect without file"),
     ({"file": 3}, "file = 3 must be the name of a file"),

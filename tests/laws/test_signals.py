@@ -342,7 +342,7 @@ def test_signal_of_ones_own():
     (lambda: Tabulated((0, 1e-300, 1), (0, 1, 0)), "times has points 1e-300 apart"),
     (lambda: Tabulated((0, 1), (0, 1e9), scale=1e300), r"scale = 1e\+300 reaches inf"),
     (lambda: Tabulated(1.0, 2.0), r"times = 1\.0 must be a list of numbers"),
-    (lambda: Tabulated((0, 1), (1, 2), file="a"), "file = 'a' cannot stand beside times and val"),
+    (lambda: Tabulated((0, 1), (1, 2), file="a"), "file = 'a' cannot be combined with times"),
 ])
 def test_values_are_checked(make, message):
     with pytest.raises(InputError, match=message):

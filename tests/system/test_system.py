@@ -424,10 +424,10 @@ def test_systems_cannot_be_changed():
     ("gap", -1e-6, "gap = -1e-06 must be finite and zero or above"),
     ("gap", float("nan"), "gap = nan"),
     ("gap", "wide", "gap = 'wide' must be a number"),
-    ("ground", 0.1, "ground = 0.1 cannot serve as ground"), ("basis", None, "basis = None"),
-    ("normal", Ground(), "cannot serve as normal"), ("load", Drive(), "cannot serve as load"),
-    ("normal", ExponentialFriction(), "cannot serve as normal"),
-    ("friction", RoughSurface(1e6, R), "cannot serve as friction"), ("drive", Load(), "as drive"),
+    ("ground", 0.1, "ground = 0.1 must be a Ground"), ("basis", None, "basis = None"),
+    ("normal", Ground(), "must be a NormalLaw"), ("load", Drive(), "must be a Load"),
+    ("normal", ExponentialFriction(), "must be a NormalLaw"),
+    ("friction", RoughSurface(1e6, R), "must be a FrictionLaw"), ("drive", Load(), "a Drive"),
 ])
 def test_changes_are_checked(name, value, message):
     with pytest.raises(InputError, match=message):

@@ -44,49 +44,40 @@ def equilibrium_branch(
     """Follow an equilibrium over a parameter.
 
     Each point stores 'state' (d,), 'eigenvalues' (d,), 'unstable' (number of eigenvalues with
-    positive real part) and 'stable'. Special points are
-
-    - 'fold': with its null_vector and quadratic coefficient,
-    - 'Hopf': angular_frequency, frequency_hz, period, eigenvector, crossing_speed (rate of the real
-      part with the parameter), first_lyapunov and criticality
-      ('supercritical', 'subcritical' or 'undecided', see
-      :func:`fecontact.bifurcation.equilibria.normal_forms.hopf`),
-    - 'branch point': null_vector, and other_tangent, the direction of the other branch,
-    - 'unresolved': where 'unstable' changes from unstable_before to unstable_after, though none of
-      the others was found.
+    positive real part) and 'stable'. Special points are 'fold', 'Hopf', 'branch point' and
+    'unresolved' (a change of 'unstable' without a zero of a test function); see the classes of
+    points, such as :class:`fecontact.bifurcation.HopfPoint`, for what they add.
 
     Parameters
     ----------
     field : VectorField
-        Its rates must not depend on time.
+        The system; its rates must not depend on time.
     start : Equilibrium, BranchPoint or (d,) sequence, optional
-        Where to begin: an equilibrium or a guess, see
-        :func:`fecontact.bifurcation.find_equilibrium`; a 'branch point' of
-        a branch of equilibria, through which the other branch is followed; or another point of
-        such a branch, also of one read from a file, from which it goes on.
+        An equilibrium or a guess, see :func:`fecontact.bifurcation.find_equilibrium`; a 'branch
+        point', to follow the other branch through it; or another point of a branch of equilibria,
+        to continue it.
     parameter : str, optional
-        The one that is varied; by default that of the point, or the only one of the field.
+        The parameter to vary; by default that of the point, or the only one of the field.
     options : ContinuationOptions, optional
-        How the branch is followed.
+        Step lengths, tolerances and stopping conditions.
     bounds : (float, float), optional
-        Range of the parameter, as in the options.
+        Range of the parameter, in place of that of the options.
     direction : float
-        Sign of the first change of the parameter; from a point 1 goes on along the branch, and -1
-        back.
+        Sign of the first change of the parameter; from a point, 1 goes forward along its branch and
+        -1 back.
     both : bool, optional
-        Whether to go to both sides; by default from a branch point alone.
-    scales : sequence, optional
-        Sizes (d,) of the states in the diagram, for arclengths; by default those of the field or
-        the largest state at the start, growing with the
-        states up to 1e4 times that.
+        Whether to go to both sides; by default only from a branch point.
+    scales : (d,) sequence, optional
+        Sizes of the states that count as one in the arclength; by default those of the field or the
+        largest state at the start, growing with the states up to 1e4 times that.
     width : float, optional
-        Width of the diagram in the parameter; by default that of the bounds, or the size of the
-        parameter at the start.
+        Parameter range that counts as one; by default that of the bounds, or the value at the
+        start.
 
     Raises
     ------
     InputError
-        If the parameter is unknown, or the point is none of a branch of equilibria.
+        If the parameter is unknown, or the point does not belong to a branch of equilibria.
     AnalysisError
         If no equilibrium is found at the start, or the rates depend on time there or at a bound.
     """

@@ -107,64 +107,43 @@ def orbit_branch(
 ) -> Branch:
     """Follow periodic orbits over a parameter.
 
+    Each point stores 'period' [s], 'multipliers' (d,), 'unstable' (number outside the unit circle),
+    'stable', 'trivial_error', 'mesh' (N + 1,), 'minimum' and 'maximum' (d,). Special points are
+    'fold', 'period doubling', 'Neimark-Sacker', 'branch point', 'period halving' and 'unresolved';
+    see docs/orbits.md.
+
     Parameters
     ----------
     field : VectorField
-        The system; for a point, the field of its branch.
+        The system; that of the branch if ``start`` is a point of one.
     start : BranchPoint, PeriodicMotion, Trajectory or (times, states)
-        Where to begin:
-
-        - a 'Hopf' point of equilibria: the orbits that are born there,
-        - a 'period doubling' of orbits: those of twice the period,
-        - a 'branch point' of orbits: those that cross there,
-        - any other point of a branch of orbits, also one read from a file: continues the branch,
-        - a settled motion over at least one period, such as the result of
-          :func:`fecontact.bifurcation.periodic_motion`; its last period is used.
+        A Hopf point of equilibria, a period doubling or branch point of orbits; another point of a
+        branch of orbits, to continue it; or a settled motion over at least one period.
     parameter : str, optional
-        The continuation parameter; by default that of the point, or the only one of the field.
+        The parameter to vary; by default that of the point, or the only one of the field.
     method : Collocation or Shooting, optional
-        Method of discretisation; by default that of the branch of the point, else collocation.
-        Doubled orbits have twice the intervals or segments by default.
+        By default that of the point's branch, else collocation. Twice the intervals or segments are
+        used beyond a period doubling.
     options : ContinuationOptions, optional
-        Options of the continuation.
+        Step lengths, tolerances and stopping conditions.
     bounds : (float, float), optional
-        Range of the parameter, as in the options.
+        Range of the parameter, in place of that of the options.
     scales : (d,) sequence, optional
-        Scales of the states in the step length. By default those of the branch of the point, or
-        the amplitudes of the motion; at a Hopf point those of the field, which grow with the
-        orbits in collocation.
+        Amplitudes of the states that count as one in the arclength; by default those of the point's
+        branch or the motion, at a Hopf point those of the field.
     width : float, optional
-        Width of the diagram in the parameter; by default that of the branch of orbits, or of the
-        bounds.
+        Parameter range that counts as one; by default that of the point's branch, or of the bounds.
     direction : float
-        Sign of the first change of the parameter from a motion. From a point of a branch of
-        orbits, 1 continues along the branch and -1 goes back; at a branch point they select the
-        two halves.
+        Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
+        its branch and -1 back, or along either half of the other branch at a branch point.
     both : bool
         Follow the branch in both directions, from a motion or a regular point.
 
-    Returns
-    -------
-    Branch
-        Values of each orbit: 'period' [s], 'multipliers' (d,), 'unstable' (number of multipliers
-        outside the unit circle), 'stable', 'trivial_error' (deviation of the trivial multiplier
-        from one), 'mesh' (N + 1,), 'minimum' and 'maximum' (d,) of the states. Special points:
-
-        - 'fold': with ``parameter_error``, the change of its parameter on a finer mesh,
-        - 'period doubling' and 'Neimark-Sacker': with ``coefficient``, ``coefficient_error``,
-          ``criticality`` ('supercritical', 'subcritical' or 'undecided') and ``parameter_error``,
-        - 'branch point': where two branches of orbits cross, with ``parameter_error``,
-        - 'period halving': where doubled orbits become single again; there the branch ends,
-        - 'unresolved': 'unstable' changes without a zero of a test function, or a point of the
-          kind ``instead_of`` is not confirmed on finer meshes.
-
     Raises
     ------
-    InputError
-        If no orbits begin at the start, the bounds exclude it, or its samples do not cover a
-        period.
-    AnalysisError
-        If no orbit is found near a motion.
+    InputError, AnalysisError
+        If no orbits emanate from the start, it lies outside the bounds or covers no period, or no
+        orbit is found near a motion.
     """
     require_field(field)
     require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, tuple), start=start)

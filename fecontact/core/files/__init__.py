@@ -1,1 +1,1 @@
-"""Files written whole or not at all, files held by one process, files of others read safely."""
+"""Atomic writing, locks, and checked reading of files."""

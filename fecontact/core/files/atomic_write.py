@@ -1,9 +1,8 @@
 """Files and folders that are written whole or not at all.
 
-What is being written lies in a folder of its own beside its place, ``.NAME.1.part``, made anew
-and readable by its owner alone, so that nothing that lies there is followed or written over. A
-lock tells the folder of a process that is at work from one that was killed; the latter is cleared
-by the next that writes the same name.
+Content is written to a new private folder beside the target, ``.NAME.1.part``, and then moved, so
+that existing links are not followed and existing files not overwritten. A lock tells the folder of
+a running process from that of a killed one, which the next writer of the same name removes.
 """
 
 import errno
@@ -24,22 +23,22 @@ _LOCK, _CONTENT, _EARLIER = "lock", "content", "earlier"
 _MARK = b"a file is being written by fecontact\n"
 _NAME = re.compile(r"\..+\.[0-9]+\.part")
 _MOST = 1000  # writers of one name at a time
-_LONGEST = 200  # bytes of a name that fit into that of the folder
+_LONGEST = 200  # bytes of the name used for the folder
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
 def replaced(path: str | Path) -> Iterator[Path]:
-    """A path whose content takes the file's place when the block ends well.
+    """Yield a path whose content replaces the file when the block ends without an error.
 
-    The content is on the disk before it takes the place of an earlier file. A link of that name is
-    replaced, not followed. Several processes may write at once; the last one's content stays.
+    The content is synchronised to disk before it replaces an earlier file. A link of that name is
+    replaced, not followed. If several processes write at once, the last one wins.
 
     Raises
     ------
     InputError
-        If it cannot be written, or there is something of that name that is not a file.
+        If it cannot be written, or the path exists and is not a file.
     """
     path = as_path(path, "a file to write")
     with _readable_errors(path):
@@ -53,7 +52,7 @@ def replaced(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def replaced_folder(path: str | Path) -> Iterator[Path]:
-    """A new folder that takes the place of the one named when the block ends well.
+    """Yield a new folder that replaces the one named when the block ends without an error.
 
     Raises
     ------
@@ -79,14 +78,14 @@ def replaced_folder(path: str | Path) -> Iterator[Path]:
 
 
 def put(content: Path, path: Path) -> None:
-    """Let a finished file take its place, once it is on the disk; OSError if that fails."""
+    """Synchronise a finished file to disk and move it to its path; OSError on failure."""
     _synchronise(content)
     os.replace(content, path)
 
 
 @contextmanager
 def beside(path: Path) -> Iterator[Path]:
-    """A private folder on the file system of a path, gone when the block ends.
+    """Yield a private folder beside a path, removed when the block ends.
 
     Raises
     ------
@@ -109,7 +108,7 @@ def beside(path: Path) -> Iterator[Path]:
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove what killed processes of this package have left half written in a folder."""
+    """Remove the unfinished files that killed processes of this package left in a folder."""
     with suppress(OSError):
         for entry in os.scandir(folder):
             if _NAME.fullmatch(entry.name):
@@ -118,8 +117,7 @@ def clear_leftovers(folder: Path) -> None:
 
 def _workplace(path: Path) -> tuple[Path, int]:
     """A new folder beside a path, and the open lock in it; leftovers of the name are cleared."""
-    # Writers of many files do not look through the whole folder each time: leftovers are found
-    # by counting.
+    # Leftovers are found by counting up, without listing a folder that may hold many files.
     name = os.fsencode(path.name)
     short = path.name if len(name) <= _LONGEST else hashlib.sha256(name).hexdigest()
     made: tuple[Path, int] | None = None
@@ -137,21 +135,21 @@ def _workplace(path: Path) -> tuple[Path, int]:
 
 
 def _locked(folder: Path) -> tuple[Path, int] | None:
-    """A folder made and locked; None if it is there, or was cleared by another process."""
+    """Make and lock a folder; None if it exists, or another process has removed it."""
     try:
         folder.mkdir(mode=0o700)
     except FileExistsError:
         return None
     try:
         lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-    except (FileNotFoundError, FileExistsError):  # another process was between the two calls
+    except (FileNotFoundError, FileExistsError):  # a race with another process
         return None
     except OSError:
         with suppress(OSError):
             folder.rmdir()
         raise
     try:
-        # Written by one call, and not awaited: a full disk is found out by what follows.
+        # One write, not synchronised: later writes report a full disk.
         with suppress(OSError):
             os.write(lock, _MARK)
         _take(lock, wait=True)
@@ -166,22 +164,22 @@ def _locked(folder: Path) -> tuple[Path, int] | None:
 
 
 def _clear(folder: Path, path: Path | None) -> None:
-    """Remove a folder of a process that was killed; others are left as they are.
+    """Remove the folder of a killed process; leave those of running ones alone.
 
-    A process that was killed while a folder took the place of another leaves the earlier one in
-    it; that is put back, if its path is known.
+    A process killed while replacing a folder leaves the earlier one in it, which is restored if its
+    path is known.
     """
     with suppress(OSError):
         if not stat.S_ISDIR(os.lstat(folder).st_mode):
             return
         with suppress(OSError):
-            folder.rmdir()  # killed before there was a lock
+            folder.rmdir()  # killed before it made the lock
             return
         lock = os.open(folder / _LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
         try:
             if os.read(lock, 100) != _MARK or not _take(lock, wait=False):
                 return
-            if not os.fstat(lock).st_nlink:  # its process has ended well, and the name is free
+            if not os.fstat(lock).st_nlink:  # its process has finished and removed it
                 return
             earlier = folder / _EARLIER
             if earlier.exists():
@@ -195,20 +193,20 @@ def _clear(folder: Path, path: Path | None) -> None:
 
 
 def _take(lock: int, *, wait: bool) -> bool:
-    """Lock an open file; whether that is sure. The system opens it when the process ends."""
+    """Lock an open file; return whether it succeeded. The lock ends with the process."""
     try:
         import fcntl
     except ImportError:  # Windows
         return False
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError:  # held by another, or a file system without locks
+    except OSError:  # locked by another process, or not supported by the file system
         return False
     return True
 
 
 def _require_file(path: Path) -> None:
-    """Raise InputError if what is there is neither a file nor a link."""
+    """Raise InputError if the path exists and is neither a file nor a link."""
     with suppress(FileNotFoundError, NotADirectoryError):
         mode = os.lstat(path).st_mode
         if not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
@@ -217,19 +215,19 @@ def _require_file(path: Path) -> None:
 
 
 def _synchronise(path: Path) -> None:
-    """Wait until a file is on the disk; OSError if it does not get there."""
+    """Synchronise a file to disk; OSError on failure."""
     file = os.open(path, os.O_RDWR)
     try:
         os.fsync(file)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems that cannot
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # not supported by the file system
             raise
     finally:
         os.close(file)
 
 
 def _synchronise_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk, where systems allow it."""
+    """Synchronise the entries of a folder to disk, where the system supports it."""
     with suppress(OSError):
         opened = os.open(folder, os.O_RDONLY)
         try:
@@ -247,7 +245,7 @@ def _readable_errors(path: Path) -> Iterator[None]:
 
 
 def unwritable(path: Path, error: OSError) -> str:
-    """The sentence for a file that cannot be written."""
+    """Message for a file that cannot be written."""
     reason = (error.strerror or str(error).strip().partition("\n")[0] or "no reason given").lower()
     remedy = ""
     if error.errno in _FULL:
@@ -259,7 +257,7 @@ def unwritable(path: Path, error: OSError) -> str:
 
 @contextmanager
 def output_folder(folder: Path) -> Iterator[Path]:
-    """A folder that can be written, made if need be; unmade if nothing was put there.
+    """Yield a writable folder, made if necessary and removed if it is left empty.
 
     Raises
     ------

@@ -10,19 +10,19 @@ from fecontact.core.errors import InputError
 
 @contextmanager
 def locked(path: Path, busy: str, *, keep: bool = False) -> Iterator[None]:
-    """Hold a lock file; other processes that want it meanwhile are refused.
+    """Hold a lock file; other processes that request it meanwhile get an error.
 
-    The lock belongs to the process, not to the file: what a killed process leaves behind keeps
-    nobody out, and is removed by the next one.
+    The lock belongs to the process, not to the file: the file of a killed process does not block
+    others, and is removed by the next one.
 
     Parameters
     ----------
     path : Path
         The lock file; its folder must exist.
     busy : str
-        The message where another process holds the lock.
+        Error message if another process holds the lock.
     keep : bool
-        Whether the file stays, for folders of our own; removed otherwise.
+        Whether to keep the file at the end.
 
     Raises
     ------
@@ -31,12 +31,12 @@ def locked(path: Path, busy: str, *, keep: bool = False) -> Iterator[None]:
     """
     try:
         import fcntl
-    except ImportError:  # Windows: files written whole, one after the other, must do
+    except ImportError:  # Windows: rely on atomic writing alone
         yield
         return
     while True:
         try:
-            # A link in its place would name a file that is not ours.
+            # Do not follow a link to a foreign file.
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         except OSError as error:
             raise InputError(f"{path} cannot be written "
@@ -50,7 +50,7 @@ def locked(path: Path, busy: str, *, keep: bool = False) -> Iterator[None]:
             pass
         if _is_at(descriptor, path):
             break
-        os.close(descriptor)  # its last holder has removed it since
+        os.close(descriptor)  # removed by its last holder meanwhile
     try:
         yield
     finally:

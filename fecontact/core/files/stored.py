@@ -1,7 +1,7 @@
 """Checked reading of arrays and attributes from HDF5 files.
 
-Files come from other computers, older versions and disks that ran full. Shapes, types and sizes
-are looked at before anything is allocated or handed to compiled code, which trusts them.
+Files may be damaged, or come from other versions. Shapes, types and sizes are checked before
+anything is allocated or passed to compiled code, which does not check them.
 """
 
 import io
@@ -21,24 +21,24 @@ from fecontact.core.errors import InputError
 T = TypeVar("T")
 Shape = tuple[int | None, ...]
 
-_DENSEST = 1100  # bytes that deflate makes of one, at most
-LARGEST = 20_000_000  # rows and columns of a sparse matrix that this package can work with
+_DENSEST = 1100  # upper bound of the compression ratio of deflate
+LARGEST = 20_000_000  # rows and columns of a sparse matrix
 _KINDS = {"f": ("fiu", np.float64), "i": ("iu", np.int64)}
 
 
 class DamagedError(ValueError):
-    """What is stored is not what it should be; :func:`reading` names the file."""
+    """The stored data is invalid; :func:`reading` adds the name of the file."""
 
 
 @contextmanager
 def reading(path: str | Path, what: str = "damaged or of another version of fecontact"
             ) -> Iterator[None]:
-    """Whatever a damaged file makes a reader raise becomes one sentence that names the file.
+    """Turn the errors of readers of damaged files into one sentence that names the file.
 
     Raises
     ------
     InputError
-        For every error but one of memory.
+        For every error except MemoryError.
     """
     try:
         yield
@@ -48,7 +48,7 @@ def reading(path: str | Path, what: str = "damaged or of another version of feco
         if str(error).startswith(str(path)):
             raise
         raise InputError(f"{path} is {what} ({str(error).rstrip('.')}).") from None
-    except Exception as error:  # damaged files make libraries fail in every way there is
+    except Exception as error:  # damaged files make libraries raise anything
         detail = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         if isinstance(error, KeyError):
             detail = f"it lacks {detail}"
@@ -107,12 +107,12 @@ def indices(group: Any, name: str, shape: Shape, end: int) -> NDArray[np.int64]:
 
 
 def values(data: Any) -> Any:
-    """What an HDF5 dataset holds.
+    """Values of an HDF5 dataset.
 
     Raises
     ------
     DamagedError
-        If it is none, or its values are not all in the file.
+        If it is not a dataset, or the file does not hold all of its values.
     """
     import h5py
 
@@ -123,13 +123,12 @@ def values(data: Any) -> Any:
     needed = math.prod(data.shape) * data.dtype.itemsize
     filtered = data.id.get_create_plist().get_nfilters() > 0
     if needed > data.id.get_storage_size() * (_DENSEST if filtered else 1):
-        raise DamagedError(f"'{data.name}' is said to hold {needed:.3g} bytes, which the file does "
-                           f"not hold")
+        raise DamagedError(f"'{data.name}' declares {needed:.3g} bytes, more than the file holds")
     return data[()]
 
 
 def texts(group: Any, name: str, count: int | None = None) -> list[str]:
-    """The texts of a dataset (k,)."""
+    """The strings of a dataset (k,)."""
     data = member(group, name)
     found = values(data)
     if getattr(found, "ndim", 0) != 1 or (count is not None and len(found) != count) or not all(
@@ -139,7 +138,7 @@ def texts(group: Any, name: str, count: int | None = None) -> list[str]:
 
 
 def text(group: Any, name: str) -> str:
-    """A text among the attributes of an HDF5 group."""
+    """A string attribute of an HDF5 group."""
     found = group.attrs[name]
     if not isinstance(found, str):
         raise DamagedError(f"the attribute '{name}' of '{group.name}' is no text")
@@ -147,7 +146,7 @@ def text(group: Any, name: str) -> str:
 
 
 def from_json(content: str, kind: type[T], what: str) -> T:
-    """What a JSON text holds, of a type."""
+    """Value of a JSON text, checked to be of a type."""
     found = json.loads(content)
     if not isinstance(found, kind):
         raise DamagedError(f"{what} is {type(found).__name__}, not {kind.__name__}")
@@ -155,12 +154,12 @@ def from_json(content: str, kind: type[T], what: str) -> T:
 
 
 def sound_sparse(matrix: Any) -> Any:
-    """A sparse matrix whose indices were looked at; scipy's kernels trust them.
+    """Check the indices of a sparse matrix, which scipy's kernels do not.
 
     Raises
     ------
     DamagedError
-        If they lie outside of its shape, or it is larger than can be worked with.
+        If they lie outside its shape, or it is too large.
     """
     if max(matrix.shape) > LARGEST:
         raise DamagedError(f"a matrix of shape {matrix.shape} is larger than {LARGEST} rows or "
@@ -188,7 +187,7 @@ def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
     Raises
     ------
     DamagedError
-        For one that the file does not hold, or that holds objects.
+        For one that is cut off, or that holds objects.
     """
     found = {}
     whole = path.stat().st_size
@@ -220,6 +219,6 @@ def npy_array(stream: Any, size: int) -> NDArray[Any]:
 
 
 def require_lengths(what: str, length: int, items: Sized) -> None:
-    """Raise DamagedError unless there are as many items as there should be."""
+    """Raise DamagedError unless there are ``length`` items."""
     if len(items) != length:
         raise DamagedError(f"{what} has {len(items)} values, not {length}")

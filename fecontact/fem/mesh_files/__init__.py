@@ -32,34 +32,32 @@ def read_mesh(
     boundaries: Mapping[str, str | Box] | None = None,
     points: Mapping[str, str | tuple[float, float]] | None = None,
 ) -> Mesh:
-    """A plane mesh with named boundaries and points from a file.
+    """Read a plane mesh with named boundaries and points from a file.
 
-    Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Nastran (.bdf, .nas, .fem), MED (.med), VTK
-    (.vtk, .vtu). Boundaries are Gmsh's physical curves, Abaqus' surfaces, sets of line elements
-    and node sets along the outline, MED's groups of edges and nodes likewise, and Nastran's line
-    elements by their property number. Points are physical points and sets of nodes; so are
-    groups of edges inside the body. VTK files have no groups. Second-order elements with
-    straight sides are reduced to first order, nodes that coincide become one, and nodes without
-    a cell are left out.
+    Formats: Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Nastran (.bdf, .nas, .fem), MED (.med), VTK
+    (.vtk, .vtu). Boundaries are physical curves (Gmsh), surfaces, sets of line elements and node
+    sets along the outline (Abaqus, MED), and line elements by property number (Nastran). Points
+    are physical points, node sets, and groups of edges inside the body. VTK files have no groups.
+    Second-order elements with straight sides are reduced to first order, coincident nodes are
+    merged, and nodes without a cell left out.
 
     Parameters
     ----------
     path : str or Path
-        The file; its suffix says its format.
+        The file; its suffix determines the format.
     scale : float
         Metres per unit of the file: 0.001 for millimetres.
     boundaries : mapping of name to name or (x0, y0, x1, y1)
-        Boundaries to name: a group of the file gets the new name; a box [m] takes the edges of
-        the outline that lie in it.
+        Boundaries by new name: a group of the file, or the edges of the outline within a box [m].
     points : mapping of name to name or (x, y)
-        Points to name: a group of the file (also the nodes of a boundary), or the node nearest
-        to a place [m] in the body.
+        Points by new name: a group of the file (also a boundary), or the node nearest to a place
+        [m] in the body.
 
     Raises
     ------
     InputError
-        If there is no such file, its suffix is not one of those above, scale is not above zero,
-        or a boundary or point is asked for in another way.
+        If the file does not exist, its suffix is unknown, scale is not above zero, or a boundary or
+        point is given in another form.
     MeshError
         If the file is not a plane mesh of first-order elements of one kind, or has no such group,
         edges or node.
@@ -83,8 +81,8 @@ def read_mesh(
 def write_mesh(mesh: Mesh, path: str | Path) -> None:
     """Write a mesh as Gmsh 4.1 text, boundaries and points as physical groups.
 
-    Coordinates are written in full, so that :func:`read_mesh` gives the same mesh back. The file
-    is complete or not there.
+    Coordinates are written with all digits, so that :func:`read_mesh` restores the same mesh. The
+    file is written whole or not at all.
 
     Raises
     ------
@@ -117,11 +115,11 @@ def write_fields(
     path : str or Path
         The file, written whole or not at all.
     points : (N, 2) or (N, 3) array
-        Coordinates [m]; z is zero where it is not given.
+        Coordinates [m]; z is zero by default.
     cells : (M, 3) or (M, 4) integer array
         Corners of triangles or quadrilaterals.
     point_data : mapping of name to (N,) or (N, k) array
-        Fields at the nodes; vectors of two components get a third one, zero.
+        Fields at the nodes; vectors of two components get a zero third component.
 
     Raises
     ------
@@ -167,7 +165,7 @@ def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
         **dict.fromkeys((".bdf", ".fem", ".nas"), (_read_nastran, "Nastran")),
     }
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path}: files of this kind are not read; the suffixes that are: "
+        raise InputError(f"{path}: files of this kind are not read; suffixes that are: "
                          f"{', '.join(sorted(readers))}.")
     return readers[path.suffix.lower()]
 
@@ -180,7 +178,7 @@ def _read(reader: Callable[[Path], RawMesh], path: Path, format_name: str) -> Ra
     except OSError as error:
         raise MeshError(f"The file cannot be opened ({error.strerror or error}).") from None
     except Exception as error:
-        # Damaged files make readers fail in every way there is.
+        # Damaged files make readers raise anything.
         detail = " ".join(str(error).split()).rstrip(".")
         if isinstance(error, KeyError):
             detail = f"it lacks {detail}"
@@ -189,7 +187,7 @@ def _read(reader: Callable[[Path], RawMesh], path: Path, format_name: str) -> Ra
 
 
 def _read_vtk(path: Path) -> RawMesh:
-    # meshio fails on many types of data arrays, and they follow the mesh in the file.
+    # meshio fails on many types of data arrays, which follow the mesh in the file.
     mesh_alone = re.split(rb"\n(?:POINT_DATA|CELL_DATA) ", path.read_bytes(), maxsplit=1)[0]
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder, "mesh.vtk")
@@ -223,15 +221,15 @@ def _read_nastran(path: Path) -> RawMesh:
 
 
 def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
-    """A file read by meshio, with the groups of line elements that Nastran's have."""
+    """Read a file by meshio, with the groups of line elements in Nastran files."""
     import meshio
 
     with _silence() as printed:
-        # meshio.read would end the process where the reader of a format raises.
+        # meshio.read exits the process if a reader raises.
         found = meshio.read(source, format_name) if isinstance(source, io.StringIO) else \
             getattr(meshio, format_name).read(source)
     if "cannot handle" in printed.getvalue():
-        raise MeshError("The file holds elements of a kind that meshio leaves out; mesh with "
+        raise MeshError("The file holds elements of a kind that meshio does not read; mesh with "
                         "first-order triangles or quadrilaterals.")
     if np.any(found.point_data.get("nastran:ref", 0)):
         raise MeshError("The file gives nodes in local coordinate systems; export them in the "
@@ -251,7 +249,7 @@ def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[io.StringIO]:
-    """Keep warnings, and what meshio prints, from the terminal."""
+    """Suppress warnings and the output of meshio."""
     printed = io.StringIO()
     with (contextlib.redirect_stderr(printed), contextlib.redirect_stdout(printed),
           warnings.catch_warnings()):
@@ -260,5 +258,5 @@ def _silence() -> Iterator[io.StringIO]:
 
 
 def _three(columns: NDArray[Any]) -> NDArray[Any]:
-    """Vectors of two components with a third one, zero; others as they are."""
+    """Add a zero third component to vectors of two; leave others unchanged."""
     return np.pad(columns, ((0, 0), (0, 1))) if columns.shape[1] == 2 else columns

@@ -28,7 +28,7 @@ def read_inp(path: Path) -> RawMesh:
     Raises
     ------
     MeshError
-        If the file holds several parts or a moved one, or a line that is not understood.
+        If the file holds several parts, a displaced part, or an unknown line.
     """
     part = _Part()
     for keyword, options, rows in _blocks(path.read_text(encoding="utf-8", errors="replace")):
@@ -51,7 +51,7 @@ def read_inp(path: Path) -> RawMesh:
             case "ASSEMBLY":
                 part.in_assembly = True
             case "INSTANCE" if any(float(word or 0) for row in rows for word in row):
-                raise MeshError("The file moves its part in *INSTANCE; export the part itself.")
+                raise MeshError("The file displaces its part in *INSTANCE; export the part itself.")
             case "INCLUDE":
                 raise MeshError("The file includes another one (*INCLUDE), which is not read; put "
                                 "everything into one file.")
@@ -85,7 +85,7 @@ def _blocks(text: str) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
 
 @dataclass
 class _Part:
-    """What has been read so far; sets hold Abaqus' numbers and names of other sets."""
+    """The part as read so far; sets hold Abaqus' numbers and names of other sets."""
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
@@ -97,7 +97,7 @@ class _Part:
 
     def add_nodes(self, options: dict[str, str], rows: list[list[str]]) -> None:
         if self.in_assembly:
-            return  # reference points, in a numbering of their own
+            return  # reference points have their own numbering
         if options.get("SYSTEM", "R").upper() != "R":
             raise MeshError("The file gives nodes in cylindrical or spherical coordinates; export "
                             "Cartesian ones.")
@@ -143,7 +143,7 @@ class _Part:
                 members.extend(int(word) if word.isdigit() else word for word in words)
 
     def resolve(self, sets: dict[str, list[int | str]], name: str) -> list[int]:
-        """The numbers in a set; names in it stand for sets defined before."""
+        """The numbers in a set; names in it refer to sets defined before."""
         by_name = {key.upper(): key for key in sets}
         pending: list[int | str] = [name]
         seen: set[str] = set()
@@ -207,7 +207,7 @@ class _Part:
 def _kind(name: str) -> str | None:
     """Kind of an element type; None for masses, springs, rigid links and the like."""
     if name == "CAX4P":
-        return "quad"  # what meshio calls every quadrilateral when it writes
+        return "quad"  # meshio writes every quadrilateral under this name
     if name.startswith(("CAX", "CGAX", "DCAX", "SAX", "MAX")):
         raise MeshError(f"The file holds axisymmetric elements ({name}); fecontact's bodies are "
                         f"plane.")

@@ -20,7 +20,7 @@ _KINDS = {15: "vertex", 1: "line", 8: "line3", 2: "triangle", 9: "triangle6",
           3: "quad", 16: "quad8", 10: "quad9"}
 _SOLIDS = {4: 4, 5: 8, 6: 6, 7: 5, 11: 10, 12: 27, 13: 18, 14: 14, 17: 20, 18: 15, 19: 13}
 
-# Elements of one kind with the physical groups (2.2: one or none, 4.1: of their entity).
+# Elements of one kind with their physical groups (2.2: one or none, 4.1: those of the entity).
 _Block = tuple[str, Integers, list[int]]
 
 
@@ -59,7 +59,7 @@ def read_msh(path: Path) -> RawMesh:
 
 
 class _Numbers:
-    """The numbers of a section, taken one run after another."""
+    """Sequential reader of the numbers of a section."""
 
     def __init__(self, data: bytes, binary: bool) -> None:
         self.data: Any = data if binary else data.split()
@@ -99,7 +99,7 @@ def _entity_groups(numbers: _Numbers, size: int) -> dict[tuple[int, int], list[i
             tag = numbers.one("i4")
             numbers.take("f8", 6 if dimension else 3)
             physical = numbers.take("i4", numbers.one(f"u{size}"))
-            groups[dimension, tag] = np.abs(physical).tolist()  # a minus sign turns the entity
+            groups[dimension, tag] = np.abs(physical).tolist()  # a minus sign reverses the entity
             if dimension:
                 numbers.take("i4", numbers.one(f"u{size}"))
     return groups

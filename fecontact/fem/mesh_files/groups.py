@@ -1,4 +1,4 @@
-"""Named boundaries and points of a mesh, from its file's groups, boxes and places."""
+"""Named boundaries and points of a mesh, from groups of its file, boxes and coordinates."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,14 +18,14 @@ _BOX_TOLERANCE = 1e-6  # of the body's size
 def named_boundaries(
     mesh: Mesh, groups: Groups, wanted: Mapping[str, str | Box]
 ) -> dict[str, Integers]:
-    """The file's boundaries, with those that are asked for under their new names.
+    """Boundaries of the file, and those requested under new names.
 
     Raises
     ------
     MeshError
-        If there is no such group, it is no boundary, or no edge lies in a box.
+        If a group does not exist or is not a boundary, or no edge lies in a box.
     InputError
-        If a boundary is asked for by neither a name nor four numbers.
+        If a boundary is given by neither a name nor four numbers.
     """
     taken = {source for source in wanted.values() if isinstance(source, str)}
     found = {name: edges for name, edges in groups.boundaries.items() if name not in taken}
@@ -46,14 +46,14 @@ def named_boundaries(
 def named_points(
     mesh: Mesh, groups: Groups, wanted: Mapping[str, str | tuple[float, float]]
 ) -> dict[str, Integers]:
-    """The file's points, with those that are asked for under their new names.
+    """Points of the file, and those requested under new names.
 
     Raises
     ------
     MeshError
         If there is no such group, or a place is outside the body.
     InputError
-        If a point is asked for by neither a name nor two numbers.
+        If a point is given by neither a name nor two numbers.
     """
     taken = {source for source in wanted.values() if isinstance(source, str)}
     found = {name: nodes for name, nodes in groups.points.items() if name not in taken}

@@ -15,14 +15,14 @@ NODES = {"vertex": 1, "line": 2, "line3": 3,
 
 _SOLID = ("tetra", "hexa", "wedge", "penta", "pyramid", "polyhedron", "voxel", "solid",
           "VTK_LAGRANGE_TETRA", "VTK_LAGRANGE_HEXA", "VTK_LAGRANGE_WEDGE", "VTK_LAGRANGE_PYRAMID")
-_CURVED = 1e-4  # mid-side node off the chord, as part of the edge; text files round coordinates
-_ROUNDED = 1e-6  # of the body's size: what files with six digits cannot tell apart
+_CURVED = 1e-4  # distance of mid-side node and chord per length; text files round coordinates
+_ROUNDED = 1e-6  # of the body's size: resolution of files with six digits
 _COINCIDENT = 1e-9  # of the body's size
 
 
 @dataclass
 class RawMesh:
-    """Nodes, elements and named groups as they stand in a file.
+    """Nodes, elements and named groups as read from a file.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class RawMesh:
     nodes : mapping of name to (k,) integer array
         Groups of nodes.
     sets_are_boundaries : bool
-        Whether a group of nodes that are joined by edges of the outline is a boundary as well.
+        Whether a group of nodes connected by edges of the outline is also a boundary.
     """
 
     points: Array
@@ -48,7 +48,7 @@ class RawMesh:
 
 @dataclass(frozen=True)
 class Groups:
-    """Named groups of a mesh, and the names of those that hold nothing of the body."""
+    """Named groups of a mesh, and the names of groups without nodes or edges of the body."""
 
     boundaries: dict[str, Integers]
     points: dict[str, Integers]

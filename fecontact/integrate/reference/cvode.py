@@ -21,9 +21,9 @@ def integrate(
     progress: Callable[[float], None] | None,
     max_step: float | None = None,
 ) -> Solution:
-    """Integrate with CVODE's backward differentiation formulas, from break to break.
+    """Integrate by CVODE's backward differentiation formulas, restarting at breakpoints.
 
-    See :func:`fecontact.integrate.reference.scipy.integrate`, whose equations these are.
+    The equations are those of :func:`fecontact.integrate.reference.scipy.integrate`.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def integrate(
     begin = clock.perf_counter()
     rate, derivative, tolerance, counts = scipy.with_work(system, state, rtol)
 
-    # CVODE's own arrays are read-only, for which the compiled functions are not made.
+    # CVODE's arrays are read-only, which the compiled functions do not accept.
     def rhs(t: float, y: Array, out: Array) -> None:
         out[:] = rate(min(t, latest), y.copy())
 

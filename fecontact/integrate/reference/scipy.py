@@ -24,8 +24,8 @@ def integrate(
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``.
 
-    The powers of drive, ground, belt, damping and friction are integrated along with the state;
-    their error is controlled too, so that the energy balance closes to the tolerance.
+    The powers of drive, ground, belt, damping and friction are integrated with the state, with
+    error control, so that the energy balance closes to the tolerance.
     ``method`` is 'Radau', 'BDF' or 'LSODA'.
     """
     import scipy.integrate
@@ -51,7 +51,7 @@ def integrate(
         while done < len(times):
             before = solver.t
             message = _step(solver)
-            # LSODA repeats steps that do not move the time, for ever.
+            # LSODA repeats steps that do not advance time forever.
             stalled = stalled + 1 if solver.t == before else 0
             if stalled == 100:
                 message = "Required step size is less than spacing between numbers."
@@ -113,12 +113,12 @@ def with_work(
 
 
 def before_break(t: float, end: float) -> float:
-    """The last moment before a break at ``end`` of a step from t: signals may jump there."""
+    """The last time before a breakpoint at ``end``, where signals may jump, of a step from t."""
     return float(np.nextafter(end, t))
 
 
 def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
-    """State and work behind a break at ``end``: the drive's work counts where its motion jumps."""
+    """State and work after a breakpoint at ``end``, with the work of jumps of the drive."""
     y, m = y.copy(), system.basis.modes
     for motion, stiffness, shape in zip(system.drive.motions, system.arrays.drive_stiffness,
                                         system.arrays.drive_shapes, strict=True):
@@ -128,12 +128,12 @@ def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
 
 
 def _step(solver: Any) -> str | None:
-    """One step; a sentence that says why if it failed."""
+    """Take one step; return a message if it failed."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             message = solver.step()
     except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-        # What scipy's linear algebra says to values that are not finite.
+        # scipy's linear algebra raises this for values that are not finite.
         return "The motion grew beyond all numbers."
     if solver.status == "failed":
         return str(message)
@@ -143,10 +143,10 @@ def _step(solver: Any) -> str | None:
 def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
     """Absolute tolerances (2 m + n s,) of the state.
 
-    ``rtol`` times the smallest penetration scale for displacements; for velocities a tenth of the
-    smallest velocity scale of friction, or less for a finer ``rtol``: steps that do not resolve
-    it lose the contact's stick. Both are divided by the mode's largest motion at any point.
-    Internal variables: ``rtol`` times their scales.
+    Displacements: ``rtol`` times the smallest penetration scale. Velocities: a tenth of the
+    smallest velocity scale of friction, or less for a smaller ``rtol``, since steps that do not
+    resolve it miss stick. Both are divided by the mode's largest motion at any point. Internal
+    variables: ``rtol`` times their scales.
     """
     T = system.basis.T[:, :2]
     largest = np.abs(T).max(axis=(0, 1))
@@ -169,11 +169,10 @@ def energy_scale(system: ContactSystem, state: Array) -> float:
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
-    """A fiftieth of the run, a twentieth of the shortest period of drive, loads and waves [s].
+    """Limit of the step [s]: 1/50 of the run, 1/20 of the shortest period, or ``max_step``.
 
-    Or the given limit, if that is shorter.
-
-    Longer steps could jump over an excitation that starts from rest.
+    The period is that of drive, loads and waves. Longer steps could miss an excitation that starts
+    from rest.
     """
     start, end = float(times[0]), float(times[-1])
     longest = min((end - start) / 50.0, system.shortest_period(start, end) / 20.0)

@@ -14,10 +14,10 @@ Smoothing = Literal["arctan", "tanh", "square-root"]
 
 
 class MemorylessFriction(base.FrictionLaw):
-    """A friction law ``f(v, F, p)``, with the usual questions to its curve R/F over v.
+    """A friction law ``f(v, F, p)`` with the properties of its curve R/F over v.
 
-    The answers come from the compiled law itself; see :mod:`fecontact.laws.friction_curve`, whose
-    functions of the same names take any law without memory.
+    They are computed from the compiled law by the functions of the same names in
+    :mod:`fecontact.laws.friction_curve`, which take any law without memory.
     """
 
     def coefficient(self, velocity: Array | float) -> Array:
@@ -35,7 +35,7 @@ class MemorylessFriction(base.FrictionLaw):
     def largest_coefficient(self) -> tuple[Array, Array]:
         """Largest maximum (n,) of R/F and its slip velocity (n,) [m/s].
 
-        Without a maximum the velocity is infinite and the coefficient the value that R/F tends to.
+        Without a maximum the velocity is infinite and the coefficient the limit of R/F.
         """
         from fecontact.laws import friction_curve
 
@@ -62,13 +62,12 @@ class SmoothedFriction(MemorylessFriction):
                      ``eps = pi / (2 k_s)``
     ===============  ===========================================
 
-    At v = 10 / k_s they have reached 0.937, 1 - 6e-6 and 0.988: with the arctan, contacts creep
-    more than with the others.
+    At v = 10 / k_s they reach 0.937, 1 - 6e-6 and 0.988: contacts creep most with the arctan.
 
     Parameters
     ----------
     smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m]. Below slip velocities of some 1/k_s the contact creeps instead of
+        k_s, positive [s/m]. Below slip velocities of about 1/k_s the contact creeps instead of
         sticking.
     viscous_coefficient : float or (n,) sequence
         c_v, zero or above [s/m].
@@ -89,33 +88,33 @@ class SmoothedFriction(MemorylessFriction):
 class MemoryFriction(base.FrictionLaw):
     """A friction law ``f(v, F, z, p, force, rates)`` with internal variables z.
 
-    Subclasses give :attr:`state_scale`, :meth:`steady_coefficient` and, where there is more than
-    one internal variable, :attr:`memory`.
+    Subclasses define :attr:`state_scale`, :meth:`steady_coefficient` and, for more than one
+    internal variable, :attr:`memory`.
     """
 
     @property
     def memory(self) -> int:
-        """Number s of internal variables per node: one, if a law does not say otherwise."""
+        """Number s of internal variables per node, one by default."""
         return 1
 
     @property
     def velocity_scale(self) -> float:
-        """Slip velocity [m/s] that moves the first internal variable by its scale in 0.1 s.
+        """Slip velocity [m/s] that changes the first internal variable by its scale in 0.1 s.
 
-        Friction with memory rises with displacement, not with velocity: velocities well below
-        this one do not change it over the time of some oscillations.
+        Friction with memory depends on displacement, not on velocity: much lower velocities do not
+        change it within some oscillations.
         """
         return 10.0 * float(self.state_scale[0])
 
     def steady_coefficient(self, velocity: Array | float) -> Array:
-        """R/F of sliding at constant slip velocity [m/s], with its sign; for v = 0 that of v > 0.
+        """R/F of steady sliding at slip velocities [m/s], with their sign; at v = 0 that of v > 0.
 
         With parameters per node, (n,) of them, velocities broadcast against (n,).
         """
         raise NotImplementedError
 
     def stick_velocity(self, nodes: int) -> Array:
-        """Slip velocity (n,) of the size at which :meth:`sticks` may change its answer [m/s].
+        """Slip velocity (n,) of the order at which :meth:`sticks` may change [m/s].
 
         Whether a node sticks depends on its force, not on its slip velocity alone.
         """
@@ -123,7 +122,7 @@ class MemoryFriction(base.FrictionLaw):
 
     def sticks(self, slip_velocity: Array, normal_force: Array, friction_force: Array
                ) -> NDArray[np.bool_]:
-        """Whether nodes in contact stick: the size of R is below 0.95 of that of steady sliding."""
+        """Whether nodes in contact stick: abs(R) is below 0.95 times that of steady sliding."""
         steady = np.abs(self.steady_coefficient(slip_velocity)) * normal_force
         return np.asarray(np.abs(friction_force) < 0.95 * steady)
 

@@ -13,13 +13,13 @@ from fecontact.laws.base import Bound, NotNegative, OneOrAbove, PerNode, Positiv
 from fecontact.laws.friction.base import LimitedFriction, MemoryFriction, require_at_least
 from fecontact.laws.signatures import memory_friction_law
 
-# Time constant [s] with which internal variables vanish without normal force.
+# Time constant [s] of the decay of internal variables without normal force.
 _FADING = 1e-7
 
 
 @helper
 def _fade(z, rates):
-    """The rate of one internal variable without normal force, when nothing drives it."""
+    """Decay rate of one internal variable without normal force."""
     rates[0, 0] = -z[0] / _FADING
     rates[0, 1] = 0.0
     rates[0, 2] = 0.0
@@ -109,9 +109,9 @@ class DahlFriction(LimitedFriction):
         z' = v\, \left|1 - \tfrac{\sigma z}{\mu} \operatorname{sgn} v\right|^{i - 1}
         \left(1 - \tfrac{\sigma z}{\mu} \operatorname{sgn} v\right)
 
-    z is a deflection [m] that does not depend on the normal force F [N], at most mu / sigma in
-    size; the stiffness of the contact before it slides, sigma F [N/m], is proportional to F. v is
-    the slip velocity [m/s]. While F = 0, z falls back to zero.
+    z is a deflection [m], at most mu / sigma in magnitude, that does not depend on the normal
+    force F [N]; the presliding stiffness sigma F [N/m] is proportional to F. v is the slip velocity
+    [m/s]. While F = 0, z decays to zero.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class DahlFriction(LimitedFriction):
 
 @dataclass(frozen=True)
 class LuGreFriction(MemoryFriction):
-    r"""LuGre's law: bristles that bend, are dragged along and slide.
+    r"""LuGre friction: bristles that deflect and slide.
 
     .. math::
 
@@ -154,10 +154,10 @@ class LuGreFriction(MemoryFriction):
         \sigma_1(v) = \sigma_1 e^{-(\lambda_1 v)^2}
 
     z is the deflection of the bristles [m], v the slip velocity [m/s], F the normal force [N], to
-    which stiffness and damping are proportional. Sliding steadily ``R = F [g(v) sgn v + sigma_2
-    v]``. While F = 0, z falls back to zero.
+    which stiffness and damping are proportional. In steady sliding ``R = F [g(v) sgn v + sigma_2
+    v]``. While F = 0, z decays to zero.
 
-    Friction takes energy out of every motion if ``sigma_2 >= sigma_1 (mu_s / mu_k - 1)``, or if
+    Friction is dissipative in every motion if ``sigma_2 >= sigma_1 (mu_s / mu_k - 1)``, or if
     ``sigma_1 <= 9.3 mu_k lambda_1``; otherwise as long as ``sigma_1 |v| <= 4 mu_k``.
 
     Parameters
@@ -177,8 +177,8 @@ class LuGreFriction(MemoryFriction):
     viscous_coefficient : float or (n,) sequence
         sigma_2, zero or above [s/m].
     damping_decay : float or (n,) sequence
-        lambda_1, zero or above: 1 / lambda_1 is the velocity at which bristle damping has fallen
-        to 1/e; zero keeps it constant [s/m].
+        lambda_1, zero or above: bristle damping falls to 1/e at the velocity 1 / lambda_1; zero
+        keeps it constant [s/m].
 
     References
     ----------
@@ -209,7 +209,7 @@ class LuGreFriction(MemoryFriction):
 
     @property
     def velocity_scale(self) -> float:
-        """Stribeck velocity, or that of :class:`MemoryFriction` where it is less [m/s]."""
+        """Stribeck velocity, or that of :class:`MemoryFriction` if it is lower [m/s]."""
         return min(super().velocity_scale, float(np.min(self.stribeck_velocity)))
 
     def steady_coefficient(self, velocity: Array | float) -> Array:
@@ -230,19 +230,19 @@ class BoucWenFriction(LimitedFriction):
         R = \mu F z, \qquad
         z' = \frac{1}{u_s} \left[v - \beta\, |v|\, |z|^{n-1} z - (1 - \beta)\, v\, |z|^n\right]
 
-    z is dimensionless, at most 1 in size; the stiffness of the contact before it slides,
-    ``mu F / u_s`` [N/m], is proportional to the normal force F [N]. v is the slip velocity [m/s].
-    While F = 0, z falls back to zero.
+    z is dimensionless, at most 1 in magnitude; the presliding stiffness ``mu F / u_s`` [N/m] is
+    proportional to the normal force F [N]. v is the slip velocity [m/s]. While F = 0, z decays to
+    zero.
 
     Parameters
     ----------
     yield_displacement : float or (n,) sequence
         u_s, positive: deflection at which the initial stiffness would reach mu F [m].
     beta : float or (n,) sequence
-        At least 1/2, which unloads with the initial stiffness to R = 0; above it loops are wider.
-        Below it loops could give energy off.
+        At least 1/2, so that loops dissipate energy; 1/2 unloads with the initial stiffness to
+        R = 0, larger values make loops wider.
     exponent : float or (n,) sequence
-        n, one or above: sharpness of the bend into sliding.
+        n, one or above: sharpness of the transition to sliding.
 
     References
     ----------
@@ -265,5 +265,5 @@ class BoucWenFriction(LimitedFriction):
 
     @property
     def velocity_scale(self) -> float:
-        """Slip velocity [m/s] that passes the smallest yield displacement in 0.1 s."""
+        """Slip velocity [m/s] that covers the smallest yield displacement in 0.1 s."""
         return 10.0 * float(np.min(self.yield_displacement))

@@ -48,9 +48,9 @@ class _MaxwellSlip(LimitedFriction):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        k, positive: stiffness of the whole face before it slides, or of each node [N/m].
+        k, positive: presliding stiffness of the whole face, or of each node [N/m].
     relaxation_time : float or (n,) sequence
-        tau, positive: short against the shortest period of the motion [s].
+        tau, positive: much shorter than the shortest period of the motion [s].
     """
 
     kernel: ClassVar = _maxwell_slip
@@ -64,7 +64,7 @@ class _MaxwellSlip(LimitedFriction):
     def state_scale(self) -> Array:
         """Deflections (s,) [m] at which the elements slide under 1 N on the whole face.
 
-        The smallest of all nodes; with coefficient zero, as with coefficient one.
+        The smallest of all nodes; for coefficient zero the same as for one.
         """
         mu = np.where(np.greater(self.friction_coefficient, 0.0), self.friction_coefficient, 1.0)
         nodes = np.size(self.stiffness)
@@ -82,11 +82,11 @@ class JenkinsFriction(_MaxwellSlip):
         z' = v - \frac{1}{\tau} \max\left(0,\ |z| - \frac{\mu F}{k}\right) \operatorname{sgn} z
 
     z is the deflection of the spring [m], v the slip velocity [m/s], F the normal force [N].
-    Beyond its limit z returns to it within the relaxation time, so that it follows a falling
-    normal force and vanishes with it; sliding at v, it is ahead of the limit by ``v tau``, R is
-    not. A cycle of amplitude X > mu F / k takes the energy ``4 mu F (X - mu F / k)``; tau changes
-    that by a part of about ``(w tau)^2`` at the angular frequency w: 1e-4 at 16 kHz by default.
-    Much shorter ones let stiff solvers step over the end of sliding.
+    Beyond its limit z relaxes to it within tau, so that it follows a decreasing normal force and
+    vanishes with it; in sliding at v it exceeds the limit by ``v tau``, while R does not. A cycle
+    of amplitude X > mu F / k dissipates ``4 mu F (X - mu F / k)``; tau changes that by about
+    ``(w tau)^2``, relative, at the angular frequency w: 1e-4 at 16 kHz by default. With much
+    shorter ones, stiff solvers may step over the end of sliding.
 
     References
     ----------
@@ -105,11 +105,11 @@ class IwanFriction(_MaxwellSlip):
         \qquad \phi_i = \frac{2 i - 1}{N^2}\, \mu F
 
     with the rate of z_i as in :class:`JenkinsFriction`, but with the limit ``phi_i N / k``. The
-    limits are spread uniformly, their sum is mu F and the sum of the stiffnesses k. The contact
-    loses stiffness from the deflection ``mu F / (N k)`` on and slides as a whole from
-    ``(2 N - 1) mu F / (N k)`` on. For many elements R on first loading is
-    ``k x - (k x)^2 / (4 mu F)`` up to ``x = 2 mu F / k``. At constant normal force Masing's rules
-    hold: unloading follows the curve of first loading, doubled in size.
+    limits are uniformly distributed, their sum is mu F and the sum of the stiffnesses k. Elements
+    slide from the deflection ``mu F / (N k)`` on, all of them from ``(2 N - 1) mu F / (N k)`` on.
+    For many elements, R on first loading is ``k x - (k x)^2 / (4 mu F)`` up to ``x = 2 mu F / k``.
+    At constant normal force Masing's rules hold: unloading follows the curve of first loading,
+    scaled by two.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Friction laws without memory whose coefficient is constant or falls with slip velocity."""
+"""Friction laws without memory: constant coefficient and Stribeck curves."""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from fecontact.laws.signatures import friction_law
 
 @helper
 def _smoothed_sign(v, slope, smoothing):
-    """s(v) and s'(v); the smoothing is its index among the choices."""
+    """s(v) and s'(v); ``smoothing`` is the index of the choice."""
     rise = 2.0 / math.pi * slope
     if smoothing == 0.0:
         x = slope * v
@@ -35,7 +35,7 @@ def _smoothed_sign(v, slope, smoothing):
 
 @helper
 def _force(v, F, coefficient, change, viscous, slope, smoothing):
-    """R, dR/dv, dR/dF from mu and its derivative ``change`` to the speed."""
+    """R, dR/dv, dR/dF from mu and ``change``, its derivative with respect to speed."""
     s, rate = _smoothed_sign(v, slope, smoothing)
     sign = 1.0 if v >= 0.0 else -1.0
     ratio = coefficient * s + viscous * v
@@ -110,12 +110,12 @@ def product(v, F, p):
 
 @dataclass(frozen=True)
 class _FallingFriction(SmoothedFriction):
-    """Friction whose coefficient leads from one value at rest to another at high velocities.
+    """Friction whose coefficient changes from one value at rest to another at high velocities.
 
     Parameters
     ----------
     static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_0 and mu_inf, zero or above; with mu_0 below mu_inf friction rises with velocity.
+        mu_0 and mu_inf, zero or above; friction rises with velocity if mu_0 is below mu_inf.
     """
 
     static_coefficient: NotNegative = 0.8
@@ -124,7 +124,7 @@ class _FallingFriction(SmoothedFriction):
 
 @dataclass(frozen=True)
 class ExponentialFriction(_FallingFriction):
-    r"""Dry friction that falls exponentially with slip velocity (4.1-21..23).
+    r"""Dry friction that decreases exponentially with slip velocity (4.1-21..23).
 
     .. math::
 
@@ -154,15 +154,15 @@ class ExponentialFriction(_FallingFriction):
 
 @dataclass(frozen=True)
 class GaussianFriction(_FallingFriction):
-    r"""Dry friction that falls with slip velocity like a Gaussian bell (Stribeck curve).
+    r"""Dry friction that decreases with slip velocity as a Gaussian (Stribeck curve).
 
     .. math::
 
         R = F\, [\mu(v)\, s(v) + c_v v], \qquad
         \mu(v) = (\mu_0 - \mu_\infty)\, e^{-(v/v_s)^2} + \mu_\infty
 
-    R [N] has the sign of the slip velocity v [m/s]. Friction is flat near rest, steepest at
-    ``v_s / sqrt(2)`` and has fallen by 63 % of the whole at v_s.
+    R [N] has the sign of the slip velocity v [m/s]. The slope of mu is zero at rest and largest at
+    ``v_s / sqrt(2)``; at v_s 63 % of the drop is reached.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class GaussianFriction(_FallingFriction):
 
 @dataclass(frozen=True)
 class HyperbolicFriction(_FallingFriction):
-    r"""Dry friction that falls with slip velocity like a hyperbola.
+    r"""Dry friction that decreases hyperbolically with slip velocity.
 
     .. math::
 
@@ -198,7 +198,7 @@ class HyperbolicFriction(_FallingFriction):
     Parameters
     ----------
     stribeck_velocity : float or (n,) sequence
-        v_s, positive: half of the fall is behind it [m/s].
+        v_s, positive: velocity of half the drop [m/s].
 
     References
     ----------
@@ -236,7 +236,7 @@ class ConstantFriction(SmoothedFriction):
 
 @dataclass(frozen=True)
 class ProductFriction(MemorylessFriction):
-    r"""Friction as a product of an exponential fall and an arctan (4.4-9).
+    r"""Friction as a product of an exponential decrease and an arctan (4.4-9).
 
     .. math:: R = F\, a_1 (1 + a_2 e^{-b_1 |v|}) \arctan(b_2 v)
 
@@ -248,7 +248,7 @@ class ProductFriction(MemorylessFriction):
     factor : float or (n,) sequence
         a_1, zero or above.
     excess : float or (n,) sequence
-        a_2, zero or above: friction near rest over that at high velocities, less one.
+        a_2, zero or above: ratio of friction near rest to that at high velocities, minus one.
     decay : float or (n,) sequence
         b_1, zero or above [s/m].
     smoothing_slope : float or (n,) sequence
@@ -274,20 +274,20 @@ class ProductFriction(MemorylessFriction):
 
 @dataclass(frozen=True)
 class GalvanettoFriction(_FallingFriction):
-    r"""Dry friction that falls like a hyperbola and rises again with the square of velocity.
+    r"""Dry friction with a hyperbolic decrease and a quadratic increase in velocity.
 
     .. math::
 
         R = F\, \mu(v)\, s(v), \qquad
         \mu(v) = \mu_k + \frac{\mu_s - \mu_k}{1 + \gamma |v|} + \eta v^2
 
-    R [N] has the sign of the slip velocity v [m/s]. Friction is least where
+    R [N] has the sign of the slip velocity v [m/s]. Friction has its minimum at
     ``gamma (mu_s - mu_k) = 2 eta |v| (1 + gamma |v|)^2``.
 
     Parameters
     ----------
     static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_s and mu_k, zero or above; with mu_s below mu_k friction rises from rest on.
+        mu_s and mu_k, zero or above; friction rises from rest if mu_s is below mu_k.
     decay : float or (n,) sequence
         gamma, zero or above [s/m].
     growth : float or (n,) sequence
@@ -309,7 +309,7 @@ class GalvanettoFriction(_FallingFriction):
 
 @dataclass(frozen=True)
 class CubicFriction(SmoothedFriction):
-    r"""Dry friction that is a cubic parabola of slip velocity with one minimum.
+    r"""Dry friction that is a cubic function of slip velocity with one minimum.
 
     .. math::
 
@@ -317,8 +317,8 @@ class CubicFriction(SmoothedFriction):
         \mu(v) = \mu_s - \tfrac{3}{2} (\mu_s - \mu_m)
         \left[\frac{|v|}{v_m} - \frac{1}{3} \left(\frac{|v|}{v_m}\right)^3\right]
 
-    R [N] has the sign of the slip velocity v [m/s]. mu falls from mu_s at rest to mu_m at v_m, is
-    back at mu_s at ``sqrt(3) v_m`` and grows without bound.
+    R [N] has the sign of the slip velocity v [m/s]. mu decreases from mu_s at rest to mu_m at v_m,
+    returns to mu_s at ``sqrt(3) v_m`` and then grows without bound.
 
     Parameters
     ----------

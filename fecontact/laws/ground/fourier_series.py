@@ -1,4 +1,4 @@
-"""Profiles of the ground that are sums of waves."""
+"""Ground profiles as Fourier series."""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from fecontact.laws.signatures import ground_profile
 
 @ground_profile
 def fourier(xi, p):
-    """Level, n, lambda, then the factors of sine and cosine of each wave."""
+    """Height from level, n, lambda, then the factors of sine and cosine of each wave."""
     # Harmonic k is the k-th power of the first one as a complex number.
     wavelength = p[2]
     wave_number = 2.0 * math.pi / wavelength
@@ -38,18 +38,18 @@ def fourier(xi, p):
 
 @dataclass(frozen=True)
 class FourierSeries(Profile):
-    r"""A sum of waves whose lengths are whole parts of one length.
+    r"""A sum of waves whose lengths are integer fractions of one length.
 
     .. math:: y = \sum_{k=1}^{n} A_k \sin(2 \pi k \xi / \lambda + \varphi_k)
 
-    The sines are powers of the first, so that a hundred cost less than ten sines.
+    Harmonics are computed as powers of the first, so that many waves are cheap.
 
     Parameters
     ----------
     wavelength : float
-        lambda, positive: the length after which the ground repeats [m].
+        lambda, positive: period of the ground [m].
     amplitudes : (n,) sequence
-        A_k from the longest wave to the shortest [m], or as parts of the friction force.
+        A_k from the longest wave to the shortest [m], or relative to the friction force.
     phases : (n,) sequence, optional
         phi_k [rad]; zero by default.
 
@@ -121,7 +121,7 @@ def _extremes(waves: NDArray[np.complex128]) -> tuple[float, float]:
     value, slope, curvature = (sampled(power) for power in range(3))
     found = []
     for sign in (-1.0, 1.0):
-        # From each sample that its neighbours do not exceed to the top of its parabola.
+        # Refine each local maximum of the samples by its parabola.
         here = sign * value
         tops = np.nonzero((here >= np.roll(here, 1)) & (here >= np.roll(here, -1)))[0]
         bend = np.minimum(sign * curvature[tops], -1e-300)

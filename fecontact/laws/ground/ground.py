@@ -29,8 +29,8 @@ class Ground:
 
     .. math:: y_R(\xi) = y_A \sin(2 \pi \xi / \lambda_w), \qquad \xi = X + x - \int_0^t V\,dt
 
-    is its height [m] below a node of reference abscissa X displaced by x; another profile and a
-    speed that changes in time may be given. The normal force stays vertical; keep the slope
+    is its height [m] below a node of reference abscissa X displaced by x. Other profiles and a
+    time-dependent speed are possible. The normal force stays vertical; keep the slope
     ``2 pi amplitude / wavelength`` well below one.
 
     Parameters
@@ -44,14 +44,14 @@ class Ground:
     profile : Profile, optional
         Heights [m] instead of the sine.
     motion : GroundMotion, optional
-        How the speed differs from V in time.
+        Time-dependent speed; by default the constant V.
     friction_variation : Profile, optional
-        s(xi): friction is that of the normal force times 1 + s, which must not be negative.
+        s(xi): the friction force is multiplied by 1 + s, which must not be negative.
 
     Raises
     ------
     InputError
-        For values outside these ranges, an amplitude beside a profile, or a variation that makes
+        For values outside these ranges, both amplitude and profile, or a variation that makes
         friction negative.
     """
 
@@ -72,8 +72,8 @@ class Ground:
             if given is not None and not isinstance(given, kind):
                 raise InputError(f"Ground: {name} = {given!r} must be a {kind.__name__}.")
         if self.profile is not None and self.amplitude != 0.0:
-            raise InputError(f"Ground: amplitude = {self.amplitude!r} cannot stand beside profile; "
-                             f"give one of them.")
+            raise InputError(f"Ground: amplitude = {self.amplitude!r} cannot be combined with "
+                             f"profile; give one of them.")
         self._require_friction()
 
     def _require_friction(self) -> None:
@@ -87,8 +87,8 @@ class Ground:
         plain, raised = (variation.kernel.python(0.0, p)[0]
                          for p in (variation.parameters(), self.friction_scale_parameters()))
         if not math.isclose(raised - plain, 1.0, abs_tol=1e-9):
-            raise InputError(f"Ground: friction_variation = {variation!r} cannot serve: the kernel "
-                             f"of a profile must add its first parameter to the height.")
+            raise InputError(f"Ground: friction_variation = {variation!r} is not usable: the "
+                             f"kernel of a profile must add its first parameter to the height.")
 
     @cached_property
     def _shape(self) -> Profile:
@@ -98,7 +98,7 @@ class Ground:
 
     @property
     def wavy(self) -> bool:
-        """Whether the height is not the same everywhere."""
+        """Whether the height varies."""
         return not self._shape.flat
 
     @property
@@ -113,7 +113,7 @@ class Ground:
 
     @property
     def shortest_wavelength(self) -> float | None:
-        """Shortest wave of the profile and of the variation of friction [m]; None without."""
+        """Shortest wavelength of profile and variation of friction [m]; None if both are flat."""
         parts = [self._shape, *([self.friction_variation] if self.friction_variation else [])]
         waves = [part.shortest_wavelength for part in parts]
         return min((wave for wave in waves if wave is not None), default=None)
@@ -138,7 +138,7 @@ class Ground:
         return self.motion.largest_speed(self.speed, t0, t1)
 
     def largest_acceleration(self, t0: float, t1: float) -> float:
-        """Largest magnitude of the rate of the speed from t0 to t1 [m/s2]."""
+        """Largest magnitude of the acceleration from t0 to t1 [m/s2]."""
         if self.motion is None:
             return 0.0
         return self.motion.largest_acceleration(self.speed, t0, t1)
@@ -169,7 +169,7 @@ class Ground:
 
     @property
     def friction_scale_kernel(self) -> CompiledLaw | None:
-        """Compiled factor 1 + s of friction along the ground; None where it is one."""
+        """Compiled factor 1 + s of friction along the ground; None if it is one."""
         return None if self.friction_variation is None else self.friction_variation.kernel
 
     def friction_scale_parameters(self) -> Array:

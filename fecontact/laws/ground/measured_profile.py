@@ -27,33 +27,33 @@ def _trace(xi, p):
 
 @dataclass(frozen=True)
 class MeasuredProfile(Profile):
-    """A measured height trace: the cubic spline through its points.
+    """A measured height trace, interpolated by a cubic spline.
 
-    Slope and curvature are continuous everywhere. A trace that is not periodic has no curvature
-    at its ends; beyond each, within twice the distance of its last two points, the slope falls
-    smoothly to zero, and from there on the height is constant.
+    Slope and curvature are continuous. A trace that is not periodic has zero curvature at its ends;
+    beyond them the slope decreases smoothly to zero within twice the distance of the last two
+    points, and the height stays constant.
 
     Parameters
     ----------
     abscissa : (N,) sequence
-        Places along the ground, growing.
+        Positions along the ground, ascending.
     heights : (N,) sequence
-        Heights there, positive out of the ground; of a periodic trace the last is the first.
+        Heights, positive out of the ground; the last of a periodic trace equals the first.
     file : str, optional
-        A text or CSV file with two columns, abscissae and heights, instead of both; lines before
-        the first of two numbers are a header. It is read once; afterwards ``file`` is None.
+        Text or CSV file with columns of abscissae and heights, instead of both; lines before the
+        first line of numbers are a header. It is read once; then ``file`` is None.
     periodic : bool
         Whether the trace is repeated.
     remove_mean : bool
-        Whether heights count from their mean along the trace.
+        Whether to subtract the mean height along the trace.
     scale, abscissa_scale : float
-        Factors from the units of the heights and of the abscissa to m; for a variation of
-        friction, ``scale`` turns the heights into parts of the friction force.
+        Factors from the units of heights and abscissa to m; for a variation of friction, ``scale``
+        converts heights to fractions of the friction force.
 
     Raises
     ------
     InputError
-        For a trace or file that cannot be used, with the place.
+        For an invalid trace or file, with the position.
     """
 
     kernel: ClassVar = _trace
@@ -101,7 +101,7 @@ class MeasuredProfile(Profile):
             spline.c[3] -= float(spline.integrate(x[0], x[-1])) / (x[-1] - x[0])
         if self.periodic:
             return spline
-        # Beyond an end the curvature falls linearly to -slope / h at h, and to zero at 2 h.
+        # Beyond an end the curvature changes linearly to -slope / h at h, and to zero at 2 h.
         before, after = x[1] - x[0], x[-1] - x[-2]
         (low, high), (rise, fall) = spline(x[[0, -1]]), spline(x[[0, -1]], 1)
         knots = np.concatenate([x[0] - before * np.array([2.0, 1.0]), x,
@@ -135,6 +135,6 @@ class MeasuredProfile(Profile):
     def shortest_wavelength(self) -> float | None:
         """Wavelength of the sine with the same range and steepest slope [m]; None when flat.
 
-        Not less than twice the shortest distance of points.
+        At least twice the shortest distance of points.
         """
         return equivalent_period(self._curve)

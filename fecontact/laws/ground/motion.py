@@ -1,4 +1,4 @@
-"""Speeds of the ground that change in time."""
+"""Time-dependent speeds of the ground."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from fecontact.core.units import Unit
 from fecontact.laws.signals.base import between
 from fecontact.laws.signatures import signal
 
-# Samples of a speed that is known by its values alone.
+# Samples of a speed without a closed-form maximum.
 _SAMPLES = 10_001
 
 
@@ -21,7 +21,7 @@ _SAMPLES = 10_001
 class GroundMotion:
     """Base class of motions of the ground: a frozen dataclass with a compiled ``signal``.
 
-    Its value is the travel [m], zero at t = 0, its rate the speed [m/s].
+    The value of the signal is the travel [m], zero at t = 0, its rate the speed [m/s].
     """
 
     kernel: ClassVar[CompiledLaw]
@@ -36,20 +36,20 @@ class GroundMotion:
 
     @property
     def shortest_period(self) -> float | None:
-        """Shortest time in which the speed goes up and down [s], for a limit of the step; or None.
+        """Shortest period of the speed between breakpoints [s], which limits the step; or None.
 
-        Between breakpoints: steps end there.
+        Steps end at breakpoints.
         """
         return None
 
     def largest_speed(self, speed: float, t0: float, t1: float) -> float:
-        """Largest magnitude of the speed from t0 to t1, or a bound of it [m/s]."""
+        """Largest magnitude of the speed from t0 to t1, or an upper bound [m/s]."""
         raise NotImplementedError
 
     def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
-        """Largest magnitude of the rate of the speed from t0 to t1, or a bound of it [m/s2].
+        """Largest magnitude of the acceleration from t0 to t1, or an upper bound [m/s2].
 
-        Here one and a half times the largest change between samples.
+        By default 1.5 times the largest change between samples.
         """
         p = self.parameters(speed)
         times = np.linspace(t0, t1, _SAMPLES)
@@ -66,7 +66,7 @@ def constant_speed(t, p):
 @signal
 def _harmonic_speed(t, p):
     speed, amplitude, w, phase = p[0], p[1], p[2], p[3]
-    # cos(phase) - cos(w t + phase), without their cancellation.
+    # cos(phase) - cos(w t + phase), without cancellation.
     travel = 2.0 * math.sin(0.5 * w * t + phase) * math.sin(0.5 * w * t)
     return speed * t + amplitude / w * travel, speed + amplitude * math.sin(w * t + phase)
 
@@ -137,7 +137,7 @@ def _ramp(t, p):
 
 @dataclass(frozen=True)
 class SpeedRamp(GroundMotion):
-    r"""Ground whose speed goes linearly from the constant one to another, and stays there.
+    r"""Ground whose speed changes linearly from V to another constant value.
 
     .. math:: V(t) = V + (V_1 - V) \frac{t - t_1}{T}, \qquad t_1 \le t \le t_1 + T
 
@@ -169,13 +169,13 @@ class SpeedRamp(GroundMotion):
         require_positive("SpeedRamp", duration=self.duration)
 
     def parameters(self, speed: float) -> Array:
-        """V, V_1 - V, t_1, T and the travel that is to be zero at t = 0."""
+        """V, V_1 - V, t_1, T and the offset that makes the travel zero at t = 0."""
         p = np.array([speed, self.end_speed - speed, self.start, self.duration, 0.0])
         p[4] = self.kernel.python(0.0, p)[0]
         return p
 
     def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
-        """Start and end of the ramp, as far as they lie between t0 and t1 [s]."""
+        """Start and end of the ramp if they lie between t0 and t1 [s]."""
         return between((self.start, self.start + self.duration), t0, t1)
 
     def largest_speed(self, speed: float, t0: float, t1: float) -> float:

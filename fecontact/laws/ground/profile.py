@@ -25,15 +25,15 @@ def _shape(address, xi, p, out):
 class Profile:
     """Base class of profiles y(xi): a frozen dataclass with a compiled ``ground_profile``.
 
-    The height, its slope and its curvature are continuous. The first parameter of every kernel
-    is a level, which it adds to the height: zero for heights, one for a factor 1 + y of the
-    friction force. A profile of one's own sets ``kernel`` and overrides what is not as here.
+    Height, slope and curvature are continuous. The first parameter of every kernel is a level that
+    is added to the height: zero for heights, one for a factor 1 + y of the friction force. A
+    user-defined profile sets ``kernel`` and overrides methods as required.
     """
 
     kernel: ClassVar[CompiledLaw]
 
     def parameters(self) -> Array:
-        """Parameters of the kernel: the level 0, then, here, the fields in their order."""
+        """Parameters of the kernel: the level 0, then by default the fields in their order."""
         return np.array([0.0, *(getattr(self, entry.name) for entry in fields(self))])
 
     @property
@@ -48,7 +48,7 @@ class Profile:
 
     @property
     def shortest_wavelength(self) -> float | None:
-        """Shortest length over which it goes up and down [m]; None when flat."""
+        """Shortest wavelength [m]; None when flat."""
         raise NotImplementedError
 
     @property
@@ -114,7 +114,7 @@ class Sine(Profile):
     Parameters
     ----------
     amplitude : float
-        y_A, zero or above [m], or as a part of the friction force.
+        y_A, zero or above [m], or relative to the friction force.
     wavelength : float
         lambda_w, positive [m].
     phase : float

@@ -1,4 +1,4 @@
-"""Random profiles of the ground."""
+"""Random ground profiles."""
 
 import math
 from dataclasses import dataclass, fields
@@ -31,8 +31,7 @@ class RandomRoughness(Profile):
     Parameters
     ----------
     rms_height : float
-        Root of the mean square of the height, zero or above [m], or as a part of the friction
-        force.
+        Root mean square of the height, zero or above [m], or relative to the friction force.
     hurst_exponent : float
         H from 0 to 1: 0.8 for many machined and worn surfaces.
     roll_off_wavelength : float
@@ -40,7 +39,7 @@ class RandomRoughness(Profile):
     cut_off_wavelength : float
         2 pi / q_s, the shortest [m].
     length : float
-        After which the profile repeats [m].
+        Period of the profile [m].
     seed : int
         Zero or above.
 
@@ -84,7 +83,7 @@ class RandomRoughness(Profile):
     @cached_property
     def series(self) -> FourierSeries:
         """The waves of this profile."""
-        # A part of 1e-12 for quotients that are whole but for rounding.
+        # Allow for rounding of integer quotients by 1e-12.
         count = int(self.length / self.cut_off_wavelength * (1.0 + 1e-12))
         q = np.arange(1, count + 1) * (self.roll_off_wavelength / self.length)
         amplitudes = np.maximum(q, 1.0) ** (-0.5 - self.hurst_exponent)
@@ -109,5 +108,5 @@ class RandomRoughness(Profile):
 
     @property
     def shortest_wavelength(self) -> float | None:
-        """The length over a whole number, near the cut-off wavelength [m]; None when flat."""
+        """Length divided by an integer, near the cut-off wavelength [m]; None when flat."""
         return self.series.shortest_wavelength

@@ -1,4 +1,4 @@
-"""Linear contact, stops on both sides, and a prescribed normal force."""
+"""Linear contact, two-sided stops, and a prescribed normal force."""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -73,23 +73,23 @@ def _two_sided(u, v, p):
 
 @dataclass(frozen=True)
 class TwoSidedStop(NormalLaw):
-    r"""Play between a stop below, at the ground, and one above.
+    r"""Clearance between a lower stop, at the ground, and an upper one.
 
     .. math::
 
         F = K u^n \max(0,\ 1 + \chi v) \quad (u > 0), \qquad
         F = -K w^n \max(0,\ 1 - \chi v), \quad w = -u - s \quad (u < -s)
 
-    u is the penetration into the lower stop [m], v its rate [m/s], s the clearance; F [N] pushes
-    the body up, F > 0, at the lower and down, F < 0, at the upper stop, and neither pulls. Within
-    the clearance the body is free. n = 1 are linear springs.
+    u is the penetration into the lower stop [m], v its rate [m/s], s the clearance. The force F [N]
+    on the body is upward, F > 0, at the lower and downward, F < 0, at the upper stop, never
+    adhesive, and zero within the clearance. n = 1 are linear springs.
 
     Parameters
     ----------
     stiffness : float or (n,) sequence
         K of each stop over the whole face, or at each node, positive [N/m^n].
     clearance : float or (n,) sequence
-        s: way between touching the one and the other stop, zero or above [m].
+        s: clearance between the stops, zero or above [m].
     exponent : float or (n,) sequence
         n, one or above.
     damping_factor : float or (n,) sequence
@@ -128,10 +128,9 @@ def _prescribed(u, v, p):
 
 @dataclass(frozen=True)
 class PrescribedForce(NormalLaw):
-    r"""Constant normal force F = F_0 on the body [N], whatever the penetration.
+    r"""Constant normal force F = F_0 on the body [N], independent of the penetration.
 
-    As in models of friction oscillators with motion along the ground only; the contact never
-    opens.
+    For friction oscillators that move along the ground only; the contact never opens.
 
     Parameters
     ----------
@@ -146,7 +145,7 @@ class PrescribedForce(NormalLaw):
 
     @property
     def penetration_scale(self) -> float:
-        """A micrometre, the size of roughness: the law itself has no scale [m]."""
+        """One micrometre, as the law itself has no scale [m]."""
         return 1e-6
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Rough surface with the bearing-area curve of a measured profile."""
+"""Rough surfaces with the bearing-area curve of a measured profile."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from fecontact.laws.signatures import normal_law
 
 _INTERVALS, _HEAD, _KNOT = 64, 3, 3
 _HALF = np.linspace(0.0, 1.0, _INTERVALS // 2 + 1) ** 2 / 2.0
-# Close at both ends, where the curve of a profile with round peaks and valleys is a square root.
+# Dense at both ends, where the curve of rounded peaks and valleys is a square root.
 _DEPTHS = np.concatenate([_HALF, 1.0 - _HALF[-2::-1]])
 _UNIFORM = (0.0, 0.5, 1.0)
 
@@ -60,34 +60,34 @@ class MeasuredSurface(RoughSurface):
 
     .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
 
-    h(s) is the part of the surface that lies above the depth s R_Z below the highest peak, by
-    monotone cubic interpolation over 64 intervals, and 1 for s > 1; f is the exact integral of
-    that curve. u is the penetration [m], v its rate [m/s], F the normal force on the body [N],
-    never tensile. See :meth:`from_heights` and :meth:`from_file` for profiles.
+    h(s) is the fraction of the surface above the depth s R_Z below the highest peak, by monotone
+    cubic interpolation over 64 intervals, and 1 for s > 1; f is the exact integral of that curve.
+    u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
+    See :meth:`from_heights` and :meth:`from_file` for profiles.
 
     Parameters
     ----------
     bearing : sequence
-        h from the highest peak, 0, to the deepest valley, 1, never falling; the same at all nodes.
+        h from the highest peak, 0, to the deepest valley, 1, not decreasing; the same at all nodes.
         By default uniform heights.
     depths : sequence
-        s of these values, growing from 0 to 1; at equal steps by default.
+        s of these values, ascending from 0 to 1; equally spaced by default.
     file : str, optional
-        A file of heights, see :meth:`from_file`, instead of ``bearing``, ``depths`` and
-        ``roughness_height``, which it gives. It is read once; afterwards ``file`` is None.
+        File of heights, see :meth:`from_file`, instead of ``bearing``, ``depths`` and
+        ``roughness_height``. It is read once; then ``file`` is None.
     scale : float
-        Factor from the file's heights to m, positive; 1 once it is read.
+        Factor from the file's heights to m, positive; 1 after reading.
 
     Raises
     ------
     InputError
-        For values outside these ranges, or a file that cannot be used.
+        For values outside these ranges, or an invalid file.
     """
 
     kernel: ClassVar = _measured
     shared_fields: ClassVar = frozenset({"bearing", "depths", "file"})
 
-    # From the file where there is one.
+    # From the file if there is one.
     roughness_height: Annotated[PerNode | None, Unit("m")] = None  # type: ignore[assignment]
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
@@ -123,8 +123,8 @@ class MeasuredSurface(RoughSurface):
         given = ("bearing", "depths", "roughness_height")
         for name in given:
             if not np.array_equal(getattr(self, name), defaults[name]):  # type: ignore[arg-type]
-                raise InputError(f"MeasuredSurface: file = {file!r} cannot stand beside {name}, "
-                                 f"which it gives; leave one of them out.")
+                raise InputError(f"MeasuredSurface: file = {file!r} cannot be combined with "
+                                 f"{name}, which it determines; leave one of them out.")
         measured = MeasuredSurface.from_file(file, scale=self.scale, stiffness=self.stiffness)
         for name in given:
             object.__setattr__(self, name, getattr(measured, name))
@@ -145,22 +145,22 @@ class MeasuredSurface(RoughSurface):
         stiffness: PerNode,
         damping: PerNode = 0.0,
     ) -> Self:
-        """The surface of a profile trace, taken as straight between its points.
+        """The surface of a profile trace, linear between its points.
 
         Parameters
         ----------
         heights : (N,) sequence
             Heights along the trace, positive out of the material [m]; R_Z is their range.
         abscissa : (N,) sequence, optional
-            Places of the heights, growing [m]; equally spaced by default.
+            Positions of the heights, ascending [m]; equally spaced by default.
         stiffness, damping : float or (n,) sequence
             c [N/m] and beta c [N s/m].
 
         Raises
         ------
         InputError
-            For fewer than three heights, heights all equal or not finite, or an abscissa that
-            does not grow.
+            For fewer than three heights, heights that are all equal or not finite, or an abscissa
+            that is not ascending.
         """
         z = _numbers(heights, "heights")
         x = np.arange(len(z), dtype=float) if abscissa is None else _numbers(abscissa, "abscissa")
@@ -196,9 +196,9 @@ class MeasuredSurface(RoughSurface):
         Parameters
         ----------
         file : path
-            Text or CSV with one column of heights, or two of abscissae and heights, separated by
-            semicolons, tabs, commas or blanks; lines before the first of just these numbers are a
-            header, ``#`` starts a comment. A decimal comma needs semicolons, tabs or quotes.
+            Text or CSV with a column of heights, or columns of abscissae and heights, separated by
+            semicolons, tabs, commas or blanks; lines before the first line of numbers are a header,
+            ``#`` starts a comment. A decimal comma needs semicolons, tabs or quotes.
         stiffness : float or (n,) sequence
             c [N/m].
         scale : float
@@ -209,7 +209,7 @@ class MeasuredSurface(RoughSurface):
         Raises
         ------
         InputError
-            For a file that cannot be read, with the line that is wrong.
+            For a file that cannot be read, with the faulty line.
         """
         require_positive("MeasuredSurface", scale=scale)
         columns = read_columns("MeasuredSurface", file, ("abscissa", "height"),

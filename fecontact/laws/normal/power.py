@@ -1,4 +1,4 @@
-"""Normal laws that are a power of the penetration, with damping in proportion to the force."""
+"""Normal laws that are a power of the penetration, with damping proportional to the force."""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, get_args
@@ -70,8 +70,8 @@ class PowerContact(_Power):
     .. math:: F = K u^n \max(0,\ 1 + \chi v), \qquad u > 0
 
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile;
-    n = 3/2 is a sphere on a plane, n = 1 a linear spring. The damping grows with the penetration,
-    so that the force starts from zero and is lost at once with the contact.
+    n = 3/2 is a sphere on a plane, n = 1 a linear spring. Damping is proportional to the elastic
+    force, so that F is continuous at first contact.
 
     References
     ----------
@@ -96,7 +96,7 @@ class RestitutionContact(_Power):
 
     .. math:: F = K u^n \max(0,\ 1 + \chi v), \qquad u > 0
 
-    with chi from e and the impact velocity v_r for which it holds, by the damping model:
+    with chi from e and the impact velocity v_r to which it applies, by the damping model:
 
     - ``hunt-crossley``: an impact at v_r has exactly the restitution e,
       chi v_r (1 + e) = ln[(1 + chi v_r) / (1 - chi e v_r)];
@@ -112,7 +112,7 @@ class RestitutionContact(_Power):
     reference_velocity : float or (n,) sequence
         v_r, positive [m/s].
     damping_model : {"hunt-crossley", "lankarani-nikravesh", "flores"}
-        How chi follows from e.
+        Relation between chi and e.
 
     References
     ----------
@@ -167,7 +167,7 @@ def _hunt_crossley(e: float) -> float:
 
     if e > 1.0 - 1e-5:
         return 1.5 * (1.0 - e)
-    # The left side leads up to x = (1 - e) / e, and at the pole 1 / e the right side is infinite.
+    # The left side is larger up to x = (1 - e) / e; the right side is infinite at its pole 1 / e.
     low, high = (1.0 - e) / e, (1.0 - np.finfo(float).eps) / e
     if excess(high) >= 0.0:
         return high

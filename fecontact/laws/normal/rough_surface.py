@@ -1,4 +1,4 @@
-"""Rough surfaces: beds of asperities whose heights follow a given density."""
+"""Rough surfaces: beds of asperities with a given density of heights."""
 
 import math
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ def cosine(u, v, p):
             bearing = s - math.sin(x) / _TAU
             compression = 0.5 * s * s - density / (_TAU * _TAU)
         else:
-            # The differences above would lose their digits.
+            # Series, to avoid cancellation in the differences above.
             y = x * x
             density = 2.0 * math.sin(0.5 * x) ** 2
             bearing = x * y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (
@@ -95,7 +95,7 @@ def gaussian(u, v, p):
             bearing = norm * (part - highest)
             compression = norm * (deviation * (t * part + normal - first_moment) - s * highest)
         else:
-            # The differences above would lose their digits: series in Hermite polynomials.
+            # Series in Hermite polynomials, to avoid cancellation in the differences above.
             scale = norm * _DENSITY * math.exp(-0.5 * b * b)
             before, hermite, term = 0.0, 1.0, y
             bearing, compression = 0.0, 0.0
@@ -119,15 +119,15 @@ class RoughSurface(NormalLaw):
     in contact is a spring with a parallel dashpot, and once all are in contact the law is linear.
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
 
-    Surfaces with another density p(z) of the relative depth z of their peaks below the highest
-    one have f(s), the integral of (s - z) p(z) from 0 to s, and h = f', the bearing-area curve.
+    For another density p(z) of the relative depth z of the peaks below the highest one, f(s) is the
+    integral of (s - z) p(z) from 0 to s, and h = f' the bearing-area curve.
 
-    How to choose. R_Z is what a profilometer measures: 1 to 10 um ground, 10 to 100 um milled.
-    The stiffness is the load over the approach of the two faces in a press; joints of machined
-    metal have 1e12 to 1e14 N/m for each m2 of nominal area, growing with the pressure. Where it
-    is not known, take a value at which the face yields little against the body itself (the report
-    of a modal basis gives the body's compliance), halve and double it, and see what changes.
-    Damping: beta between 1e-6 and 1e-4 s, or from the restitution of an impact.
+    How to choose. R_Z is measured by a profilometer: 1 to 10 um ground, 10 to 100 um milled. The
+    stiffness is the ratio of load and approach of the two faces in a press; joints of machined
+    metal have 1e12 to 1e14 N/m per m2 of nominal area, increasing with pressure. If it is unknown,
+    choose a value at which the contact is much stiffer than the body (the report of a modal basis
+    gives the body's compliance), and vary it by factors of two to see its influence. Damping: beta
+    between 1e-6 and 1e-4 s, or from the restitution of an impact.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ class CosineSurface(RoughSurface):
 
 @dataclass(frozen=True)
 class GaussianSurface(RoughSurface):
-    r"""Rough surface with normally distributed heights, cut off at R_Z.
+    r"""Rough surface with normally distributed heights, truncated to the range R_Z.
 
     .. math:: F = \max(0,\ c R_Z f(s) + \beta c\, h(s)\, v), \qquad s = u / R_Z
 
@@ -225,8 +225,8 @@ class GaussianSurface(RoughSurface):
     Parameters
     ----------
     deviation : float or (n,) sequence
-        sigma: standard deviation of the heights before they are cut off, divided by R_Z; 0.02 to
-        1 (where the density is nearly uniform).
+        sigma: standard deviation of the heights before truncation, divided by R_Z; from 0.02 to 1
+        (nearly uniform).
     """
 
     kernel: ClassVar = gaussian

@@ -1,4 +1,4 @@
-"""Normal laws of surfaces whose heights have no bound: exponential and Greenwood-Williamson."""
+"""Normal laws of surfaces with unbounded heights: exponential and Greenwood-Williamson."""
 
 import math
 from dataclasses import dataclass
@@ -28,14 +28,14 @@ def _exponential(u, v, p):
 
 @dataclass(frozen=True)
 class ExponentialContact(NormalLaw):
-    r"""Self-affine rough surface: force that grows exponentially with the approach (Persson).
+    r"""Self-affine rough surface: force that increases exponentially with approach (Persson).
 
     .. math:: F = F_0\, e^{u / u_0} \max(0,\ 1 + \chi v)
 
-    u is the penetration [m] from a plane of reference, v its rate [m/s], F the normal force on
-    the body [N], never tensile. Few high peaks touch above that plane, so that F fades smoothly
-    for u < 0 and is set to zero below -50 u_0, where it is 2e-22 F_0. Above 60 u_0, far beyond
-    complete contact, it continues linearly with the slope it has there.
+    u is the penetration [m] from a reference plane, v its rate [m/s], F the normal force on the
+    body [N], never tensile. High peaks touch above that plane: F decays smoothly for u < 0 and is
+    set to zero below -50 u_0, where it is 2e-22 F_0. Above 60 u_0, far beyond complete contact, it
+    continues linearly with the same slope.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class ExponentialContact(NormalLaw):
     decay_length : float or (n,) sequence
         u_0, positive; of the order of the rms roughness [m].
     damping_factor : float or (n,) sequence
-        chi, zero or above [s/m]: damping in proportion to the real area of contact, and with it
-        to the force.
+        chi, zero or above [s/m]: damping proportional to the real contact area, and so to the
+        force.
 
     References
     ----------
@@ -62,11 +62,11 @@ class ExponentialContact(NormalLaw):
 
     @property
     def penetration_scale(self) -> float:
-        """Penetration u_0 over which the force grows by a factor e [m], the smallest of all."""
+        """Decay length u_0 [m], the smallest of all nodes."""
         return float(np.min(self.decay_length))
 
     def onsets(self, nodes: int) -> Array:
-        """Where the force is exp(-10) of that at u = 0 (1, n) [m]."""
+        """Penetration (1, n) at which the force is exp(-10) times that at u = 0 [m]."""
         return np.full((1, nodes), -10.0 * np.asarray(self.decay_length))
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:
@@ -145,9 +145,9 @@ class GreenwoodWilliamson(NormalLaw):
         F_{3/2}(h) = \int_h^\infty (s - h)^{3/2} \frac{e^{-s^2/2}}{\sqrt{2\pi}}\, ds
 
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile,
-    h the distance from the other surface to the mean plane of the asperities in terms of sigma.
-    The highest asperity of a normal distribution is infinitely high, so that F fades smoothly
-    for u < 0; from h = 9 on, where F is 1e-20 of that at h = 0, the contact is open.
+    h the distance of the other surface from the mean plane of the asperities, divided by sigma.
+    The heights are unbounded, so that F decays smoothly for u < 0; the contact is open from h = 9
+    on, where F is 1e-20 times that at h = 0.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ class GreenwoodWilliamson(NormalLaw):
         return float(np.min(self.height_deviation))
 
     def onsets(self, nodes: int) -> Array:
-        """Where h = 5, and the force 1e-7 of that at h = 0 (1, n) [m]."""
+        """Penetration (1, n) at h = 5, where the force is 1e-7 times that at h = 0 [m]."""
         away = np.asarray(self.separation) - 5.0
         return np.array(np.broadcast_to(np.asarray(self.height_deviation) * away, (1, nodes)))
 

@@ -23,37 +23,36 @@ def _history(address, t, p, out):
 class Signal:
     """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.signal`.
 
-    A signal of one's own sets ``kernel``, and overrides what else is not as here.
+    A user-defined signal sets ``kernel`` and overrides methods as required.
     """
 
     kernel: ClassVar[CompiledLaw]
 
     def parameters(self) -> Array:
-        """Parameters of the kernel; here the fields in their order.
+        """Parameters of the kernel, by default the fields in their order.
 
-        The kernel may get zeros after them.
+        They may be padded with zeros.
         """
         return np.array([getattr(self, entry.name) for entry in fields(self)], dtype=float)
 
     def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
-        """Times between t0 and t1 on which an integrator must step, ascending [s].
+        """Times between t0 and t1, both excluded, at which a step must end, ascending [s].
 
         There the signal, its rate or its second derivative jumps, or a steep piece begins or ends.
-        The times t0 and t1 are not among them.
         """
         return ()
 
     @property
     def shortest_period(self) -> float | None:
-        """Shortest time in which it goes up and down [s], for a limit of the step; or None.
+        """Shortest period between breakpoints [s], which limits the step; or None.
 
-        Between breakpoints: what is smooth from one to the next, on which steps end, needs none.
+        A signal that is smooth between breakpoints, where steps end, needs none.
         """
         return None
 
     @property
     def frequency_hz(self) -> float | None:
-        """Frequency with which it repeats [Hz], or None."""
+        """Frequency of a periodic signal [Hz], else None."""
         return None
 
     @property
@@ -70,13 +69,13 @@ class Signal:
 
 
 def between(times: ArrayLike, t0: float, t1: float) -> tuple[float, ...]:
-    """Those of the times that lie between t0 and t1, ascending, each once."""
+    """Distinct times between t0 and t1, ascending."""
     found = np.unique(np.asarray(times, dtype=float))
     return tuple(found[(found > t0) & (found < t1)].tolist())
 
 
 def require_one_of(owner: str, name: str, value: object, names: tuple[str, ...]) -> None:
-    """Raise :class:`InputError` unless a value is one of a few names."""
+    """Raise :class:`InputError` unless a value is one of the names."""
     if value not in names:
         raise InputError(f"{owner}: {name} = {value!r} must be one of {choices(names)}"
                          f"{nearest(str(value), names)}.")

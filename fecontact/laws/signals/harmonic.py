@@ -29,7 +29,7 @@ class Constant(Signal):
     Parameters
     ----------
     value : float
-        In the unit of what is given.
+        In the unit of the quantity.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class Harmonic(Signal):
     Parameters
     ----------
     amplitude : float
-        A, in the unit of what is given.
+        A, in the unit of the quantity.
     angular_frequency : float
         w, zero or above [rad/s].
     phase : float
@@ -118,14 +118,14 @@ def _harmonics(t, p):
 
 @dataclass(frozen=True)
 class Harmonics(Signal):
-    r"""A sum of sines of any frequencies.
+    r"""A sum of sines of arbitrary frequencies.
 
     .. math:: \sum_k A_k \sin(w_k t + \varphi_k)
 
     Parameters
     ----------
     amplitudes : sequence
-        A_k, in the unit of what is given.
+        A_k, in the unit of the quantity.
     angular_frequencies : sequence
         w_k, zero or above [rad/s].
     phases : sequence, optional
@@ -173,7 +173,7 @@ class Harmonics(Signal):
 
     @property
     def frequency_hz(self) -> float | None:
-        """The lowest frequency [Hz], if all others are whole multiples of it; else None."""
+        """The lowest frequency [Hz] if all others are integer multiples of it, else None."""
         if not self._heard:
             return None
         ratios = np.array(self._heard) / self._heard[0]
@@ -204,7 +204,7 @@ def _sweep(t, p):
 
 @dataclass(frozen=True)
 class SweptSine(Signal):
-    r"""A sine whose frequency goes from one value to another, and stays there.
+    r"""A sine whose frequency is swept from one value to another, and then constant.
 
     .. math:: A \sin\Big(2 \pi \int_0^t f\,dt\Big), \qquad
         f = f_0 + (f_1 - f_0) \frac{t}{T} \quad\text{or}\quad
@@ -215,7 +215,7 @@ class SweptSine(Signal):
     Parameters
     ----------
     amplitude : float
-        A, in the unit of what is given.
+        A, in the unit of the quantity.
     start_frequency_hz, end_frequency_hz : float
         f_0, f_1, zero or above, for a logarithmic sweep above zero [Hz].
     duration : float
@@ -259,7 +259,7 @@ class SweptSine(Signal):
         return np.asarray(f0 * (f1 / f0) ** part)
 
     def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
-        """Start and end of the sweep, as far as they lie between t0 and t1 [s]."""
+        """Start and end of the sweep if they lie between t0 and t1 [s]."""
         return between((0.0, self.duration), t0, t1)
 
     @property

@@ -32,17 +32,17 @@ def _step(t, p):
 
 @dataclass(frozen=True)
 class Step(Signal):
-    """Zero before a time, a value from then on; no ramp between them.
+    """A step from zero to a value.
 
-    Integrators step on the time. As a motion of the drive it makes the springs' force jump, and
-    the work of the jump counts; as the motion of a body it would need an infinite force.
+    Integrators end a step at its time. As motion of the drive it makes the force of the springs
+    jump; the work of the jump is included in the drive work.
 
     Parameters
     ----------
     time : float
-        Of the jump [s].
+        Time of the step [s].
     value : float
-        After it, in the unit of what is given.
+        Value after the step, in the unit of the quantity.
 
     Raises
     ------
@@ -95,20 +95,20 @@ class Pulse(Signal):
     - ``half-sine``: A sin(pi s);
     - ``haversine``: A sin^2(pi s), whose rate is continuous;
     - ``triangle``: A (1 - abs(1 - 2 s));
-    - ``rectangle``: A, but it rises from zero and falls to zero as A x^2 (3 - 2 x), x from 0 to 1
-      within the time ``rise``, which is part of T; its integral is A (T - rise).
+    - ``rectangle``: A, with flanks A x^2 (3 - 2 x), x from 0 to 1 within the time ``rise``, which
+      is part of T; its integral is A (T - rise).
 
     Parameters
     ----------
     kind : 'half-sine', 'rectangle', 'triangle' or 'haversine'
     amplitude : float
-        A, in the unit of what is given.
+        A, in the unit of the quantity.
     duration : float
         T, positive [s].
     start : float
         t_0 [s].
     rise : float, optional
-        For a rectangle, above zero and at most T / 2 [s]; by default a hundredth of T.
+        For a rectangle, above zero and at most T / 2 [s]; by default T / 100.
 
     Raises
     ------
@@ -150,7 +150,7 @@ class Pulse(Signal):
                          _PULSES.index(self.kind)], dtype=float)
 
     def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
-        """Start, end and kinks of the pulse, as far as they lie between t0 and t1 [s]."""
+        """Start, end and kinks of the pulse that lie between t0 and t1 [s]."""
         places = [0.0, self.duration]
         if self.kind in ("triangle", "rectangle"):
             places += [self._rise, self.duration - self._rise]
@@ -170,30 +170,30 @@ def _tabulated(t, p):
 
 @dataclass(frozen=True)
 class Tabulated(Signal):
-    """Values at given times, with straight lines or a smooth curve between them.
+    """Values at given times, with linear or cubic interpolation.
 
-    Outside the times the end values hold, or the table is repeated. The smooth curve is the cubic
-    spline with continuous second derivative; at its ends its rate is zero where the values hold,
-    and periodic where they repeat.
+    Outside the times the end values are held, or the table is repeated. Cubic interpolation is the
+    spline with continuous second derivative; its rate at the ends is zero if they are held, and
+    periodic if the table is repeated.
 
     Parameters
     ----------
     times : (N,) sequence
-        Growing [s].
+        Ascending [s].
     values : (N,) sequence
-        Values at these times; to be repeated, the last must be the first.
+        Values at these times; the last of a repeated table must equal the first.
     file : str, optional
-        A text or CSV file with two columns, times and values, instead of both; lines before the
-        first of two numbers are a header. It is read once; afterwards ``file`` is None.
+        Text or CSV file with columns of times and values, instead of both; lines before the first
+        line of numbers are a header. It is read once; then ``file`` is None.
     interpolation : 'linear' or 'cubic'
     outside : 'hold' or 'repeat'
     scale : float
-        Factor from the values of the table to the unit of what is given.
+        Factor from the values of the table to the unit of the quantity.
 
     Raises
     ------
     InputError
-        For a table or file that cannot be used, with the place.
+        For an invalid table or file, with the position.
     """
 
     kernel: ClassVar = _tabulated
@@ -231,7 +231,7 @@ class Tabulated(Signal):
                            bc_type="clamped" if self.outside == "hold" else "periodic")
 
     def parameters(self) -> Array:
-        """Number of pieces, whether they repeat, the times and the pieces' coefficients."""
+        """Number of pieces, whether they repeat, the times and the coefficients."""
         return piecewise_parameters(self._curve, self.outside == "repeat")
 
     @cached_property
@@ -245,9 +245,9 @@ class Tabulated(Signal):
         return period, np.union1d(ends, steep)
 
     def breakpoints(self, t0: float, t1: float) -> tuple[float, ...]:
-        """Times between t0 and t1 at which a piece of a line or a steep piece of a curve ends [s].
+        """Times between t0 and t1 at which a linear or a steep cubic piece ends [s].
 
-        And the ends of a curve that hold.
+        Also the ends of a table that are held.
         """
         times, places = np.array(self.times), self._steps[1]
         if self.outside == "hold" or not len(places) or t1 <= t0:
@@ -261,16 +261,15 @@ class Tabulated(Signal):
 
     @property
     def shortest_period(self) -> float | None:
-        """Period of the harmonic with the curve's range and its steepest rate [s], or None.
+        """Period of the harmonic with the range and the steepest rate of the table [s], or None.
 
-        Without pieces that begin and end with a breakpoint, as all of a table of lines do and
-        those of a curve that are much steeper than the others.
+        Pieces between breakpoints do not count: all linear ones, and steep cubic ones.
         """
         return self._steps[0]
 
     @property
     def frequency_hz(self) -> float | None:
-        """With which the table is repeated [Hz]; None if its ends hold."""
+        """Frequency of a repeated table [Hz]; None if the ends are held."""
         return 1.0 / (self.times[-1] - self.times[0]) if self.outside == "repeat" else None
 
     @property

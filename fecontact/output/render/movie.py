@@ -51,30 +51,26 @@ def render(
 ) -> Path:
     """Draw a run as a movie or as numbered pictures, whole or not at all.
 
-    One sees the body in scaled displacement and its undeformed outline, the ground, whose waves
-    are as high in scale, the contact nodes in the colour of their state, and the forces of the
-    ground on them, the longest arrow being the largest force of the movie. The marks on flat
-    ground travel in scale too, so that a node that sticks stays with them; over waves, whose
-    length is true, so are the travel of the ground and the drift of the body along it. Scale and
-    colour range hold for all frames. Above flat bodies stand the total contact forces over time.
+    It shows the deformed body over its undeformed outline, the ground, the contact nodes coloured
+    by state, contact forces as arrows, and above flat bodies the total forces over time; see
+    docs/analysis.md.
 
     Parameters
     ----------
     trajectory : Trajectory
-        Its modal basis must hold shapes over the body.
+        The run; its modal basis must hold mode shapes of the body.
     path : str or Path
         ``NAME.mp4`` for a movie, ``NAME.png`` for ``NAME_0000.png`` and so on, or a folder for
-        ``frame_0000.png`` and so on in it. Earlier files of these names are replaced, and
-        pictures of an earlier call that made more of them are removed.
+        ``frame_0000.png`` and so on. Earlier files of these names are replaced, and further
+        pictures of an earlier series removed.
     frames : int
-        Number of frames, evenly spaced, never more than there are output times.
+        Number of frames, evenly spaced, at most the number of output times.
     fps : float
         Frames per second of the movie.
     size : (int, int)
         Width and height in pixels, even, at least 320 x 180.
     colour : "displacement" or "von_mises"
-        What the body is coloured by: the magnitude of the displacement [m] or the von Mises
-        stress [Pa].
+        Magnitude of the displacement [m], or von Mises stress [Pa].
     scale : float, optional
         Factor of the displacements; by default a round one that makes the largest visible.
     title : str, optional
@@ -82,13 +78,12 @@ def render(
     t_start, t_end : float, optional
         Part of the run to draw [s].
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is called as
-        ``progress(done, total)`` after each frame.
+        True for a progress bar; a function is called as ``progress(done, total)`` after each frame.
 
     Returns
     -------
     Path
-        The movie, the folder, or the first of the pictures.
+        The movie, the folder, or the first picture.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class AssembledMatrix:
         Raises
         ------
         InputError
-            If the file does not name degrees of freedom, or has no such one.
+            If the file does not name degrees of freedom, or lacks this one.
         """
         if self.labels is None:
             raise InputError(f"{self.source}: the file does not name its degrees of freedom; give "
@@ -61,20 +61,20 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
 
     Matrix Market (.mtx, .mm), MATLAB (.mat up to version 7.3), NumPy and SciPy (.npy, .npz), and
     the text files of Abaqus' ``*MATRIX OUTPUT`` (.mtx) in the formats COORDINATE and MATRIX
-    INPUT; the content of a .mtx file says which it is. Of a symmetric matrix one triangle is
-    enough.
+    INPUT; the format of a .mtx file is found from its content. One triangle of a symmetric
+    matrix suffices.
 
     Parameters
     ----------
     path : str or Path
         The file.
     name : str, optional
-        Name of the matrix in a file that may hold several (.mat, .npz, MATRIX INPUT).
+        Name of the matrix in a file with several (.mat, .npz, MATRIX INPUT).
 
     Raises
     ------
     InputError
-        If there is no such file or matrix, or the file is damaged or of another kind.
+        If the file or matrix does not exist, or the file is damaged or of another kind.
     """
     path = as_path(path, "a matrix")
     readers = {".mtx": _read_mtx, ".mm": _read_mtx, ".mat": _read_mat, ".npz": _read_npz,
@@ -91,7 +91,7 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     except MemoryError:
         raise
     except Exception as error:
-        # Damaged files make readers fail in every way there is.
+        # Damaged files make readers raise anything.
         detail = " ".join(str(error).split()).rstrip(".")
         raise InputError(f"{path}: the file cannot be read, it is damaged or of another kind"
                          f"{f' ({detail[:200]})' * bool(detail)}.") from error
@@ -113,7 +113,7 @@ def _read_mtx(path: Path, name: str | None) -> tuple[Any, NDArray[np.int64] | No
     if form == "array":
         entries = rows * columns // (1 if symmetry == "general" else 2)
     if 2 * entries > path.stat().st_size:  # a digit and a blank each, at least
-        raise InputError(f"The file is said to hold {entries} numbers, which it does not hold.")
+        raise InputError(f"The file declares {entries} numbers, more than it holds.")
     return mmread(path), None
 
 

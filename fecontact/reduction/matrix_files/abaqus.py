@@ -1,9 +1,9 @@
-"""Text files of matrices that Abaqus writes: ``*MATRIX GENERATE``, ``*MATRIX OUTPUT``.
+"""Matrices written by Abaqus as text: ``*MATRIX GENERATE``, ``*MATRIX OUTPUT``.
 
-FORMAT=COORDINATE has ``row column value`` on a line, counted from 1, both triangles and no
-heading. FORMAT=MATRIX INPUT, the default, has ``node, direction, node, direction, value``, one
-triangle; nodes with negative numbers are internal ones (Lagrange multipliers and the like).
-Written by hand it may begin with a keyword line ``*MATRIX INPUT``.
+FORMAT=COORDINATE has lines ``row column value``, counted from 1, both triangles and no heading.
+FORMAT=MATRIX INPUT, the default, has lines ``node, direction, node, direction, value`` and one
+triangle; negative node numbers are internal nodes (such as Lagrange multipliers). Input files may
+begin with a keyword line ``*MATRIX INPUT``.
 """
 
 import io
@@ -27,7 +27,7 @@ _KEYWORD = re.compile(r"^[ \t]*\*(?!\*)(.*)$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class _Block:
-    """Lines of numbers after a keyword line, which is empty for a file without any."""
+    """Lines of numbers after a keyword line, which is empty for files without keywords."""
 
     keyword: str
     options: dict[str, str]
@@ -44,8 +44,7 @@ def read_abaqus_matrix(path: Path, name: str | None) -> tuple[Any, Ints | None]:
     Raises
     ------
     InputError
-        For a line that is not understood (with its number), an entry that comes twice, or
-        another kind of file.
+        For an invalid line (with its number), a repeated entry, or another kind of file.
     """
     blocks = list(_blocks(path.read_text(encoding="utf-8", errors="replace")))
     block = _chosen(blocks, name)
@@ -82,7 +81,7 @@ def read_abaqus_matrix(path: Path, name: str | None) -> tuple[Any, Ints | None]:
 
 
 def _blocks(text: str) -> Iterator[_Block]:
-    """What stands between keyword lines."""
+    """The blocks between keyword lines."""
     options: dict[str, str] = {}
     keyword, start = "", 0
     for found in [*_KEYWORD.finditer(text), None]:
@@ -98,7 +97,7 @@ def _blocks(text: str) -> Iterator[_Block]:
 
 
 def _chosen(blocks: list[_Block], name: str | None) -> _Block:
-    """The block to read, after a look at all of them."""
+    """The block to read, by name or as the only one."""
     for block in blocks:
         if block.keyword not in ("", "MATRIX INPUT"):
             kind = "loads" if block.keyword == "CLOAD" else "something else"

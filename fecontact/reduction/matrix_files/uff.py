@@ -1,4 +1,4 @@
-"""Universal files (UFF, UNV) of modes, as test laboratories and preprocessors write them.
+"""Universal files (UFF, UNV) of modes, from modal tests and preprocessors.
 
 Read by pyuff: data sets 55 (data at nodes), 15 and 2411 (nodes), 2412 (elements), 164 (units),
 2420 (coordinate systems). Set 55 carries six digits.
@@ -26,26 +26,26 @@ _AXES = ("x", "y", "z")
 
 @dataclass(frozen=True, eq=False)
 class UffModes:
-    """Modes of a universal file, in SI units where the file says its own.
+    """Modes of a universal file, in SI units if the file gives its units.
 
     Attributes
     ----------
     frequencies_hz : (m,) array
         Undamped eigenfrequencies [Hz].
     shapes : (N, 3, m) or (N, 6, m) array
-        Displacements x, y, z (and rotations about x, y, z); zero at nodes that a mode leaves out.
+        Displacements x, y, z (and rotations about x, y, z); zero at nodes that a mode omits.
     node_labels : (N,) integer array
         Ascending.
     coordinates : (N, 3) array
-        Places of the nodes [m]; not a number where the file does not give them.
+        Coordinates of the nodes [m]; NaN if the file does not give them.
     damping_ratios : (m,) array
-        Viscous damping ratios, half the hysteretic ones where only these are given.
+        Viscous damping ratios; half the hysteretic ones if only these are given.
     modal_masses : (m,) array or None
-        None where the file does not give them for every mode.
+        None unless the file gives them for every mode.
     source : str
         The file, for messages.
     elements : mapping of int to (k, c) integer array
-        Labels of the c nodes of the k elements that have as many; empty where the file has none.
+        Labels of the nodes of the k elements with c nodes, by c; empty if the file has none.
     """
 
     frequencies_hz: Array
@@ -70,31 +70,31 @@ class UffModes:
         contact_x: ArrayLike | None = None,
         tributary: ArrayLike | None = None,
     ) -> "ModalBasis":
-        """The modal basis with points of interest at nodes of the file.
+        """Modal basis with points of interest at nodes of the file.
 
         Parameters
         ----------
         contact : sequence of int
             Labels of the contact nodes.
         B, C : int, optional
-            Labels of excitation and load point; without, they do not move.
+            Labels of excitation and load point; zero rows by default.
         points : mapping of name to label, optional
             Further points.
         axes : (str, str)
-            The file's directions that are x, along the ground, and y, away from it: 'x', 'y' or
-            'z', with a minus sign for the opposite direction.
+            Directions of the file for x, along the ground, and y, away from it: 'x', 'y' or 'z',
+            with a minus sign for the opposite direction.
         modal_mass : float or (m,) array, optional
-            In the place of the file's modal masses [kg].
+            Replaces the file's modal masses [kg].
         damping : float, (m,) sequence, Rayleigh or (m, m) array, optional
-            In the place of the file's damping ratios.
+            Replaces the file's damping ratios.
         contact_x, tributary : (n,) arrays, optional
             As for :meth:`basis_from_modes`; the default for contact_x is the file's.
 
         Raises
         ------
         InputError
-            For labels that are not there, axes that are not at right angles, and where neither
-            the file nor the call gives modal masses.
+            For unknown labels, axes that are not at right angles, and if neither the file nor the
+            call gives modal masses.
         """
         from fecontact.reduction.restriction import rows_from_dofs
 
@@ -131,7 +131,7 @@ class UffModes:
             tributary=tributary)
 
     def node(self, label: int) -> int:
-        """Place of a node in the arrays; InputError if the file does not have it."""
+        """Index of a node in the arrays; InputError if the file does not have it."""
         at = int(np.searchsorted(self.node_labels, label))
         if at == len(self.node_labels) or self.node_labels[at] != label:
             raise InputError(f"{self.source}: there is no node {label!r} in the modes; its nodes "
@@ -149,8 +149,7 @@ class UffModes:
 def read_uff(path: str | Path) -> UffModes:
     """Read the modes of a universal file (.uff, .unv).
 
-    Complex modes are turned to the phase in which they are most nearly real, and what is then
-    left of their imaginary part is dropped.
+    Complex modes are rotated to the phase of smallest imaginary part, which is then dropped.
 
     Parameters
     ----------
@@ -162,8 +161,8 @@ def read_uff(path: str | Path) -> UffModes:
     MissingLibraryError
         If pyuff is not installed.
     InputError
-        If there is no such file, it is damaged or holds no modes, or a mode is not in
-        displacements, or far from real.
+        If the file does not exist, is damaged or holds no modes, or a mode is not in displacements
+        or essentially complex.
     """
     path = as_path(path, "modes")
     sets = data_sets(path)
@@ -217,14 +216,13 @@ def data_sets(path: Path) -> list[dict[str, Any]]:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     try:
-        # Each data set lies between two such lines; pyuff passes over one that has no end.
+        # Each data set lies between two such lines; pyuff skips one without end.
         if len(re.findall(rb"^ {4}-1\s*?$", path.read_bytes(), re.MULTILINE)) % 2:
             raise InputError(f"{path}: the file ends within a data set; it is cut off.")
         file = pyuff.UFF(str(path))
         kinds = file.get_set_types()
         wanted = [k for k, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2412, 2420)]
-        # One at a time: what pyuff returns for one set is no list, and its message for several
-        # does not say which one is damaged.
+        # One at a time: pyuff's message for several does not say which one is damaged.
         sets = []
         for k in wanted:
             try:
@@ -318,7 +316,7 @@ def units(sets: list[dict[str, Any]]) -> tuple[float, float]:
 
 
 def coordinates(sets: list[dict[str, Any]], labels: Integers) -> Array:
-    """Places (N, 3) of the nodes in the file's unit, not a number where it does not give them."""
+    """Places (N, 3) of the nodes in the file's unit, NaN if it does not give them."""
     for one in sets:
         if one["type"] == 2420 and not all(
                 np.array_equal(matrix, np.eye(4, 3)) for matrix in one["CS_matrices"]):
