@@ -165,9 +165,21 @@ def check_sweeps(names, printed, folder):
     assert names["amplitude"].ravel()[7] == pytest.approx(np.ptp(x) / 2.0, rel=1e-12)
 
 
+def check_integrator(names, printed, folder):
+    assert printed.startswith("The run reached its end.")
+    # Stick-slip: the block sticks to the belt and never overtakes it by more than round-off.
+    assert names["run"].states[:, 1].max() == pytest.approx(0.5, rel=0.01)
+
+
+def check_set_valued(names, printed, folder):
+    # The spring pulls the sticking block up to the static limit before it slips.
+    assert 0.97 < float(printed) <= 1.0 + 1e-9
+
+
 CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
-          "sweeps.md": check_sweeps}
+          "sweeps.md": check_sweeps, "integrator.md": check_integrator,
+          "set-valued.md": check_set_valued}
 
 
 def test_every_page_with_code_is_known():

@@ -463,7 +463,7 @@ plot run.vtkhdf history --point 99 | 99
 plot run.vtkhdf history --point 1,2,3 | 1,2,3
 plot run.vtkhdf history --point nan,nan | nan
 plot run.vtkhdf history --point 9,9 | 9
-plot run.vtkhdf history --component z | axis
+plot run.vtkhdf history --component z | component
 plot run.vtkhdf history --t-start nan | t_start
 plot run.vtkhdf history --t-end nan | t_end
 plot run.vtkhdf history --t-start 7 | 7
