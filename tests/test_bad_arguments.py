@@ -599,6 +599,9 @@ SetValued(static_coefficient=True)
 Rodas5P(keep_checkpoint=3)
 """
 
+NAMESPACES = ("laws", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps", "plot",
+              "io")
+
 
 @pytest.fixture(scope="module")
 def names():
@@ -612,7 +615,8 @@ def names():
                                      load=fecontact.Load(normal=10.0))
     oscillator = friction_oscillator(2)
     point = BranchPoint(np.zeros(5), np.ones(5))
-    known = {name: getattr(fecontact, name) for name in fecontact.__all__}
+    spaces = [fecontact, *(getattr(fecontact, space) for space in NAMESPACES)]
+    known = {name: getattr(space, name) for space in spaces for name in space.__all__}
     return known | {
         "np": np, "nan": float("nan"), "mesh": mesh, "body": body, "basis": basis,
         "system": system, "osc": oscillator,

@@ -217,7 +217,7 @@ def test_loads_at_points():
     (HarmonicSpeed, {"amplitude": None, "angular_frequency": 1.0}, "amplitude = None"),
     (SpeedRamp, {"end_speed": 1.0, "start": 0.0, "duration": 0.0}, r"SpeedRamp: duration = 0\.0"),
     (SpeedRamp, {"end_speed": float("nan"), "start": 0.0, "duration": 1.0}, "end_speed = nan"),
-    (Drive, {"amplitude_x": 1.0, "motion_x": Constant(1.0)}, r"amplitude_x = 1\.0 cannot be c"),
+    (Drive, {"amplitude_x": 1.0, "motion_x": Constant(1.0)}, r"amplitude_x = 1\.0 cannot be com"),
     (Drive, {"motion_y": 3.0}, r"Drive: motion_y = 3\.0 must be a Signal"),
     (Drive, {"motion_x": Constant(), "motion_y": Constant(), "angular_frequency": 2.0},
      r"angular_frequency = 2\.0 has no effect"),

@@ -58,7 +58,7 @@ def test_defaults_and_units_of_a_section():
     assert "| `amplitude`, `wavelength`" not in section
     needed = study_keys("load.forces")
     assert '| `component` | "x", "y" or "phi" | `"y"` |' in needed
-    assert "| `signal` | a table of a law and its parameters |  | Its value in time" in needed
+    assert "| `signal` | a table of a law and its parameters |  | Its history" in needed
     contact = study_keys("contact.NAME")
     assert "totals in them are those of the group" in contact
 

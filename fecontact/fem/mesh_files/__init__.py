@@ -165,7 +165,7 @@ def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
         **dict.fromkeys((".bdf", ".fem", ".nas"), (_read_nastran, "Nastran")),
     }
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path}: files of this kind are not read; suffixes that are: "
+        raise InputError(f"{path}: files of this kind are not read; the suffixes that are: "
                          f"{', '.join(sorted(readers))}.")
     return readers[path.suffix.lower()]
 

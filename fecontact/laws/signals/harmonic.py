@@ -29,7 +29,7 @@ class Constant(Signal):
     Parameters
     ----------
     value : float
-        In the unit of the quantity.
+        Value, in the unit of the quantity.
 
     Raises
     ------
