@@ -516,7 +516,7 @@ sweep sweep.toml --set 'sweep.summaries=["none.py:f"]' | none.py
 sweep sweep.toml --set sweep.t_start=9 | t_start
 branch none.toml | none.toml
 branch tiny.toml | parameter
-branch tiny.toml ground.speed | range
+branch tiny.toml ground.speed | bounds
 branch tiny.toml ground.sped --bounds 0.1 0.2 | did you mean 'ground.speed'
 branch tiny.toml ground.speed --bounds 1 | --bounds
 branch tiny.toml ground.speed --bounds 1 1 | smaller one first
