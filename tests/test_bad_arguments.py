@@ -599,8 +599,8 @@ SetValued(static_coefficient=True)
 Rodas5P(keep_checkpoint=3)
 """
 
-NAMESPACES = ("laws", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps", "plot",
-              "io")
+NAMESPACES = ("laws", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps",
+              "plot", "io")
 
 
 @pytest.fixture(scope="module")
