@@ -27,7 +27,7 @@ signal       ``f(t, p)``                 value and rate of a function of time: t
 those of the contact node. A parameter given as one number applies to every node; an extensive one
 (stiffness, damping) is then the total of the contact face, distributed by tributary length. A
 parameter given as a sequence has one value per node and is not distributed. A parameter with named
-choices applies to every node; ``p`` holds its index in :attr:`NodeLaw.choices`.
+choices applies to every node; ``p`` holds its index in :attr:`fecontact.laws.base.NodeLaw.choices`.
 
 Internal variables of friction with memory are states of the system. Their rates must be continuous
 where R depends on them; at F = 0, where it does not, they decay to zero.

@@ -304,7 +304,7 @@ def test_rows_of_displacements():
     field = contact_field(two_mass_system(), [])
     T = field.system().basis.contact_T[:, 0]
     assert field.displacement_row(1) == pytest.approx([*T[1], 0.0, 0.0])
-    with pytest.raises(InputError, match="must be one of 'rotation', 'x', 'y'"):
+    with pytest.raises(InputError, match="must be one of 'phi', 'x', 'y'"):
         field.displacement_row(1, "z")
 
 

@@ -115,7 +115,7 @@ def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
                        "-o", "pictures/p.png")
     assert (code, err) == (0, "")
     plots = {f"results/beam-{what}.png" for what in
-             ("modes", "history", "phase", "contact", "energies")}
+             ("modes", "history", "phase", "contact_map", "energies")}
     assert plots <= files_below(tmp_path)
     assert not [name for name in files_below(tmp_path) if ".part" in name]
 

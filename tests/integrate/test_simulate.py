@@ -379,7 +379,7 @@ def test_nodes_and_field_points():
         run.displacement("tip")
     with pytest.raises(InputError, match="Contact node 4"):
         run.velocity(4)
-    with pytest.raises(InputError, match="no shapes"):
+    with pytest.raises(InputError, match="no mode shapes"):
         simulate(oscillator(), 0.01, outputs=2).displacement((0.0, 0.0))
 
 

@@ -275,10 +275,10 @@ def test_plots_leave_matplotlib_as_it_was(tmp_path):
 
 
 def test_every_plot_returns_its_figure_and_takes_a_path_by_name():
-    names = [name for name in fecontact.__all__ if name.startswith("plot_")]
+    names = [name for name in fecontact.plot.__all__ if name.startswith("plot_")]
     assert len(names) > 12
     for name in names:
-        signature = inspect.signature(getattr(fecontact, name))
+        signature = inspect.signature(getattr(fecontact.plot, name))
         assert signature.return_annotation.strip('"') == "Figure"
         path = list(signature.parameters.values())[-1]
         assert (path.name, path.default, path.kind) == ("path", None, path.KEYWORD_ONLY)

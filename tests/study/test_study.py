@@ -282,7 +282,7 @@ MISTAKES = [
     ({"simulation.solver": "rodas"},
      r"\[simulation\]: solver = 'rodas' must be one of .* \(did you mean 'rodas5p'\?\)"),
     ({"simulation.restitution": 0.5},
-     r"\[simulation\]: restitution = 0\.5 is for solver = 'set-valued' alone, not 'rodas5p'"),
+     r"\[simulation\]: restitution = 0\.5 is only for solver = 'set-valued', not 'rodas5p'"),
     ({"simulation.solver": "set-valued", "simulation.restitution": 1.0},
      r"\[simulation\]: restitution = 1\.0 must be a number from 0 to below 1\.$"),
     ({"simulation.solver": "radau", "simulation.stop": ["stick"]},

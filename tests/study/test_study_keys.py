@@ -60,7 +60,7 @@ def test_defaults_and_units_of_a_section():
     assert '| `component` | "x", "y" or "phi" | `"y"` |' in needed
     assert "| `signal` | a table of a law and its parameters |  | Its history" in needed
     contact = study_keys("contact.NAME")
-    assert "totals in them are those of the group" in contact
+    assert "total values refer to the face of the group" in contact
 
 
 def test_keys_on_the_command_line(capsys):
