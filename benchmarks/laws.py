@@ -23,7 +23,7 @@ SURFACE = {"stiffness": 0.3e6, "roughness_height": 5.2e-6, "damping": 6.0}
 GIVEN: dict[str, dict[str, float]] = {
     **dict.fromkeys(("rough-surface", "parabolic-surface", "cosine-surface", "gaussian-surface",
                      "measured-surface"), SURFACE),
-    "linear": {"stiffness": 1e7}, "power": {"stiffness": 1e9}, "prescribed": {"force": 14.0},
+    "linear": {"stiffness": 1e7}, "power": {"stiffness": 1e9}, "prescribed-force": {"force": 14.0},
     "restitution": {"stiffness": 1e9, "restitution": 0.8, "reference_velocity": 0.1},
     "exponential": {"force": 10.0, "decay_length": 1e-6},
     "back-burdekin": {"nominal_area": 1e-4, "coefficient": 1e-9},
