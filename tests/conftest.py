@@ -27,6 +27,8 @@ LONG = {
     "test_poincare_scan", "test_branch_study", "test_branch_command", "test_impact_orbits",
     "test_orbits_by_shooting", "test_shooting_of_beam", "test_squeal", "test_two_mass_example",
     "test_convergence", "test_mode_convergence",
+    "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",
+    "test_receptance", "test_references",
 }
 
 
