@@ -28,7 +28,7 @@ LONG = {
     "test_orbits_by_shooting", "test_shooting_of_beam", "test_squeal", "test_two_mass_example",
     "test_convergence", "test_mode_convergence",
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",
-    "test_receptance", "test_references",
+    "test_receptance", "test_references", "test_eigen", "test_set_valued_search",
 }
 
 
