@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fecontact import sensitivity, simulate
-from fecontact.bifurcation import ContinuationOptions, orbit_branch
+from fecontact.bifurcation import ContinuationOptions, Shooting, orbit_branch
 from fecontact.integrate import ContactEvents, strobe
 
 # States near orbits of one period, from which Newton's method finds them.
@@ -71,7 +71,13 @@ def test_multipliers_are_continuous_at_a_grazing():
 def test_a_doubling_is_where_runs_double(branch):
     """Above it one period, below two, apart by the square root of the distance."""
     doubling = max(branch.of_kind("period doubling"), key=lambda point: point.parameter)
-    assert doubling.parameter == pytest.approx(39.02833, abs=1e-4)
+    # The branch of the example is as exact as its runs, of rtol = 1e-7.
+    near = min(branch.points, key=lambda point: abs(point.parameter - 39.08))
+    field = impact_orbits.field_at(39.08)
+    exact = orbit_branch(field, near.orbit(field, 400), method=Shooting(segments=1, rtol=1e-9),
+                         bounds=(39.0, 39.15), direction=-1.0,
+                         options=ContinuationOptions(step=0.05, largest_step=0.1, points=12))
+    assert exact.of_kind("period doubling")[0].parameter == pytest.approx(39.0283286, abs=5e-6)
     twice = orbit_branch(impact_orbits.field_at(39.0), doubling, bounds=(38.9, 39.1),
                          options=ContinuationOptions(step=2e-3, largest_step=5e-3, points=20))
     end = twice.points[-1]
