@@ -1,6 +1,7 @@
 """Sweeps: many cases of a study on all cores or a cluster, stored and resumable."""
 
 import contextlib
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import FecontactError, InputError
-from fecontact.core.progress import shown
+from fecontact.core.progress import clock, shown, titled_bar
 from fecontact.core.tables import from_table, plain, require_known, to_table
 from fecontact.core.types import Array
 from fecontact.study.study import Study
@@ -22,7 +23,6 @@ from fecontact.sweeps.case_key import case_keys
 from fecontact.sweeps.dispatch import LostError, results
 from fecontact.sweeps.executors import opened, worker_count
 from fecontact.sweeps.plan import Plan, plan
-from fecontact.sweeps.progress import sweep_bar
 from fecontact.sweeps.shared_bases import Bases
 from fecontact.sweeps.store import Store, write_whole
 from fecontact.sweeps.summaries import functions_for
@@ -118,7 +118,7 @@ def sweep(
             rows = {key: row for key, row in rows.items() if not row["reason"]}
         finished = False
         try:
-            with shown(progress, sweep_bar) as tell:
+            with shown(progress, _sweep_bar) as tell:
                 _compute(work, store, rows, executor, workers, tell)
             finished = True
         except FecontactError as error:
@@ -276,3 +276,30 @@ def _compute(
                       for case in job.batch.cases])
             else:
                 take(result)
+
+
+@contextlib.contextmanager
+def _sweep_bar() -> Iterator[Callable[[int, int, int], None]]:
+    """Callback for the numbers of finished, failed and all cases, which draws the bar."""
+    begin = time.perf_counter()
+    first: int | None = None
+
+    def tell(done: int, failed: int, total: int) -> None:
+        nonlocal first
+        # Cases of an earlier sweep do not count towards the rate.
+        first = done if first is None else first
+        show(f"Sweeping {done}/{total}", done / max(total, 1),
+             note(done, failed, total, first, time.perf_counter() - begin))
+
+    with titled_bar() as show:
+        yield tell
+
+
+def note(done: int, failed: int, total: int, first: int, passed: float) -> str:
+    """``12.3 cases/s, 1:05 left, 2 failed``, after ``passed`` seconds from ``first`` cases on."""
+    if done <= first:
+        return "starting"
+    rate = (done - first) / passed
+    parts = [f"{rate:.3g} cases/s" if rate >= 1.0 else f"{1.0 / rate:.3g} s a case",
+             f"{clock((total - done) / rate)} left"]
+    return ", ".join(parts + ([f"{failed} failed"] if failed else []))

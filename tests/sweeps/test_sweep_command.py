@@ -17,7 +17,7 @@ from fecontact.core.progress import clock
 from fecontact.io import read_table
 from fecontact.plot import plot_sobol, plot_sweep
 from fecontact.sweeps import Estimate, SobolIndices, SweepTable, executors, plots
-from fecontact.sweeps.progress import note
+from fecontact.sweeps.sweep import note
 
 SWEEP = """
 [sweep]
