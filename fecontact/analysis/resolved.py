@@ -38,7 +38,7 @@ _FAILURES = 8  # consecutive failures before the run is considered not repeatabl
 _TOLD = 2e-3  # fraction of the time
 _NODES = 8  # contact nodes monitored besides the named points
 
-_COUNTED = ("work", "node_friction_work")  # relative to the first time of a run
+_COUNTED = ("work", "node_friction_work", "node_creep_work")  # relative to the first time of a run
 _STATE = ("modal_coordinates", "modal_velocities", "memory", "held_normal_force",
           "held_friction_force")
 
@@ -232,7 +232,7 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
     """Repeat the run from an output; None if it does not reach the end."""
     rows = slice(first, first + 1)
     start = replace(run, time=run.time[rows], work=run.work[rows], node_friction_work=None,
-                    events=None, **_cut(run, rows, _STATE))
+                    node_creep_work=None, events=None, **_cut(run, rows, _STATE))
     used = run.statistics
     options: dict[str, Any] = {"rtol": min(float(used.get("rtol", 1e-6)), 1e-2)}
     try:

@@ -76,6 +76,14 @@ def require_finite(owner: str, **values: float) -> None:
             raise InputError(f"{owner}: {name} = {shown(value)} must be finite.")
 
 
+def require_choice(owner: str, name: str, value: object, names: Iterable[str]) -> None:
+    """Raise :class:`InputError` unless a value is one of the names."""
+    known = tuple(names)
+    if not isinstance(value, str) or value not in known:
+        raise InputError(f"{owner}: {name} = {shown(value)} must be one of {choices(known)}"
+                         f"{nearest(str(value), known)}.")
+
+
 def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 

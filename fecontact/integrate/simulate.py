@@ -105,7 +105,8 @@ def simulate(
         system, found.time, states[:, :m], states[:, m : 2 * m], found.work, found.status,
         {"solver": solver.name, "rtol": float(rtol), **found.statistics},
         memory=states[:, 2 * m :] if system.memory else None,
-        node_friction_work=found.node_friction_work, held_normal_force=found.normal_force,
+        node_friction_work=found.node_friction_work, node_creep_work=found.node_creep_work,
+        held_normal_force=found.normal_force,
         held_friction_force=found.friction_force, events=found.events if watched else None)
     if found.status in (Status.FINISHED, Status.EVENT):
         trajectory = replace(trajectory, status=_checked(trajectory, solver, rtol))

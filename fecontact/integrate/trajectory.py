@@ -51,11 +51,15 @@ class Energies:
 
     Attributes
     ----------
-    kinetic, elastic, drive_spring, contact : (N,) arrays
-        Stored: in motion, in the modes, in the springs at B, in the contact.
-    drive_work, ground_work, belt_work, load_work : (N,) arrays
-        Put in: by the driven ends of the springs at B, by the ground lifting the body, by the
-        ground dragging it along, by the loads.
+    kinetic, elastic, drive_spring, contact, bristles : (N,) arrays
+        Stored: in motion, in the modes, in the springs at B, in the contact, in the internal
+        variables of friction.
+    drive_work, belt_normal_work, belt_friction_work, load_work, circulatory_work : (N,) arrays
+        Put in: by the driven ends of the springs at B, by the normal forces and by the friction
+        of the moving ground, by the loads, by stiffness that is not symmetric. With
+        ``ground.normal = "vertical"`` the normal forces of waves at rest do work too.
+    bristle_work : (N,) array
+        Put in by normal forces that change the stiffness of the bristles.
     modal_damping, dashpots, contact_damping, friction : (N,) arrays
         Lost: in the modes, in the dashpots at B, in the contact's normal damping, by friction
         between body and ground.
@@ -65,10 +69,13 @@ class Energies:
     elastic: Array
     drive_spring: Array
     contact: Array
+    bristles: Array
     drive_work: Array
-    ground_work: Array
-    belt_work: Array
+    belt_normal_work: Array
+    belt_friction_work: Array
     load_work: Array
+    circulatory_work: Array
+    bristle_work: Array
     modal_damping: Array
     dashpots: Array
     contact_damping: Array
@@ -77,12 +84,13 @@ class Energies:
     @property
     def stored(self) -> Array:
         """Kinetic energy and all stored energy [J]."""
-        return self.kinetic + self.elastic + self.drive_spring + self.contact
+        return self.kinetic + self.elastic + self.drive_spring + self.contact + self.bristles
 
     @property
     def work(self) -> Array:
         """All work put in [J]."""
-        return self.drive_work + self.ground_work + self.belt_work + self.load_work
+        return (self.drive_work + self.belt_normal_work + self.belt_friction_work + self.load_work
+                + self.circulatory_work + self.bristle_work)
 
     @property
     def lost(self) -> Array:
@@ -123,15 +131,16 @@ class Solution:
         [s].
     states : (N, 2 m + n s) array
         y = [q, q', z].
-    work : (N, 8) array
+    work : (N, p) array
         Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
         [J]. Energy lost in impacts on rigid stops is part of ``contact_damping``.
     status : Status
         How the run ended.
     statistics : mapping
         Numbers of steps, rejected steps, events and so on, seconds, message of the solver.
-    node_friction_work : (N, n) array or None
-        Energy dissipated by friction at each node since the first time [J].
+    node_friction_work, node_creep_work : (N, n) arrays or None
+        Energy dissipated by friction at each node since the first time, and the part of it that
+        is lost in stick, by the creep of smoothed friction [J].
     normal_force, friction_force : (N, n) arrays or None
         F and R of each node [N] if they do not follow from the state, as in set-valued contact;
         F without the impulses of rigid stops.
@@ -145,6 +154,7 @@ class Solution:
     status: Status
     statistics: dict[str, Any]
     node_friction_work: Array | None = None
+    node_creep_work: Array | None = None
     normal_force: Array | None = None
     friction_force: Array | None = None
     events: Events | None = None
@@ -161,7 +171,7 @@ class Trajectory(Summarised):
         [s].
     modal_coordinates, modal_velocities : (N, m) arrays
         q and q'.
-    work : (N, 8) array
+    work : (N, p) array
         Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
         [J].
     status : Status
@@ -170,9 +180,9 @@ class Trajectory(Summarised):
         Counts of the integrator: steps, right-hand sides, Jacobians, factorisations; seconds.
     memory : (N, n s) array or None
         Internal variables z of friction with memory, node by node; None without memory.
-    node_friction_work : (N, n) array or None
-        Energy lost by friction at each node [J], if the integrator stores it; see
-        :attr:`friction_work`.
+    node_friction_work, node_creep_work : (N, n) arrays or None
+        Energy lost by friction at each node, and the part of it in stick [J], if the integrator
+        stores them; see :attr:`friction_work` and :attr:`creep_work`.
     held_normal_force, held_friction_force : (N, n) arrays or None
         Forces of set-valued contact [N], which do not follow from the state; None if laws give the
         forces.
@@ -189,6 +199,7 @@ class Trajectory(Summarised):
     statistics: dict[str, Any] = field(default_factory=dict)
     memory: Array | None = None
     node_friction_work: Array | None = None
+    node_creep_work: Array | None = None
     held_normal_force: Array | None = None
     held_friction_force: Array | None = None
     events: Events | None = None
@@ -244,11 +255,11 @@ class Trajectory(Summarised):
             for name in ("time", "modal_coordinates", "modal_velocities", "memory",
                          "held_normal_force", "held_friction_force")
             if (values := getattr(self, name)) is not None}
-        friction = self.node_friction_work
-        return replace(
-            self, work=self.work[chosen] - self.work[begin],
-            node_friction_work=None if friction is None else friction[chosen] - friction[begin],
-            **kept)
+        counted: dict[str, Any] = {
+            name: values[chosen] - values[begin]
+            for name in ("work", "node_friction_work", "node_creep_work")
+            if (values := getattr(self, name)) is not None}
+        return replace(self, **kept, **counted)
 
     def displacement(self, point: str | int | tuple[float, float]) -> Array:
         """Displacement x, y [m] and rotation phi [rad] (N, 3) of a point.
@@ -316,16 +327,39 @@ class Trajectory(Summarised):
 
     @property
     def friction_work(self) -> Array:
-        """Energy (N, n) absorbed by friction at each node since the first time [J].
+        """Energy (N, n) lost by friction at each node since the first time [J].
 
-        Friction with memory returns part of it. From the integrator if stored, else by the
-        trapezoidal rule over the output times.
+        What bristles store and give back is not part of it. From the integrator if stored, else by
+        the trapezoidal rule over the output times.
         """
         if self.node_friction_work is not None:
             return self.node_friction_work
-        power = self.friction_force * self.slip_velocity
+        storing = self._bristles[1]
+        return self._summed(self.friction_force * self.slip_velocity - storing)
+
+    @property
+    def creep_work(self) -> Array:
+        """Part (N, n) of :attr:`friction_work` that is lost in stick [J].
+
+        Smoothed friction creeps where a rough surface rests; that wears nothing. Zero for friction
+        with memory. From the integrator if stored, else by the trapezoidal rule.
+        """
+        if self.node_creep_work is not None:
+            return self.node_creep_work
+        if self.held_friction_force is not None:
+            return np.zeros_like(self.friction_force)
+        stick = (self.contact_state == ContactState.STICK) & (self.system.arrays.memory == 0)
+        return self._summed(np.where(stick, self.friction_force * self.slip_velocity, 0.0))
+
+    def _summed(self, power: Array) -> Array:
+        """Integral (N, n) of powers (N, n) from the first time by the trapezoidal rule."""
         steps = 0.5 * np.diff(self.time)[:, None] * (power[1:] + power[:-1])
         return np.vstack([np.zeros(power.shape[1]), np.cumsum(steps, axis=0)])
+
+    @cached_property
+    def _bristles(self) -> tuple[Array, Array]:
+        """Energy (N, n) that the internal variables store [J], and the power into it [W]."""
+        return self.system.bristle_energy(self.time, self.states)
 
     def wear_depth(self, coefficient: float, width: float) -> Array:
         """Depth (N, n) worn off the body at each node since the first time [m].
@@ -394,16 +428,20 @@ class Trajectory(Summarised):
             ends = motion.history(t)[:, 0]
             spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
         contact = system.stored_energy(self.penetration)
+        bristles = self._bristles[0].sum(axis=1)
         put = dict(zip(POWERS, self.work.T, strict=True))
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
             elastic=0.5 * ((basis.angular_frequencies * q) ** 2).sum(axis=1),
             drive_spring=spring,
             contact=contact,
+            bristles=bristles,
             drive_work=put["drive"],
-            ground_work=put["ground"],
-            belt_work=put["belt"],
+            belt_normal_work=put["belt_normal"],
+            belt_friction_work=put["belt_friction"],
             load_work=put["load"],
+            circulatory_work=put["circulatory"],
+            bristle_work=bristles - bristles[0] - put["bristles"],
             modal_damping=put["modal_damping"],
             dashpots=put["dashpots"],
             contact_damping=put["contact_damping"],

@@ -205,6 +205,14 @@ class FrictionLaw(NodeLaw):
         """Slip velocity [m/s] over which the force rises, the smallest of all nodes."""
         raise NotImplementedError
 
+    def bristle_stiffness_of(self, share: Array) -> Array:
+        """Stiffness of the internal variables of n nodes (2, n, s): a and b.
+
+        The internal variable z stores ``(a + b F) z^2 / 2`` [J] under the normal force F, which
+        friction gives back. Zero by default: then all that friction takes counts as lost.
+        """
+        return np.zeros((2, len(share), self.memory))
+
     def stick_velocity(self, nodes: int) -> Array:
         """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
 

@@ -9,6 +9,7 @@ from fecontact.core.errors import (
     InputError,
     choices,
     nearest,
+    require_choice,
     require_finite,
     require_not_negative,
 )
@@ -20,12 +21,13 @@ _COMPONENTS = ("x", "y", "phi")
 
 @dataclass(frozen=True)
 class Drive:
-    r"""Base excitation of B through springs and absolute dashpots (4.1-8..11).
+    r"""Base excitation of B through springs and dashpots (4.1-8..11).
 
     .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin w_E t
 
-    acts on the body in -x, and likewise in y; u_x may be another motion. The dashpots act on the
-    absolute velocity of B.
+    acts on the body in -x, and likewise in y; u_x may be another motion. By default the dashpots
+    act on the absolute velocity of B, as here; relative ones on ``x_B' - u_x'``, as where spring
+    and dashpot share their driven end.
 
     Parameters
     ----------
@@ -39,11 +41,14 @@ class Drive:
         w_E, zero or above [rad/s].
     motion_x, motion_y : Signal, optional
         u_x(t), u_y(t) [m], instead of the harmonic motion.
+    dashpots : 'absolute' or 'relative'
+        Whether the dashpots act on the velocity of B, or on that relative to the driven end.
 
     Raises
     ------
     InputError
-        For values outside these ranges, or an amplitude and a motion in the same direction.
+        For values outside these ranges, an amplitude and a motion in the same direction, or
+        unknown dashpots.
     """
 
     stiffness_x: Annotated[float, Unit("N/m")] = 0.0
@@ -55,6 +60,7 @@ class Drive:
     angular_frequency: Annotated[float, Unit("rad/s")] = 0.0
     motion_x: Annotated[Signal | None, Unit("m")] = None
     motion_y: Annotated[Signal | None, Unit("m")] = None
+    dashpots: Literal["absolute", "relative"] = "absolute"
 
     def __post_init__(self) -> None:
         require_not_negative(
@@ -62,6 +68,7 @@ class Drive:
             damping_x=self.damping_x, damping_y=self.damping_y,
             angular_frequency=self.angular_frequency,
         )
+        require_choice("Drive", "dashpots", self.dashpots, ("absolute", "relative"))
         require_finite("Drive", amplitude_x=self.amplitude_x, amplitude_y=self.amplitude_y)
         for component, motion, amplitude in (
                 ("x", self.motion_x, self.amplitude_x), ("y", self.motion_y, self.amplitude_y)):

@@ -206,8 +206,8 @@ def friction_power(trajectory: Trajectory) -> float:
 
 
 def belt_power(trajectory: Trajectory) -> float:
-    """Mean power supplied by the moving ground through friction."""
-    return _power(trajectory, "belt")
+    """Mean power supplied by the moving ground through friction and normal forces."""
+    return _power(trajectory, "belt_friction") + _power(trajectory, "belt_normal")
 
 
 def _power(trajectory: Trajectory, name: str) -> float:

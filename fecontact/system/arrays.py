@@ -31,6 +31,8 @@ def system_arrays(
     B, C = basis.T[0], basis.T[1]
     stiffness = np.diag(basis.angular_frequencies**2)
     damping = basis.damping.copy()
+    springs = np.array([drive.stiffness_x, drive.stiffness_y], dtype=float)
+    dashpots = np.array([drive.damping_x, drive.damping_y], dtype=float)
     for axis, c, b in ((0, drive.stiffness_x, drive.damping_x),
                        (1, drive.stiffness_y, drive.damping_y)):
         stiffness += c * np.outer(B[axis], B[axis])
@@ -50,13 +52,15 @@ def system_arrays(
         damping=damping,
         modal_damping=basis.damping.copy(),
         constant_load=-load.normal * C[1],
-        drive_shapes=np.array([drive.stiffness_x * B[0], drive.stiffness_y * B[1]]),
-        drive_stiffness=np.array([drive.stiffness_x, drive.stiffness_y], dtype=float),
+        drive_shapes=np.array(B[:2], dtype=float),
+        drive_stiffness=springs,
+        drive_damping=dashpots if drive.dashpots == "relative" else np.zeros(2),
         load_shapes=np.array(load_shapes, dtype=float).reshape(-1, m),
         Tx=basis.contact_T[:, 0].copy(),
         Ty=basis.contact_T[:, 1].copy(),
         abscissa=basis.contact_x.copy(),
         gap=np.array(np.broadcast_to(gap, n)),
+        bristle_stiffness=_bristles(friction_groups, n),
         normal_parameters=normal_parameters,
         friction_parameters=friction_parameters,
         profile_parameters=ground.profile_parameters(),
@@ -72,6 +76,7 @@ def system_arrays(
         profile=ground.profile_kernel.address,
         friction_scale=0 if scale is None else scale.address,
         ground_motion=ground.motion_kernel.address,
+        leans=int(ground.normal == "surface"),
     )
 
 
@@ -92,6 +97,14 @@ def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
             turn = "turns" if component == "phi" else f"moves along {component}"
             raise InputError(f"{what} has no effect, as {point!r} {turn} in no mode of the basis; "
                              f"leave it out, or give the basis rows for that point.")
+
+
+def _bristles(friction_groups: list[LawGroup], n: int) -> Array:
+    """Stiffness (2, n, s) of the internal variables, and its derivative to the normal force."""
+    found = np.zeros((2, n, max((law.memory for _, _, law in friction_groups), default=0)))
+    for nodes, share, law in friction_groups:
+        found[:, nodes, : law.memory] = law.bristle_stiffness_of(share)
+    return found
 
 
 def _law_table(law_groups: Iterable[LawGroup]) -> tuple[Integers, Array]:

@@ -265,6 +265,18 @@ class ContactSystem(Summarised):
         kernels.contact_history(times, states, self.arrays, out)
         return out
 
+    def bristle_energy(self, times: Array, states: Array) -> tuple[Array, Array]:
+        """Energy (N, n) that internal variables of friction store, and the power into it (N, n).
+
+        The power [W] is that at constant normal force: what else changes the energy [J] comes from
+        normal forces to which the stiffness of bristles is proportional.
+        """
+        out = np.zeros((2, len(times), self.basis.contact_nodes))
+        if self.memory:
+            kernels.bristle_history(np.ascontiguousarray(times, dtype=float),
+                                    np.ascontiguousarray(states, dtype=float), self.arrays, out)
+        return out[0], out[1]
+
     def with_(self, **changes: Any) -> "ContactSystem":
         """A copy with other parameters, by their dotted names.
 

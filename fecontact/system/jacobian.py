@@ -56,7 +56,7 @@ def contact_gradients(t, y, s, gradients, active, out):
     """Rows of the Jacobian's contact part, for the nodes whose normal force is not zero.
 
     Fills ``active`` (n, 2 m) with the rows Tx, Ty of these nodes and ``gradients`` (4, n, m) with
-    the derivatives of [-R, F] of each to q (first two) and to q' (last two), applied to the
+    the derivatives of [-T, F] of each to q (first two) and to q' (last two), applied to the
     modes. Returns their number. The parts of friction with memory are put into the Jacobian
     ``out`` at once.
     """
@@ -123,10 +123,10 @@ def batch_rates(t, x, s, f):
 
 
 @helper
-def _add_contact(j, F, R, s, partial, gradient, rate, out):
+def _add_contact(j, F, T, s, partial, gradient, rate, out):
     """Add the forces of node j to y' and their derivatives to the Jacobian.
 
-    ``gradient`` (2, 2 m) is filled with those of -R and F to the state.
+    ``gradient`` (2, 2 m) is filled with those of -T and F to the state.
     """
     m = s.Tx.shape[1]
     for k in range(m):
@@ -138,7 +138,7 @@ def _add_contact(j, F, R, s, partial, gradient, rate, out):
                                          + partial[0, 2 * part + 1] * ty)
     for i in range(m):
         tx, ty = s.Tx[j, i], s.Ty[j, i]
-        rate[m + i] += ty * F - tx * R
+        rate[m + i] += ty * F - tx * T
         for k in range(2 * m):
             out[m + i, k] += tx * gradient[0, k] + ty * gradient[1, k]
 
@@ -174,7 +174,7 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                 P[c, m : 2 * m] = load_p
         for j in range(n):
             z = memory_of(j, y, s)
-            F, R, contact = node_gradients(j, node_motion(j, y, s), moved, z, s, force, rates,
+            F, T, contact = node_gradients(j, node_motion(j, y, s), moved, z, s, force, rates,
                                            partial)
             first = 2 * m + j * states
             for k in range(s.memory[j]):
@@ -188,17 +188,17 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                 shifts[0] += r.abscissa[j] - moved_p[0]
                 shifts[1] += r.gap[j]
                 shifts[2] -= moved_p[1]
-                F_p, R_p, slip_p, pressing_p = node_rates(
+                F_p, T_p, slip_p, pressing_p = node_rates(
                     j, contact, z, F, shifts, s, laws, force, partial, (room, room_rates, memory))
                 for i in range(m):
-                    P[c, m + i] += s.Ty[j, i] * F_p - s.Tx[j, i] * R_p
+                    P[c, m + i] += s.Ty[j, i] * F_p - s.Tx[j, i] * T_p
                 if basis_moves and F != 0.0:
                     for i in range(m):
-                        P[c, m + i] += r.Ty[j, i] * F - r.Tx[j, i] * R
+                        P[c, m + i] += r.Ty[j, i] * F - r.Tx[j, i] * T
                 for k in range(s.memory[j]):
                     P[c, first + k] = rates[k, 1] * slip_p + rates[k, 2] * pressing_p + memory[k]
             if F != 0.0:
-                _add_contact(j, F, R, s, partial, gradient, out, A)
+                _add_contact(j, F, T, s, partial, gradient, out, A)
 
 
 @kernel(types.void(vector, matrix, SYSTEM, SYSTEM, f8, matrix, block, matrix))

@@ -5,10 +5,12 @@ With x = Tx q and y = Ty q at the n contact nodes, per node j
 
     xi = X_j + x_j - travel(t)      u_j = y_R(xi) - y_j - g_j      v_j = u_j'
     F_j = normal(u_j, v_j)          R_j = friction(x_j' - V, s(xi) |F_j|, z_j)
-    q'' = -K q - C q' + T^T f,      f_j = [-R_j, F_j]
+    q'' = -K q - C q' + T^T f,      f_j = [-T_j, F_j]
+    T_j = R_j + F_j y_R'(xi)
 
-where K and C hold the modes' own stiffness and damping and the springs and dashpots at B, and s
-is the variation of friction along the ground.
+where K and C hold the modes' own stiffness and damping and the springs and dashpots at B, s is
+the variation of friction along the ground, and T the force against +x: friction, and that part of
+the contact force that leans with the ground (absent where the ground's normal counts as vertical).
 """
 
 from typing import NamedTuple
@@ -32,7 +34,12 @@ from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_
 
 
 class SystemArrays(NamedTuple):
-    """A contact system as the kernels see it: arrays, and laws by address."""
+    """A contact system as the kernels see it: arrays, and laws by address.
+
+    ``drive_damping`` (2,) belongs to dashpots between B and the moving ends of its springs;
+    ``bristle_stiffness`` (2, n, s) says with a and b that an internal variable stores
+    ``(a + b |F|) z^2 / 2``; ``leans`` is 0 where contact forces stay vertical on waves, else 1.
+    """
 
     stiffness: Array
     damping: Array
@@ -40,11 +47,13 @@ class SystemArrays(NamedTuple):
     constant_load: Array
     drive_shapes: Array
     drive_stiffness: Array
+    drive_damping: Array
     load_shapes: Array
     Tx: Array
     Ty: Array
     abscissa: Array
     gap: Array
+    bristle_stiffness: Array
     normal_parameters: Array
     friction_parameters: Array
     profile_parameters: Array
@@ -60,12 +69,13 @@ class SystemArrays(NamedTuple):
     profile: int
     friction_scale: int
     ground_motion: int
+    leans: int
 
 
 SYSTEM = types.NamedTuple(
-    [matrix, matrix, matrix, vector, matrix, vector, matrix, matrix, matrix, vector, vector,
-     matrix, matrix, vector, vector, vector, matrix, matrix,
-     integers, integers, integers, integers, integers, i8, i8, i8], SystemArrays)
+    [matrix, matrix, matrix, vector, matrix, vector, vector, matrix, matrix, matrix, vector, vector,
+     block, matrix, matrix, vector, vector, vector, matrix, matrix,
+     integers, integers, integers, integers, integers, i8, i8, i8, i8], SystemArrays)
 
 # Columns of the per-node results of `contact_state`.
 STATE_COLUMNS = 6
@@ -148,6 +158,12 @@ def pressing_force(place, F, s):
 
 
 @helper
+def force_against_x(F, R, contact, s):
+    """Force of a node in -x: friction, and the part of the contact force that leans."""
+    return R + F * contact.slope if s.leans else R
+
+
+@helper
 def node_forces(j, motion, moved, z, s, force, rates):
     """F and R of node j, and its :class:`NodeContact`.
 
@@ -193,9 +209,9 @@ def normal_gradients(j, contact, s, out):
 
 @helper
 def node_gradients(j, motion, moved, z, s, force, rates, out):
-    """As :func:`node_forces`, with derivatives.
+    """F of node j, its force T in -x, and its :class:`NodeContact`, with derivatives.
 
-    Fills out (3, 4) with those of F, R and the force that friction sees to x, y, x', y'.
+    Fills out (3, 4) with those of F, T and the force that friction sees to x, y, x', y'.
     ``force`` and ``rates`` as above, but ``force`` begins with R and its derivatives to slip
     velocity and pressing force for all laws.
     """
@@ -211,7 +227,11 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
     for k in range(4):
         out[1, k] = R_F * out[2, k]
     out[1, 2] += R_v
-    return F, R, contact
+    if s.leans:
+        for k in range(4):
+            out[1, k] += contact.slope * out[0, k]
+        out[1, 0] += F * contact.curvature
+    return F, force_against_x(F, R, contact, s), contact
 
 
 @kernel(types.void(f8, vector, SYSTEM, matrix))
@@ -232,12 +252,12 @@ def contact_state(t, y, s, out):
 
 
 @helper
-def set_load(t, drive_x, drive_y, s, load):
-    """Fill load (m,) with the modal forces of the loads at time t and of the drive's motion."""
+def set_load(t, pull_x, pull_y, s, load):
+    """Fill load (m,) with the modal forces of the loads at time t and of the drive's pulls."""
     m = len(load)
     for i in range(m):
-        load[i] = (s.constant_load[i] + drive_x * s.drive_shapes[0, i]
-                   + drive_y * s.drive_shapes[1, i])
+        load[i] = (s.constant_load[i] + pull_x * s.drive_shapes[0, i]
+                   + pull_y * s.drive_shapes[1, i])
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         for i in range(m):
@@ -245,11 +265,16 @@ def set_load(t, drive_x, drive_y, s, load):
 
 
 @helper
+def drive_pull(axis, t, s):
+    """Force on B at rest at time t, by spring and dashpot to an end that moves."""
+    value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
+    return s.drive_stiffness[axis] * value + s.drive_damping[axis] * rate
+
+
+@helper
 def given_at(t, s, load):
     """Fill load (m,) with modal forces given in time; returns the motion of the ground."""
-    drive_x = signal_at(s.drive[0])(t, s.drive_parameters[0])[0]
-    drive_y = signal_at(s.drive[1])(t, s.drive_parameters[1])[0]
-    set_load(t, drive_x, drive_y, s, load)
+    set_load(t, drive_pull(0, t, s), drive_pull(1, t, s), s, load)
     return ground_motion(t, s)
 
 
@@ -282,10 +307,12 @@ def rates_under(load, moved, y, s, force, rates, out):
     states = len(rates)
     body_rates(load, y, s, out)
     for j in range(n):
-        F, R, _ = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
+        F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
+                                    rates)
         if F != 0.0:
+            T = force_against_x(F, R, contact, s)
             for i in range(m):
-                out[m + i] += s.Ty[j, i] * F - s.Tx[j, i] * R
+                out[m + i] += s.Ty[j, i] * F - s.Tx[j, i] * T
         for k in range(s.memory[j]):
             out[2 * m + j * states + k] = rates[k, 0]
 
@@ -314,25 +341,33 @@ def normal_values(addresses, u, v, p, force, slope):
         force[j], slope[j], _ = normal_at(addresses[j])(u[j], v[j], p[j])
 
 
-# Columns of `powers`: put in by the drive's springs, the ground's lifting, the belt and the loads;
-# lost in the modes, in the dashpots at B, in the contact's damping, by friction.
-POWERS = ("drive", "ground", "belt", "load", "modal_damping", "dashpots", "contact_damping",
-          "friction")
+# Columns of `powers`: put in by the drive, by the normal force and the friction of the belt, by the
+# loads and by stiffness that is not symmetric; lost in the modes, in the dashpots at B, in the
+# contact's damping, by friction; stored in bristles at constant normal force.
+POWERS = ("drive", "belt_normal", "belt_friction", "load", "circulatory", "modal_damping",
+          "dashpots", "contact_damping", "friction", "bristles")
 POWER_COUNT = len(POWERS)
-DRIVE, GROUND, BELT, LOAD, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING, FRICTION = range(POWER_COUNT)
+(DRIVE, BELT_NORMAL, BELT_FRICTION, LOAD, CIRCULATORY, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING,
+ FRICTION, BRISTLES) = range(POWER_COUNT)
+# Powers of each node: what its friction loses, and the part of it that is lost in stick.
+NODE_POWERS = 2
 
 
 @helper
 def body_powers(t, y, s, out):
-    """Fill out (8,) with the powers outside the contact, the others with zero."""
+    """Fill out (p,) with the powers outside the contact, the others with zero."""
     m = s.Tx.shape[1]
     out[:POWER_COUNT] = 0.0
     for axis in range(2):
         value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
-        pull = s.drive_stiffness[axis] * value
+        place, speed = 0.0, 0.0
         for i in range(m):
-            pull -= s.drive_shapes[axis, i] * y[i]
-        out[DRIVE] += pull * rate
+            place += s.drive_shapes[axis, i] * y[i]
+            speed += s.drive_shapes[axis, i] * y[m + i]
+        damping = s.drive_damping[axis]
+        out[DRIVE] += (s.drive_stiffness[axis] * (value - place) + damping * (rate - speed)) * rate
+        # The absolute dashpot is counted below.
+        out[DASHPOTS] += damping * rate * (rate - 2.0 * speed)
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         for i in range(m):
@@ -343,6 +378,7 @@ def body_powers(t, y, s, out):
             product = y[m + i] * y[m + k]
             out[MODAL_DAMPING] += s.modal_damping[i, k] * product
             out[DASHPOTS] += (s.damping[i, k] - s.modal_damping[i, k]) * product
+            out[CIRCULATORY] -= 0.5 * (s.stiffness[i, k] - s.stiffness[k, i]) * y[m + i] * y[k]
 
 
 @helper
@@ -352,26 +388,70 @@ def drive_jump(before, after, y, s):
     for axis in range(2):
         old = signal_at(s.drive[axis])(before, s.drive_parameters[axis])[0]
         new = signal_at(s.drive[axis])(after, s.drive_parameters[axis])[0]
-        pull = 0.5 * s.drive_stiffness[axis] * (old + new)
+        stretch = 0.5 * (old + new)
         for i in range(s.Tx.shape[1]):
-            pull -= s.drive_shapes[axis, i] * y[i]
-        work += pull * (new - old)
+            stretch -= s.drive_shapes[axis, i] * y[i]
+        work += s.drive_stiffness[axis] * stretch * (new - old)
     return work
 
 
-@kernel(types.void(f8, vector, SYSTEM, vector, vector))
-def powers(t, y, s, out, friction):
-    """Fill out (8,) with the powers and ``friction`` (n,) with that of each node's friction."""
+@helper
+def belt_normal_power(F, slope, slip, speed, s):
+    """Power of the normal force's motion: of the drag up the slopes, or of lifting the node."""
+    return -F * slope * speed if s.leans else F * slope * slip
+
+
+@helper
+def storing_power(j, F, z, rates, s):
+    """Power that goes into the bristles of node j at constant normal force."""
+    total = 0.0
+    for k in range(s.memory[j]):
+        stiffness = s.bristle_stiffness[0, j, k] + s.bristle_stiffness[1, j, k] * abs(F)
+        total += stiffness * z[k] * rates[k, 0]
+    return total
+
+
+@kernel(types.void(vector, matrix, SYSTEM, block))
+def bristle_history(times, states, s, out):
+    """Fill out (2, N, n): what the bristles store, and the power into it at constant force."""
+    count = s.memory.max()
+    force, rates = np.empty(3 + count), np.empty((count, 3 + count))
+    for i in range(len(times)):
+        y, moved = states[i], ground_motion(times[i], s)
+        for j in range(len(s.Tx)):
+            z = memory_of(j, y, s)
+            F = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)[0]
+            stored = 0.0
+            for k in range(s.memory[j]):
+                stored += (s.bristle_stiffness[0, j, k]
+                           + s.bristle_stiffness[1, j, k] * abs(F)) * z[k] * z[k]
+            out[0, i, j] = 0.5 * stored
+            out[1, i, j] = storing_power(j, F, z, rates, s)
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, vector, vector))
+def powers(t, y, s, stick_speed, out, nodes):
+    """Fill out (p,) with the powers and ``nodes`` (2 n,) with those of each node.
+
+    First what the friction of each node loses, then what of it is lost below the node's slip
+    velocity ``stick_speed`` (n,), by creep.
+    """
+    y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)
-    speed = ground_motion(t, s).speed
-    state = np.empty((n, STATE_COLUMNS))
-    contact_state(t, y, s, state)
+    moved = ground_motion(t, s)
+    states = s.memory.max()
+    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
     body_powers(t, y, s, out)
     for j in range(n):
-        F, R = state[j, NORMAL_FORCE], state[j, FRICTION_FORCE]
-        elastic = normal_at(s.normal[j])(state[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
-        out[GROUND] += F * state[j, GROUND_RATE]
-        out[BELT] -= R * speed
-        out[CONTACT_DAMPING] += (F - elastic) * state[j, PENETRATION_RATE]
-        friction[j] = R * state[j, SLIP_VELOCITY]
-        out[FRICTION] += friction[j]
+        z = memory_of(j, y, s)
+        F, R, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+        elastic = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])[0]
+        out[BELT_NORMAL] += belt_normal_power(F, contact.slope, contact.slip, moved.speed, s)
+        out[BELT_FRICTION] -= R * moved.speed
+        out[CONTACT_DAMPING] += (F - elastic) * contact.rate
+        storing = storing_power(j, F, z, rates, s)
+        lost = R * contact.slip - storing
+        out[BRISTLES] += storing
+        out[FRICTION] += lost
+        nodes[j] = lost
+        nodes[n + j] = lost if abs(contact.slip) < stick_speed[j] else 0.0

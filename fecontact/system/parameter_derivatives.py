@@ -90,10 +90,13 @@ def given_rates(t, s, r, laws, load):
     for i in range(m):
         load[i] = r.constant_load[i]
     for k in range(2):
-        value = signal_at(s.drive[k])(t, s.drive_parameters[k])[0]
-        rate = _signal_rates(s.drive[k], t, laws.drive, k, h)[0]
+        value, rate = signal_at(s.drive[k])(t, s.drive_parameters[k])
+        value_p, rate_p = _signal_rates(s.drive[k], t, laws.drive, k, h)
+        pull = s.drive_stiffness[k] * value + s.drive_damping[k] * rate
+        pull_p = (r.drive_stiffness[k] * value + s.drive_stiffness[k] * value_p
+                  + r.drive_damping[k] * rate + s.drive_damping[k] * rate_p)
         for i in range(m):
-            load[i] += value * r.drive_shapes[k, i] + rate * s.drive_shapes[k, i]
+            load[i] += pull * r.drive_shapes[k, i] + pull_p * s.drive_shapes[k, i]
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         rate = _signal_rates(s.load[k], t, laws.load, k, h)[0]
@@ -115,7 +118,7 @@ def _ground_rates(address, xi, beside, h):
 
 @helper
 def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
-    """Derivatives of F, R, slip velocity and pressing force at node j.
+    """Derivatives of F, T, slip velocity and pressing force at node j.
 
     ``shifts`` holds those of xi, height, slip velocity and rate of the height by themselves;
     ``contact``, ``force`` and ``partial`` are results of
@@ -157,4 +160,6 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
                 memory[i] += weight * room_rates[i, 0]
         elif F != 0.0:
             R_p += weight * friction_at(s.friction[j])(slip, pressing, laws.friction[k, j])[0]
+    if s.leans:
+        R_p += contact.slope * F_p + F * (slope + contact.curvature * shifts[0])
     return F_p, R_p, shifts[2], pressing_p

@@ -271,7 +271,8 @@ def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
     """
     arrays = system.arrays
     load = arrays.constant_load.copy()
-    given = [*zip(arrays.drive_shapes, system.drive.motions, strict=True),
+    springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
+    given = [*zip(springs, system.drive.motions, strict=True),
              *zip(arrays.load_shapes, (force.signal for force in system.load.forces), strict=True)]
     for shape, source in given:
         if isinstance(source, Constant):

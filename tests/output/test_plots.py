@@ -201,11 +201,12 @@ def test_modes_are_titled_by_their_frequencies():
 def test_colours_of_energies_tell_where_they_are():
     named = {entry.name for entry in fields(Energies)}
     assert set(plots.ENERGY_COLOURS) == named
-    panels = (("kinetic", "elastic", "drive_spring", "contact"),
-              ("drive_work", "ground_work", "belt_work", "load_work"),
+    panels = (("kinetic", "elastic", "drive_spring", "contact", "bristles"),
+              ("drive_work", "belt_normal_work", "belt_friction_work", "load_work",
+               "circulatory_work", "bristle_work"),
               ("modal_damping", "dashpots", "contact_damping", "friction"))
     for names in panels:
-        assert len({plots.ENERGY_COLOURS[name] for name in names}) == 4
+        assert len({plots.ENERGY_COLOURS[name] for name in names}) == len(names)
 
 
 def test_long_lines_are_thinned_without_losing_peaks():

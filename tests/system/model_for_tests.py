@@ -21,6 +21,7 @@ class Model:
         share = [length / sum(basis.tributary) for length in basis.tributary]
         self.values = system.parameters()
         self.gap = np.broadcast_to(system.gap, self.n)
+        self.carried = float(self.values["drive.dashpots"] == "relative")
 
         def per_node(name, extensive):
             value = self.values[name]
@@ -59,7 +60,7 @@ class Model:
         return mu * F * (2.0 / np.pi) * np.arctan(self.k_s[j] * v)
 
     def node(self, j, t, y):
-        """Normal force, friction, penetration, its rate, slip velocity, lifting of the ground."""
+        """Normal force, friction, penetration, its rate, slip velocity, slope of the ground."""
         q, rate = y[: self.m], y[self.m :]
         x, height = self.T[2 + j, 0] @ q, self.T[2 + j, 1] @ q
         x_rate, height_rate = self.T[2 + j, 0] @ rate, self.T[2 + j, 1] @ rate
@@ -67,10 +68,14 @@ class Model:
         k = 2.0 * np.pi / self.values["ground.wavelength"]
         phase = k * (self.X[j] + x - V * t)
         slip = x_rate - V
-        ground, lifting = y_A * np.sin(phase), y_A * k * np.cos(phase) * slip
-        u, v = ground - height - self.gap[j], lifting - height_rate
+        ground, slope = y_A * np.sin(phase), y_A * k * np.cos(phase)
+        u, v = ground - height - self.gap[j], slope * slip - height_rate
         F = self.normal(j, u, v)
-        return F, self.friction(j, slip, F), u, v, slip, lifting
+        return F, self.friction(j, slip, F), u, v, slip, slope
+
+    def leaning(self, F, slope):
+        """Force on a node in -x that belongs to its normal force."""
+        return F * slope if self.values["ground.normal"] == "surface" else 0.0
 
     def rhs(self, t, y):
         """y' = [q', -2 D w q' - w^2 q + T^T f_ex]."""
@@ -79,11 +84,12 @@ class Model:
         w_B, v_B = self.T[0] @ q, self.T[0] @ rate
         for i, axis in enumerate("xy"):
             c, b = self.values[f"drive.stiffness_{axis}"], self.values[f"drive.damping_{axis}"]
-            force[0, i] = -(c * (w_B[i] - self.drive(axis, t)[0]) + b * v_B[i])
+            end, end_rate = self.drive(axis, t)
+            force[0, i] = -(c * (w_B[i] - end) + b * (v_B[i] - self.carried * end_rate))
         force[1, 1] = -self.values["load.normal"]
         for j in range(self.n):
-            F, R = self.node(j, t, y)[:2]
-            force[2 + j] = [-R, F, 0.0]
+            F, R, *_, slope = self.node(j, t, y)
+            force[2 + j] = [-R - self.leaning(F, slope), F, 0.0]
         total = -self.C @ rate - self.w**2 * q
         for point in range(2 + self.n):
             for i in range(3):
@@ -122,19 +128,23 @@ class Model:
     def powers(self, t, y):
         """Powers put in and lost, by name."""
         q, rate = y[: self.m], y[self.m :]
-        out = dict.fromkeys(("drive", "ground", "belt", "load", "modal_damping", "dashpots",
-                             "contact_damping", "friction"), 0.0)
+        out = dict.fromkeys(("drive", "belt_normal", "belt_friction", "load", "circulatory",
+                             "modal_damping", "dashpots", "contact_damping", "friction",
+                             "bristles"), 0.0)
         for i, axis in enumerate("xy"):
             end, end_rate = self.drive(axis, t)
             c, b = self.values[f"drive.stiffness_{axis}"], self.values[f"drive.damping_{axis}"]
-            out["drive"] += c * (end - self.T[0, i] @ q) * end_rate
-            out["dashpots"] += b * (self.T[0, i] @ rate) ** 2
+            lag = self.carried * end_rate - self.T[0, i] @ rate
+            out["drive"] += (c * (end - self.T[0, i] @ q) + b * lag * self.carried) * end_rate
+            out["dashpots"] += b * lag**2
         out["load"] = -self.values["load.normal"] * (self.T[1, 1] @ rate)
         out["modal_damping"] = rate @ self.C @ rate
         for j in range(self.n):
-            F, R, u, v, slip, lifting = self.node(j, t, y)
-            out["ground"] += F * lifting
-            out["belt"] -= R * self.values["ground.speed"]
+            F, R, u, v, slip, slope = self.node(j, t, y)
+            # What the normal force does on the body beyond what goes into the contact.
+            out["belt_normal"] += F * slope * slip - self.leaning(F, slope) * (
+                slip + self.values["ground.speed"])
+            out["belt_friction"] -= R * self.values["ground.speed"]
             out["contact_damping"] += (F - self.normal(j, u, 0.0)) * v
             out["friction"] += R * slip
         return out

@@ -86,6 +86,9 @@ SYSTEMS = {
     "flat ground": {"ground": Ground(speed=1e-3)},
     "ground at rest": {"ground": Ground(amplitude=50e-6, wavelength=1e-3)},
     "no drive": {"drive": Drive()},
+    "vertical": {"ground": Ground(0.01, 50e-6, 1e-3, normal="vertical")},
+    "dashpots to the base": {"drive": Drive(3e3, 2e3, 0.7, 0.4, 1e-3, 5e-4, 13.8,
+                                            dashpots="relative")},
     "back": {"ground": Ground(speed=-0.3, amplitude=20e-6, wavelength=2.5e-3)},
     "rising friction": {"friction": ExponentialFriction(0.2, 0.6, 300.0, 1e5)},
     "per node": {
@@ -119,7 +122,8 @@ def test_right_hand_side_jacobian_and_powers(case, parts):
     assert history[:, kernels.SLIP_VELOCITY] == pytest.approx(slip, abs=1e-14)
     for j in range(3):
         expected = model.node(j, t, y)
-        assert history[j] == pytest.approx(expected, rel=1e-8, abs=1e-10)
+        *expected, slope = expected
+        assert history[j] == pytest.approx([*expected, slope * expected[4]], rel=1e-8, abs=1e-10)
     if case in ("open", "clipped by damping"):
         assert (history[:, kernels.NORMAL_FORCE] == 0.0).all() or parts == "per node"
 
@@ -131,10 +135,12 @@ def test_right_hand_side_jacobian_and_powers(case, parts):
     assert system.jacobian(t, y) == pytest.approx(
         expected, rel=1e-5, abs=1e-11 * np.abs(expected).max())
 
-    values, friction = np.empty(len(POWERS)), np.empty(3)
-    powers(t, y, system.arrays, values, friction)
+    values, of_nodes = np.empty(len(POWERS)), np.empty(6)
+    creep = np.array([2e-7, 1.1e-3, 0.1])
+    powers(t, y, system.arrays, creep, values, of_nodes)
     got = dict(zip(POWERS, values, strict=True))
-    assert friction.sum() == pytest.approx(got["friction"], rel=1e-12)
+    assert of_nodes[:3].sum() == pytest.approx(got["friction"], rel=1e-12)
+    assert (of_nodes[3:] == np.where(np.abs(slip) < creep, of_nodes[:3], 0.0)).all()
     expected = model.powers(t, y)
     largest = max(abs(value) for value in expected.values())
     for name, value in got.items():
@@ -142,7 +148,7 @@ def test_right_hand_side_jacobian_and_powers(case, parts):
     for name in ("modal_damping", "dashpots", "contact_damping", "friction"):
         assert got[name] >= -1e-12 * largest, name
     # What is put in and not lost is stored.
-    balance = (got["drive"] + got["ground"] + got["belt"] + got["load"]
+    balance = (got["drive"] + got["belt_normal"] + got["belt_friction"] + got["load"]
                - got["modal_damping"] - got["dashpots"] - got["contact_damping"]
                - got["friction"])
     assert model.stored_rate(t, y) == pytest.approx(balance, abs=1e-9 * largest)
@@ -358,13 +364,16 @@ def test_parameters_by_their_dotted_names():
     assert (values["friction.decay"], values["friction.smoothing_slope"]) == (1000.0, 1e6)
 
 
+_OTHER = {"arctan": "tanh", "surface": "vertical", "absolute": "relative"}
+
+
 def test_every_parameter_changes_the_motion_and_only_in_the_copy():
     system = random_system()
     y = state_with(system, 0.3, np.array([0.4, 2.0, 0.9]) * R, np.array([0.001, 0.002, 0.0]),
                    np.array([1e-3, 2e-5, -1e-3]))
     before = system.rhs(0.3, y)
     for name, value in system.parameters().items():
-        other = {"arctan": "tanh"}[value] if isinstance(value, str) else 1.01 * value or 0.01
+        other = _OTHER[value] if isinstance(value, str) else 1.01 * value or 0.01
         changed = system.with_(**{name: other})
         assert changed.parameters()[name] == other
         assert system.parameters()[name] == value

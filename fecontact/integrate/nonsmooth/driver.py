@@ -241,7 +241,8 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
     speed = max(0.01 * system.ground.largest_speed(float(times[0]), float(times[-1])),
                 depth / longest)
     # Velocities that drive and loads bring about in each mode, within a step where it is slow.
-    pushes = [(arrays.drive_shapes, [motion.largest for motion in drive.motions]),
+    springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
+    pushes = [(springs, [motion.largest for motion in drive.motions]),
               (arrays.load_shapes, [force.signal.largest for force in system.load.forces])]
     push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
     driven = push / np.maximum(np.sqrt(np.diag(arrays.stiffness)), 1.0 / longest)

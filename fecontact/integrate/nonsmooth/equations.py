@@ -27,7 +27,6 @@ from fecontact.integrate.nonsmooth.problem import (
     CURVED,
     FIXED,
     FORCE,
-    GROUND_RATE,
     LIMIT,
     OPEN,
     PENETRATION,
@@ -41,11 +40,12 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.laws.signatures import friction_at, normal_at, signal_at
 from fecontact.system.kernels import (
-    BELT,
+    BELT_FRICTION,
+    BELT_NORMAL,
     CONTACT_DAMPING,
     FRICTION,
-    GROUND,
     POWER_COUNT,
+    belt_normal_power,
     body_acceleration,
     body_powers,
     given_at,
@@ -100,8 +100,9 @@ def contact_powers(moved, s, nodes, friction, elastic, out):
     """
     for j in range(len(nodes)):
         force, R = nodes[j, FORCE], friction[j]
-        out[GROUND] += force * nodes[j, GROUND_RATE]
-        out[BELT] -= R * moved.speed
+        out[BELT_NORMAL] += belt_normal_power(force, nodes[j, SLOPE], nodes[j, SLIP], moved.speed,
+                                              s)
+        out[BELT_FRICTION] -= R * moved.speed
         if elastic and force != 0.0:
             stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
             out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
@@ -133,8 +134,19 @@ def observe(moved, Y, p, nodes):
         nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
         nodes[j, SLIP], nodes[j, SLOPE] = contact.slip, contact.slope
-        nodes[j, GROUND_RATE] = contact.slope * contact.slip
         nodes[j, CURVED] = contact.curvature * contact.slip * contact.slip
+
+
+@helper
+def sinking_row(j, i, w, s):
+    """Change of the height of node j over the ground by mode i."""
+    return s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]
+
+
+@helper
+def lifting_row(j, i, w, s):
+    """Modal force i of a unit contact force of node j."""
+    return sinking_row(j, i, w, s) if s.leans else s.Ty[j, i]
 
 
 @helper
@@ -159,21 +171,20 @@ def hold_stops(t, p, closed, w, acceleration):
     ground = speed_rate(t, p)
     for a in range(count):
         j = w.indices[a]
-        slope = w.nodes[j, SLOPE]
-        w.right[a] = w.nodes[j, CURVED] - slope * ground
+        w.right[a] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
         for i in range(m):
-            w.right[a] -= (s.Ty[j, i] - slope * s.Tx[j, i]) * acceleration[i]
+            w.right[a] -= sinking_row(j, i, w, s) * acceleration[i]
         for b in range(count):
             total = 0.0
             for i in range(m):
-                total += (s.Ty[j, i] - slope * s.Tx[j, i]) * s.Ty[w.indices[b], i]
+                total += sinking_row(j, i, w, s) * lifting_row(w.indices[b], i, w, s)
             w.matrix[a, b] = total
     solve_small(w, count)
     for a in range(count):
         j = w.indices[a]
         w.nodes[j, FORCE] = w.right[a]
         for i in range(m):
-            acceleration[i] += s.Ty[j, i] * w.right[a]
+            acceleration[i] += lifting_row(j, i, w, s) * w.right[a]
 
 
 @helper
@@ -238,7 +249,8 @@ def _derivative(t, held_Y, held_p, held_status, held_closed, held_w, held_out):
                 w.total[c] += w.friction[j]
             force = w.nodes[j, FORCE]
             for i in range(m):
-                acceleration[i] += s.Ty[j, i] * force - s.Tx[j, i] * w.friction[j]
+                acceleration[i] += (lifting_row(j, i, w, s) * force
+                                    - s.Tx[j, i] * w.friction[j])
         hold_clusters(t, p, status, w, acceleration)
         for j in range(n):
             c = p.cluster[j]

@@ -14,8 +14,8 @@ from fecontact.system.kernels import POWER_COUNT, SYSTEM
 STEEP, CREEP = 1e36, 1e-18
 
 # Columns of `Workspace.nodes`.
-NODE_COLUMNS = 9
-FORCE, PRESSING, PENETRATION, RATE, SLIP, GROUND_RATE, SLOPE, CURVED, LIMIT = range(NODE_COLUMNS)
+NODE_COLUMNS = 8
+FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT = range(NODE_COLUMNS)
 
 # Status of a cluster; a slipping one has the sign of its slip velocity, +1 or -1.
 OPEN, STICK, FIXED = 0, 2, 3

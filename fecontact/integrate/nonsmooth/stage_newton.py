@@ -27,7 +27,12 @@ from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
 from fecontact.integrate.nonsmooth.problem import CREEP
 from fecontact.laws.signatures import friction_at
-from fecontact.system.kernels import node_contact, node_motion, normal_gradients
+from fecontact.system.kernels import (
+    force_against_x,
+    node_contact,
+    node_motion,
+    normal_gradients,
+)
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
@@ -99,7 +104,7 @@ def newton_room_for(nodes: int, modes: int) -> NewtonRoom:
 def _linearise(stage, moved, p, hold, turning, room, force):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
-    Adds ``Ty F - Tx R`` to ``room.balance``, fills ``force`` (n,) with R, and ``active`` and
+    Adds ``Ty F - Tx T`` to ``room.balance``, fills ``force`` (n,) with R, and ``active`` and
     ``gradients`` of the room. KEPT nodes stay on their side; HESITANT ones that would turn their
     slip around are first tried as sticking, or the iteration would jump across stick for ever.
     Returns the number of nodes under force and the largest creep velocity of a sticking node,
@@ -138,9 +143,13 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             R_along = R_v + R_F * (g * partial[2, 0] + partial[2, 2])
             R_away = R_F * (g * partial[2, 1] + partial[2, 3])
         force[j] = R
+        T = force_against_x(F, R, contact, s)
+        if s.leans:
+            R_along += contact.slope * along + g * F * contact.curvature
+            R_away += contact.slope * away
         for i in range(m):
             tx, ty = s.Tx[j, i], s.Ty[j, i]
-            room.balance[i] += ty * F - tx * R
+            room.balance[i] += ty * F - tx * T
             room.active[0, count, i], room.active[1, count, i] = tx, ty
             room.gradients[0, count, i] = R_along * tx + R_away * ty
             room.gradients[1, count, i] = -along * tx - away * ty

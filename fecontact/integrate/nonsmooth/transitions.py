@@ -15,7 +15,13 @@ import math
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.integrate.nonsmooth.equations import derivative, solve_small, speed_rate
+from fecontact.integrate.nonsmooth.equations import (
+    derivative,
+    lifting_row,
+    sinking_row,
+    solve_small,
+    speed_rate,
+)
 from fecontact.integrate.nonsmooth.problem import (
     CURVED,
     FIXED,
@@ -149,7 +155,7 @@ def _stop_matrix(p, w):
         for k in range(n):
             total = 0.0
             for i in range(m):
-                total += (s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]) * s.Ty[k, i]
+                total += sinking_row(j, i, w, s) * lifting_row(k, i, w, s)
             w.matrix[j, k] = total
 
 
@@ -188,12 +194,12 @@ def _push(p, touching, w, Y, first):
         for b in range(count):
             total = 0.0
             for i in range(m):
-                total += (s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]) * s.Ty[w.indices[b], i]
+                total += sinking_row(j, i, w, s) * lifting_row(w.indices[b], i, w, s)
             w.matrix[a, b] = total
     solve_small(w, count)
     for a in range(count):
         for i in range(m):
-            Y[first + i] += s.Ty[w.indices[a], i] * w.right[a]
+            Y[first + i] += lifting_row(w.indices[a], i, w, s) * w.right[a]
 
 
 @helper
@@ -238,7 +244,7 @@ def resolve_impacts(t, p, progress, room, slow, height, brief, w, out):
     _impulses(touching, wanted, w)
     for j in range(n):
         for i in range(m):
-            Y[m + i] += s.Ty[j, i] * w.right[j]
+            Y[m + i] += lifting_row(j, i, w, s) * w.right[j]
     for i in range(m):
         before -= 0.5 * Y[m + i] * Y[m + i]
     Y[2 * m + CONTACT_DAMPING] += before
@@ -251,10 +257,9 @@ def resolve_impacts(t, p, progress, room, slow, height, brief, w, out):
     ground = speed_rate(t, p)
     resting = np.zeros(n, np.bool_)
     for j in range(n):
-        slope = w.nodes[j, SLOPE]
-        pressed[j] = w.nodes[j, CURVED] - slope * ground
+        pressed[j] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
         for i in range(m):
-            pressed[j] -= (s.Ty[j, i] - slope * s.Tx[j, i]) * out[m + i]
+            pressed[j] -= sinking_row(j, i, w, s) * out[m + i]
         blurred = 30.0 * math.sqrt(2.2e-16 * height * abs(pressed[j])) + brief * abs(pressed[j])
         resting[j] = (touching[j] and not parting[j]
                       and abs(w.nodes[j, RATE]) <= max(slow, blurred))

@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import POWERS, powers, right_hand_side
+from fecontact.system.kernels import NODE_POWERS, POWERS, powers, right_hand_side
 
 
 def integrate(
@@ -90,7 +90,8 @@ def with_work(
     """
     size, extra = len(state), len(POWERS)
     arrays = system.arrays
-    friction = np.empty(system.basis.contact_nodes)
+    n = system.basis.contact_nodes
+    of_nodes, stick_speed = np.empty(NODE_POWERS * n), np.zeros(n)
     counts: dict[str, Any] = {"right_hand_sides": 0, "jacobians": 0}
 
     def rhs(t: float, y: Array) -> Array:
@@ -98,7 +99,7 @@ def with_work(
         out = np.empty(size + extra)
         state = np.ascontiguousarray(y[:size])
         right_hand_side(t, state, arrays, out[:size])
-        powers(t, state, arrays, out[size:], friction)
+        powers(t, state, arrays, stick_speed, out[size:], of_nodes)
         return out
 
     def jacobian(t: float, y: Array) -> Array:
@@ -123,7 +124,7 @@ def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
     for motion, stiffness, shape in zip(system.drive.motions, system.arrays.drive_stiffness,
                                         system.arrays.drive_shapes, strict=True):
         old, new = motion.history([before_break(t, end), end])[:, 0]
-        y[system.size] += (0.5 * stiffness * (old + new) - shape @ y[:m]) * (new - old)
+        y[system.size] += stiffness * (0.5 * (old + new) - shape @ y[:m]) * (new - old)
     return y
 
 

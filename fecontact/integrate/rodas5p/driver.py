@@ -21,7 +21,7 @@ from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import POWER_COUNT
+from fecontact.system.kernels import NODE_POWERS, POWER_COUNT
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.
@@ -85,9 +85,11 @@ def start(
     times = np.array(times, dtype=float)
     largest = np.abs(basis.T[:, :2]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
-    slip_scale, depth = np.empty(n), np.empty(n)
+    slip_scale, depth, stick_speed = np.empty(n), np.empty(n), np.zeros(n)
     for nodes, _, law in system.law_groups("friction"):
         slip_scale[nodes] = law.velocity_scale
+        if not law.memory:
+            stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
     longest = longest_step(system, times, max_step)
@@ -103,7 +105,8 @@ def start(
             columns += 1
     control = Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
-        slip_scale=slip_scale, slow=_SLOW * slip_scale, depth=depth, largest=largest,
+        slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
+        largest=largest,
         breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
         speed_scale=system.velocity_scale, energy_scale=energy,
@@ -116,7 +119,7 @@ def start(
         Problem(system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), control),
         progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
         Output(times, np.zeros((len(times), len(state))),
-               np.zeros((len(times), POWER_COUNT + n))),
+               np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(above.arrays, below.arrays, width, variation_for(
             columns, m, n, states, width, float(vary_rtol or _LOOSER * rtol),
             1.0 if vary_rtol else _FADED),
@@ -221,8 +224,9 @@ def integrate(
     if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
         times = np.append(times, run.time)
         states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
+    lost, creep = np.split(work[:, POWER_COUNT:], NODE_POWERS, axis=1)
     return Solution(times, states, work[:, :POWER_COUNT], ended, statistics,
-                    node_friction_work=work[:, POWER_COUNT:], events=run.events)
+                    node_friction_work=lost, node_creep_work=creep, events=run.events)
 
 
 ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,

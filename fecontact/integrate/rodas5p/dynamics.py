@@ -15,14 +15,14 @@ from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system import kernels as kernels
 
 # Entries of what is given in time: drive x and y, travel and speed of the ground, and their rates.
-DRIVE_X, DRIVE_Y, TRAVEL, SPEED, DRIVE_X_RATE, DRIVE_Y_RATE = range(6)
+PULL_X, PULL_Y, TRAVEL, SPEED, PULL_X_RATE, PULL_Y_RATE = range(6)
 GIVEN = 6
 
 
 class Gradients(NamedTuple):
     """Derivatives of the node forces, as :func:`fecontact.system.kernels.node_gradients` gives.
 
-    partial : (n, 3, 4), derivatives of F, R and the pressing force to x, y, x', y'
+    partial : (n, 3, 4), derivatives of F, T and the pressing force to x, y, x', y'
     force : (n, 3 + s), rates : (n, s, 3 + s), of friction with memory
     """
 
@@ -38,12 +38,13 @@ GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
 def set_given(t, s, given, load):
     """Fill ``given`` (6,) with what is given at time t, and ``load`` (m,) with its modal force."""
     for axis in range(2):
-        if s.drive_stiffness[axis] != 0.0:
+        stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
+        if stiffness != 0.0 or damping != 0.0:
             value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
-            given[DRIVE_X + axis] = value
-            given[DRIVE_X_RATE + axis] = rate
+            given[PULL_X + axis] = stiffness * value + damping * rate
+            given[PULL_X_RATE + axis] = stiffness * rate
     given[TRAVEL], given[SPEED] = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    kernels.set_load(t, given[DRIVE_X], given[DRIVE_Y], s, load)
+    kernels.set_load(t, given[PULL_X], given[PULL_Y], s, load)
 
 
 @helper
@@ -76,7 +77,7 @@ def project(shapes, y, places, speeds):
 
 @helper
 def gather(y, s, shapes, load, forces, rate):
-    """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -R, then all F."""
+    """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -T, then all F."""
     m, rows = shapes.shape
     for i in range(m):
         total = load[i]
@@ -100,9 +101,9 @@ def set_rate(y, s, shapes, given, load, w, scratch, rate):
     force, rates = scratch.force[0], scratch.rates[0]
     for j in range(n):
         first = 2 * m + j * states
-        F, R, _ = kernels.node_forces(j, motion_of(j, w), moved, y[first : first + s.memory[j]],
-                                      s, force, rates)
-        forces[j] = -R
+        F, R, contact = kernels.node_forces(j, motion_of(j, w), moved,
+                                            y[first : first + s.memory[j]], s, force, rates)
+        forces[j] = -kernels.force_against_x(F, R, contact, s)
         forces[n + j] = F
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
@@ -120,10 +121,10 @@ def set_rate_and_gradients(y, s, shapes, given, load, w, out, rate):
     moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
     for j in range(n):
         first = 2 * m + j * states
-        F, R, _ = kernels.node_gradients(j, motion_of(j, w), moved,
+        F, T, _ = kernels.node_gradients(j, motion_of(j, w), moved,
                                          y[first : first + s.memory[j]], s, out.force[j],
                                          out.rates[j], out.partial[j])
-        forces[j] = -R
+        forces[j] = -T
         forces[n + j] = F
         for k in range(states):
             rate[first + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
@@ -153,8 +154,8 @@ def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):
                 -acceleration * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
                 if k < s.memory[j] else 0.0)
     for i in range(m):
-        total = (rate_of_loads[i] + given[DRIVE_X_RATE] * s.drive_shapes[0, i]
-                 + given[DRIVE_Y_RATE] * s.drive_shapes[1, i])
+        total = (rate_of_loads[i] + given[PULL_X_RATE] * s.drive_shapes[0, i]
+                 + given[PULL_Y_RATE] * s.drive_shapes[1, i])
         for j in range(rows):
             total += shapes[i, j] * forces[j]
         out[m + i] = total

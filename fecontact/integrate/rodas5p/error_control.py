@@ -103,7 +103,7 @@ _DIFFERENCE = _third_difference()
 
 
 @helper
-def _set_powers(step, s, progress, room):
+def _set_powers(step, s, stick_speed, progress, room):
     """Fill ``room.power`` with the powers at the points of a step."""
     for k in range(len(progress.power)):
         room.power[0, k] = progress.power[k]
@@ -113,7 +113,7 @@ def _set_powers(step, s, progress, room):
             state = room.right
         else:
             state = room.after
-        powers(min(step.t + _POINTS[point] * step.h, step.latest), state, s,
+        powers(min(step.t + _POINTS[point] * step.h, step.latest), state, s, stick_speed,
                room.power[point, :POWER_COUNT], room.power[point, POWER_COUNT:])
 
 
@@ -133,7 +133,7 @@ def _quadrature_error(h, power):
 def work_error(step, problem, progress, room):
     """Error of the work in a step; fills ``room.power`` with the powers at the points of it."""
     control = problem.control
-    _set_powers(step, problem.system, progress, room)
+    _set_powers(step, problem.system, control.stick_speed, progress, room)
     return _quadrature_error(step.h, room.power) / (
         control.rtol * _energy_scale(control, progress, room))
 

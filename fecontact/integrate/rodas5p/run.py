@@ -26,7 +26,8 @@ class Run:
         What is integrated, and how finely.
     output : Output
         Output times and what belongs to them; rows from ``outputs`` on are not filled yet. Work
-        of the powers :data:`fecontact.system.kernels.POWERS`, then friction work of each node [J].
+        of the powers :data:`fecontact.system.kernels.POWERS`, then friction work of each node and
+        its part in stick [J].
     variation : Vary
         Derivatives that go with the run.
     progress : Progress
@@ -55,7 +56,7 @@ class Run:
 
     @property
     def work(self) -> Array:
-        """Work (N, p + n) up to the output times [J]."""
+        """Work (N, p + 2 n) up to the output times [J]."""
         return self.output.work
 
     @property

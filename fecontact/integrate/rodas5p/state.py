@@ -10,7 +10,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
-from fecontact.system.kernels import POWER_COUNT, SYSTEM
+from fecontact.system.kernels import NODE_POWERS, POWER_COUNT, SYSTEM
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
 # fail may still lie ahead, else zero. ENERGY is the largest energy or work so far.
@@ -30,9 +30,10 @@ class Control(NamedTuple):
         Modal displacements below which errors count as if the displacement were this large.
     memory_scale : (n s,) array
         Scales of the internal variables.
-    slip_scale, slow, depth : (n,) arrays
+    slip_scale, slow, stick_speed, depth : (n,) arrays
         Width of the smoothing of friction, slip velocity at which slip is about to become stick,
-        penetration at which the normal law changes its character.
+        that below which what friction loses is creep, penetration at which the normal law changes
+        its character.
     largest : (m,) array
         Largest motion of each mode at any point.
     breaks : (k,) array
@@ -55,6 +56,7 @@ class Control(NamedTuple):
     memory_scale: Array
     slip_scale: Array
     slow: Array
+    stick_speed: Array
     depth: Array
     largest: Array
     breaks: Array
@@ -69,7 +71,7 @@ class Control(NamedTuple):
     unfelt: int
 
 
-CONTROL = types.NamedTuple([vector] * 7 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
+CONTROL = types.NamedTuple([vector] * 8 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
 
 
 class Problem(NamedTuple):
@@ -127,8 +129,8 @@ class Progress(NamedTuple):
         y and y'.
     extremes : (m,) array
         Largest modal displacements so far.
-    work, power : (p + n,) arrays
-        Work so far and powers: those of POWERS, p of them, then of each node's friction.
+    work, power : (p + 2 n,) arrays
+        Work so far and powers: those of POWERS, p of them, then those of each node.
     gradients : Gradients
         Derivatives of the node forces.
     """
@@ -148,7 +150,7 @@ PROGRESS = types.NamedTuple(
 
 
 class Output(NamedTuple):
-    """Output times (N,), and states (N, size) and work (N, p + n) there."""
+    """Output times (N,), and states (N, size) and work (N, p + 2 n) there."""
 
     times: Array
     states: Array
@@ -163,7 +165,7 @@ class Room(NamedTuple):
 
     Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
     what the names say; ``nodes`` (3, 2 n), ``given`` and ``load`` for what acts at the time of a
-    stage, ``power`` (4, p + n) for a quadrature. ``ends`` to ``places`` serve to look at the
+    stage, ``power`` (4, p + 2 n) for a quadrature. ``ends`` to ``places`` serve to look at the
     course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
     what they may do.
     """
@@ -212,7 +214,8 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
         np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
         stage, right, base, time_rate, after, rate_after,
         np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
-        np.zeros((4, POWER_COUNT + nodes)), stage_solver.reduced_for(modes, nodes, states),
+        np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)),
+        stage_solver.reduced_for(modes, nodes, states),
         gradients_for(nodes, states), gradients_for(nodes, states),
         np.zeros((3, 2 * nodes)), np.zeros((3, size)), np.zeros((courses.DOUBT + 1, 3 * nodes)),
         np.zeros((3, courses.COEFFICIENTS)),
@@ -223,8 +226,8 @@ def progress_for(state: Array, time: float, step: float, modes: int, nodes: int)
     """A run that is about to start."""
     numbers = np.zeros(NUMBERS)
     numbers[TIME], numbers[STEP] = time, step
-    size = len(state)
+    size, powers = len(state), POWER_COUNT + NODE_POWERS * nodes
     return Progress(
         numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
-        np.zeros(modes), np.zeros(POWER_COUNT + nodes), np.zeros(POWER_COUNT + nodes),
+        np.zeros(modes), np.zeros(powers), np.zeros(powers),
         gradients_for(nodes, (size - 2 * modes) // nodes))

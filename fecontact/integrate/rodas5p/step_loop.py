@@ -58,7 +58,8 @@ def _start(t, problem, progress, room, output, watch):
     dynamics.set_rate_and_gradients(progress.state, s, problem.shapes, room.given, room.load,
                                     room.nodes, progress.gradients, progress.rate)
     if control.work:
-        powers(t, progress.state, s, progress.power[:POWER_COUNT], progress.power[POWER_COUNT:])
+        powers(t, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
+               progress.power[POWER_COUNT:])
     if _watched(watch) or watch.counts[KINKS]:
         begin(t, progress.state, s, control.depth, watch, room.scratch)
     for k in range(len(progress.state)):
@@ -119,6 +120,13 @@ def _linearise(step, after_t, problem, progress, room):
         acceleration = (speed - room.given[dynamics.SPEED]) / (later - step.t)
     for i in range(m):
         room.pull_rate[i] = 0.0
+    for axis in range(2):
+        if s.drive_damping[axis] != 0.0 and later > step.t:
+            rise = (signal_at(s.drive[axis])(later, s.drive_parameters[axis])[1]
+                    - signal_at(s.drive[axis])(after_t, s.drive_parameters[axis])[1])
+            for i in range(m):
+                room.pull_rate[i] += (s.drive_damping[axis] * rise / (later - step.t)
+                                      * s.drive_shapes[axis, i])
     for k in range(len(s.load)):
         rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
         for i in range(m):
@@ -283,8 +291,8 @@ def _go_on(step, problem, progress, room, output):
     if problem.control.work:
         work_until(1.0, step.h, progress.work, room.power, progress.work)
         if step.at_break:
-            powers(step.target, room.after, problem.system, progress.power[:POWER_COUNT],
-                   progress.power[POWER_COUNT:])
+            powers(step.target, room.after, problem.system, problem.control.stick_speed,
+                   progress.power[:POWER_COUNT], progress.power[POWER_COUNT:])
             jump = drive_jump(step.latest, step.target, room.after, problem.system)
             progress.work[DRIVE] += jump
             last = progress.counts[OUTPUTS] - 1

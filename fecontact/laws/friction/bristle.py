@@ -133,6 +133,12 @@ class DahlFriction(LimitedFriction):
     presliding_stiffness: Annotated[Positive, Unit("1/m")] = 1e5
     exponent: OneOrAbove = 1.0
 
+    def bristle_stiffness_of(self, share: Array) -> Array:
+        """That of z is sigma F."""
+        stiffness = np.zeros((2, len(share), 1))
+        stiffness[1, :, 0] = self.presliding_stiffness
+        return stiffness
+
     @property
     def state_scale(self) -> Array:
         """Deflection mu / sigma at which the contact slides [m], the smallest of all nodes."""
@@ -202,6 +208,12 @@ class LuGreFriction(MemoryFriction):
         super().__post_init__()
         require_at_least(self, "static_coefficient", "kinetic_coefficient")
 
+    def bristle_stiffness_of(self, share: Array) -> Array:
+        """That of z is sigma_0 F."""
+        stiffness = np.zeros((2, len(share), 1))
+        stiffness[1, :, 0] = self.bristle_stiffness
+        return stiffness
+
     @property
     def state_scale(self) -> Array:
         """Deflection mu_k / sigma_0 of sliding bristles [m], the smallest of all nodes."""
@@ -257,6 +269,12 @@ class BoucWenFriction(LimitedFriction):
     yield_displacement: Annotated[Positive, Unit("m")] = 5e-6
     beta: Annotated[PerNode, Bound("0.5 or above", lambda x: x >= 0.5)] = 0.5
     exponent: OneOrAbove = 1.0
+
+    def bristle_stiffness_of(self, share: Array) -> Array:
+        """That of z is mu F u_s."""
+        stiffness = np.zeros((2, len(share), 1))
+        stiffness[1, :, 0] = np.multiply(self.friction_coefficient, self.yield_displacement)
+        return stiffness
 
     @property
     def state_scale(self) -> Array:

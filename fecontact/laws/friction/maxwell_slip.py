@@ -60,6 +60,12 @@ class _MaxwellSlip(LimitedFriction):
     friction_coefficient: NotNegative = 0.55
     relaxation_time: Annotated[Positive, Unit("s")] = 1e-7
 
+    def bristle_stiffness_of(self, share: Array) -> Array:
+        """The springs', whose deflections the internal variables are."""
+        stiffness = np.zeros((2, len(share), self.memory))
+        stiffness[0] = self.table(share)[:, :1] / self.memory
+        return stiffness
+
     @property
     def state_scale(self) -> Array:
         """Deflections (s,) [m] at which the elements slide under 1 N on the whole face.

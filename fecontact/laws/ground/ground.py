@@ -3,13 +3,19 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
 from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw
-from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
+from fecontact.core.errors import (
+    InputError,
+    require_choice,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
 from fecontact.laws.ground.motion import (
@@ -30,8 +36,13 @@ class Ground:
     .. math:: y_R(\xi) = y_A \sin(2 \pi \xi / \lambda_w), \qquad \xi = X + x - \int_0^t V\,dt
 
     is its height [m] below a node of reference abscissa X displaced by x. Other profiles and a
-    time-dependent speed are possible. The normal force stays vertical; keep the slope
-    ``2 pi amplitude / wavelength`` well below one.
+    time-dependent speed are possible. The contact force that belongs to the penetration
+    ``u = y_R - y - g`` pushes the body off the slopes:
+
+    .. math:: f_y = F, \qquad f_x = -F\, y_R'(\xi)
+
+    so that ground at rest does no work. Friction stays along x: keep the slope ``2 pi amplitude /
+    wavelength`` well below one.
 
     Parameters
     ----------
@@ -47,12 +58,15 @@ class Ground:
         Time-dependent speed; by default the constant V.
     friction_variation : Profile, optional
         s(xi): the friction force is multiplied by 1 + s, which must not be negative.
+    normal : 'surface' or 'vertical'
+        Direction of the contact force: normal to the surface as above, or always vertical,
+        f_x = 0, as in the source. Waves put energy into the body then, even at rest.
 
     Raises
     ------
     InputError
-        For values outside these ranges, both amplitude and profile, or a variation that makes
-        friction negative.
+        For values outside these ranges, both amplitude and profile, a variation that makes
+        friction negative, or an unknown normal.
     """
 
     speed: Annotated[float, Unit("m/s")] = 0.0
@@ -61,6 +75,7 @@ class Ground:
     profile: Annotated[Profile | None, Unit("m")] = None
     motion: GroundMotion | None = None
     friction_variation: Profile | None = None
+    normal: Literal["surface", "vertical"] = "surface"
 
     def __post_init__(self) -> None:
         require_finite("Ground", speed=self.speed)
@@ -74,6 +89,7 @@ class Ground:
         if self.profile is not None and self.amplitude != 0.0:
             raise InputError(f"Ground: amplitude = {self.amplitude!r} cannot be combined with "
                              f"profile; give one of them.")
+        require_choice("Ground", "normal", self.normal, ("surface", "vertical"))
         self._require_friction()
 
     def _require_friction(self) -> None:

@@ -29,6 +29,7 @@ _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
 _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
           "work": "J"}
 _OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
+             "node_creep_work": "J",
              "held_normal_force": "N", "held_friction_force": "N"}
 # Recorded results of user-defined laws, so that a run can be drawn without their code.
 _OF_LAWS = {"penetration_rate": "m/s", "ground_rate": "m/s", "contact_energy": "J"}

@@ -237,8 +237,11 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
         axes = figure.subplots(3, 1, sharex=True)
         time = _time(axes[2:], trajectory)
         panels = (
-            ("stored energy", energies.stored, ("kinetic", "elastic", "drive_spring", "contact")),
-            ("work put in", energies.work, ("drive_work", "ground_work", "belt_work", "load_work")),
+            ("stored energy", energies.stored, ("kinetic", "elastic", "drive_spring", "contact",
+                                                "bristles")),
+            ("work put in", energies.work,
+             ("drive_work", "belt_normal_work", "belt_friction_work", "load_work",
+              "circulatory_work", "bristle_work")),
             ("energy lost", energies.lost,
              ("modal_damping", "dashpots", "contact_damping", "friction")),
         )

@@ -20,8 +20,9 @@ DASHES: Any = (0, (4, 2.5))
 ENERGY_COLOURS = {
     "kinetic": "#0072b2", "elastic": "#56b4e9", "modal_damping": "#56b4e9",
     "drive_spring": "#d55e00", "drive_work": "#d55e00", "dashpots": "#d55e00",
-    "contact": "#009e73", "ground_work": "#009e73", "contact_damping": "#009e73",
-    "belt_work": "#e69f00", "friction": "#e69f00", "load_work": "#cc79a7",
+    "contact": "#009e73", "belt_normal_work": "#009e73", "contact_damping": "#009e73",
+    "belt_friction_work": "#e69f00", "friction": "#e69f00", "bristles": "#e69f00",
+    "load_work": "#cc79a7", "circulatory_work": "#0072b2", "bristle_work": "#6a6a6a",
 }
 # Colour-blind safe; 'open' takes the colour of the background.
 STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
