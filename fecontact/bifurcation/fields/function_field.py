@@ -95,13 +95,13 @@ class FunctionField(VectorField):
             kernels.batch_jacobians(self._jacobian.address, t, x, values, J)
         if not (states or len(active)):
             return f, J, P, wrong
-        room, complex_room = kernels.rooms(d, len(values))
+        places = kernels.Places(t, x, f, values, scales, self._sizes, active, states)
+        room = kernels.room_for(d, len(values))
         if self._complex is None:
-            kernels.differences(address, t, x, values, scales, self._sizes, f, active,
-                                states, room, J, P)
+            kernels.differences(address, places, room, J, P)
         else:
-            kernels.complex_steps(address, self._complex.address, t, x, values, scales,
-                                  self._sizes, f, active, states, room, complex_room, J, P, wrong)
+            kernels.complex_steps(address, self._complex.address, places, room,
+                                  kernels.complex_room_for(d, len(values)), J, P, wrong)
         return f, J, P, wrong
 
     def complaint(self, wrong: NDArray[np.int64], active: NDArray[np.int64]) -> str:

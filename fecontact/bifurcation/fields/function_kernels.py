@@ -1,5 +1,7 @@
 """Compiled loops over many states for a vector field that is given by its address."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from fecontact.core.compiled import (
     matrix,
     vector,
 )
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 
 c16 = types.complex128
 complex_vector = types.Array(c16, 1, "C")
@@ -45,17 +47,76 @@ _RIGHT = 1e-7
 _EPS = 2.220446049250313e-16
 
 
+class Places(NamedTuple):
+    """Where derivatives are wanted, and to what.
+
+    Attributes
+    ----------
+    t, x, f : (N,), (N, d), (N, d) arrays
+        Times, states, and the rates there.
+    p : (k,) array
+        Parameters.
+    scales, sizes : (d,), (k,) arrays
+        Typical sizes of states and parameters.
+    active : (a,) integer array
+        Parameters to which derivatives are wanted.
+    states : bool
+        Whether those to the states are wanted.
+    """
+
+    t: Array
+    x: Array
+    f: Array
+    p: Array
+    scales: Array
+    sizes: Array
+    active: Integers
+    states: bool
+
+
+PLACES = types.NamedTuple([vector, matrix, matrix, vector, vector, vector, integers, types.boolean],
+                          Places)
+
+
+class _Place(NamedTuple):
+    """One place: time, state and parameters that may be moved, and the rates there."""
+
+    t: float
+    y: Array
+    q: Array
+    f: Array
+
+
+class Room(NamedTuple):
+    """Room for the work on one place; ``best`` and ``error`` (d,) are results of differences."""
+
+    y: Array
+    q: Array
+    above: Array
+    below: Array
+    orders: Array
+    best: Array
+    error: Array
+    column: Array
+
+
+ROOM = types.NamedTuple([vector] * 4 + [matrix] + [vector] * 3, Room)
+
+
 @helper
-def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, best, error):
-    """Fill best (d,) with the derivative to ``moved[at]``, an entry of y or q, and its error (d,).
+def _extrapolated(function, place, moved, at, size, room):
+    """Fill ``room.best`` with the derivative to ``moved[at]``, an entry of y or q of the place.
 
     Central differences over steps h that are halved again and again, extrapolated to order six.
     The error is the change from order four to order six, and rounding; the step with the least
-    counts, for each rate, and is kept in orders[3]. What lies between x - h and x + h is seen by f
-    at x: a second difference that does not fall with h^2 shows a function that changes over less
-    than h. Once a rate has converged, the first step at which its error grows is the last one: over
-    shorter ones only rounding is seen, and none at all where it keeps f from changing.
+    counts, for each rate, and is kept in ``room.orders[3]``. What lies between x - h and x + h is
+    seen by f at x: a second difference that does not fall with h^2 shows a function that changes
+    over less than h. Once a rate has converged, stop at the first step at which its error grows:
+    over shorter ones only rounding is seen, and none at all where it keeps f from changing.
     """
+    t, y, q, f = place
+    above, below, orders, best, error = (room.above, room.below, room.orders, room.best,
+                                         room.error)
     value, h = moved[at], _WIDEST * size
     for i in range(len(f)):
         best[i], error[i], orders[4, i] = np.nan, np.inf, 0.0
@@ -96,11 +157,13 @@ def _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, b
 
 
 @helper
-def _roughness(function, t, y, q, moved, at, size, above, below, orders):
-    """Fill orders[0] with how much the rates jump beside x: their rounding, cancellation included.
+def _roughness(function, place, moved, at, size, room):
+    """Fill ``room.orders[0]`` with how much the rates jump beside x.
 
-    It shows in second differences over steps, 1e-6 and less, over which the function is straight.
+    That is their rounding, cancellation included. It shows in second differences over steps, 1e-6 and less, over which the function is straight.
     """
+    t, y, q = place.t, place.y, place.q
+    above, below, orders = room.above, room.below, room.orders
     value, h = moved[at], _WIDEST * size
     for i in range(len(above)):
         orders[0, i] = 0.0
@@ -123,8 +186,11 @@ def _roughness(function, t, y, q, moved, at, size, above, below, orders):
 
 
 @helper
-def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, error, column):
-    """Put differences where the derivatives (d,) by the complex step are wrong; True if any are."""
+def _correct(function, place, moved, at, size, room):
+    """Put differences into ``room.column`` where the complex step is wrong; True if it is."""
+    t, y, q, f = place
+    above, below, best, error, column = (room.above, room.below, room.best, room.error,
+                                         room.column)
     value, h = moved[at], _CHECK * size
     moved[at] = value + h
     function(t, y, q, above)
@@ -141,7 +207,7 @@ def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, 
         right = right and seen and near
     if right:
         return False
-    _extrapolated(function, t, y, q, moved, at, size, f, above, below, orders, best, error)
+    _extrapolated(function, place, moved, at, size, room)
     wrong, largest = False, 0.0
     for i in range(len(f)):
         off = abs(column[i] - best[i])
@@ -151,7 +217,8 @@ def _correct(function, t, y, q, moved, at, size, f, above, below, orders, best, 
                 wrong = True
     if not wrong:
         return False
-    _roughness(function, t, y, q, moved, at, size, above, below, orders)
+    _roughness(function, place, moved, at, size, room)
+    orders = room.orders
     wrong = False
     for i in range(len(f)):
         off = abs(column[i] - best[i])
@@ -179,42 +246,36 @@ def batch_jacobians(address, t, x, p, J):
         function(t[k], x[k], p, J[k])
 
 
-@kernel(types.void(i8, i8, vector, matrix, vector, vector, vector, matrix, integers,
-                   types.boolean, matrix, complex_matrix, block, block, integers))
-def complex_steps(
-    address, complex_address, t, x, p, scales, sizes, f, active, states, room, complex_room, J, P,
-    wrong,
-):
-    """Fill J (N, d, d) if ``states``, and P (N, d, a), by the complex step.
+@kernel(types.void(i8, i8, PLACES, ROOM, complex_matrix, block, block, integers))
+def complex_steps(address, complex_address, places, room, complex_room, J, P, wrong):
+    """Fill J (N, d, d) if wanted, and P (N, d, a), by the complex step.
 
     Each column is compared with differences, which take the place of what differs from them:
-    ``wrong`` (d + a,) counts the places at which that is so, by columns of J and P. The rooms are
-    those of :func:`rooms`; ``scales`` (d,) and ``sizes`` (k,) are typical of states and parameters.
+    ``wrong`` (d + a,) counts the places at which that is so, by columns of J and P.
+    ``complex_room`` is that of :func:`complex_room_for`.
     """
     function, complex_function = _rates_at(address), _complex_rates_at(complex_address)
-    x, p, f, room, complex_room = (borrowed(x), borrowed(p), borrowed(f), borrowed(room),
-                                   borrowed(complex_room))
+    places, room, complex_room = borrowed(places), borrowed(room), borrowed(complex_room)
+    t, x, p, active, column = places.t, places.x, places.p, places.active, room.column
     d, k = x.shape[1], len(p)
-    above, below, best, error, column, y = (room[0, :d], room[1, :d], room[2, :d], room[3, :d],
-                                            room[4, :d], room[5, :d])
-    orders, q = room[6:11], room[11, :k]
+    y, q = room.y, room.q
     z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]
     q[:] = p
     for a in range(k):
         w[a] = p[a]
     wrong[:] = 0
     for n in range(len(t)):
+        place = _Place(t[n], y, q, places.f[n])
         for i in range(d):
             z[i], y[i] = x[n, i], x[n, i]
-        for j in range(d if states else 0):
+        for j in range(d if places.states else 0):
             z[j] = complex(x[n, j], _TINY)
             complex_function(t[n], z, w, out)
             z[j] = x[n, j]
             for i in range(d):
                 column[i] = out[i].imag / _TINY
-            size = max(abs(x[n, j]), scales[j])
-            if _correct(function, t[n], y, q, y, j, size, f[n], above, below, orders, best, error,
-                        column):
+            size = max(abs(x[n, j]), places.scales[j])
+            if _correct(function, place, y, j, size, room):
                 wrong[j] += 1
             for i in range(d):
                 J[n, i, j] = column[i]
@@ -225,45 +286,45 @@ def complex_steps(
             w[at] = p[at]
             for i in range(d):
                 column[i] = out[i].imag / _TINY
-            size = max(abs(p[at]), sizes[at])
-            if _correct(function, t[n], y, q, q, at, size, f[n], above, below, orders, best, error,
-                        column):
+            size = max(abs(p[at]), places.sizes[at])
+            if _correct(function, place, q, at, size, room):
                 wrong[d + a] += 1
             for i in range(d):
                 P[n, i, a] = column[i]
 
 
-@kernel(types.void(i8, vector, matrix, vector, vector, vector, matrix, integers, types.boolean,
-                   matrix, block, block))
-def differences(
-    address, t, x, p, scales, sizes, f, active, states, room, J, P,
-):
-    """Fill J (N, d, d) if ``states``, and P (N, d, a), by extrapolated central differences."""
+@kernel(types.void(i8, PLACES, ROOM, block, block))
+def differences(address, places, room, J, P):
+    """Fill J (N, d, d) if wanted, and P (N, d, a), by extrapolated central differences."""
     function = _rates_at(address)
-    x, p, f, room = borrowed(x), borrowed(p), borrowed(f), borrowed(room)
-    d, k = x.shape[1], len(p)
-    above, below, best, error, y = room[0, :d], room[1, :d], room[2, :d], room[3, :d], room[5, :d]
-    orders, q = room[6:11], room[11, :k]
+    places, room = borrowed(places), borrowed(room)
+    t, x, p, active, best = places.t, places.x, places.p, places.active, room.best
+    d = x.shape[1]
+    y, q = room.y, room.q
     q[:] = p
     for n in range(len(t)):
+        place = _Place(t[n], y, q, places.f[n])
         for i in range(d):
             y[i] = x[n, i]
-        for j in range(d if states else 0):
-            size = max(abs(x[n, j]), scales[j])
-            _extrapolated(function, t[n], y, q, y, j, size, f[n], above, below, orders, best,
-                          error)
+        for j in range(d if places.states else 0):
+            size = max(abs(x[n, j]), places.scales[j])
+            _extrapolated(function, place, y, j, size, room)
             for i in range(d):
                 J[n, i, j] = best[i]
         for a in range(len(active)):
             at = active[a]
-            size = max(abs(p[at]), sizes[at])
-            _extrapolated(function, t[n], y, q, q, at, size, f[n], above, below, orders, best,
-                          error)
+            size = max(abs(p[at]), places.sizes[at])
+            _extrapolated(function, place, q, at, size, room)
             for i in range(d):
                 P[n, i, a] = best[i]
 
 
-def rooms(states: int, parameters: int) -> tuple[Array, NDArray[np.complex128]]:
-    """Room for the work on one place, real and complex."""
-    widest = max(states, parameters)
-    return np.empty((12, widest)), np.empty((3, widest), dtype=complex)
+def room_for(states: int, parameters: int) -> Room:
+    """Room for a function of so many states and parameters."""
+    y, above, below, best, error, column = np.empty((6, states))
+    return Room(y, np.empty(parameters), above, below, np.empty((5, states)), best, error, column)
+
+
+def complex_room_for(states: int, parameters: int) -> NDArray[np.complex128]:
+    """Room (3, max(d, k)) for the complex step of such a function."""
+    return np.empty((3, max(states, parameters)), dtype=complex)
