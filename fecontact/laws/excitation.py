@@ -90,6 +90,13 @@ class Drive:
                 self.motion_y or Harmonic(self.amplitude_y, w))
 
     @property
+    def moves(self) -> tuple[bool, bool]:
+        """Whether the driven ends in x and y act on B, by a spring or a relative dashpot."""
+        relative = self.dashpots == "relative"
+        return (bool(self.stiffness_x or (relative and self.damping_x)),
+                bool(self.stiffness_y or (relative and self.damping_y)))
+
+    @property
     def frequency_hz(self) -> float:
         """Frequency of the excitation [Hz]; zero without one.
 

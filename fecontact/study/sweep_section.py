@@ -224,7 +224,7 @@ class SweepSettings:
         if self.strobe is not None and (self.keep != "none" or self.t_start is not None
                                         or self.summaries not in (_SUMMARIES, ("periods",))):
             raise InputError("SweepSettings: strobe keeps no histories, so that keep, t_start and "
-                             "summaries other than 'periods' cannot stand beside it.")
+                             "summaries other than 'periods' cannot be combined with it.")
         if self.t_start is not None and not math.isfinite(self.t_start):
             raise InputError(f"SweepSettings: t_start = {self.t_start!r} must be finite.")
 

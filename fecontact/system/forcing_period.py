@@ -29,8 +29,7 @@ def common_period(system: ContactSystem) -> float | None:
     drive, ground = system.drive, system.ground
     given: list[tuple[str, Any]] = [
         (f"drive.motion_{axis}", motion)
-        for axis, stiffness, motion in zip("xy", (drive.stiffness_x, drive.stiffness_y),
-                                           drive.motions, strict=True) if stiffness]
+        for axis, acts, motion in zip("xy", drive.moves, drive.motions, strict=True) if acts]
     given += [(f"load.forces.{k}", force.signal) for k, force in enumerate(system.load.forces)]
     periods = []
     for name, source in given:

@@ -160,7 +160,8 @@ def _extrapolated(function, place, moved, at, size, room):
 def _roughness(function, place, moved, at, size, room):
     """Fill ``room.orders[0]`` with how much the rates jump beside x.
 
-    That is their rounding, cancellation included. It shows in second differences over steps, 1e-6 and less, over which the function is straight.
+    That is their rounding, cancellation included. It shows in second differences over steps, 1e-6
+    and less, over which the function is straight.
     """
     t, y, q = place.t, place.y, place.q
     above, below, orders = room.above, room.below, room.orders
