@@ -39,7 +39,7 @@ class Row:
     nodes: int
     modes: int
     deflection: float
-    peak_pressure: float
+    peak_pressure: float  # [Pa]
     contact_share: float
     middle_force: float
     stick_share: float = float("nan")
@@ -79,7 +79,7 @@ def row(element_size: float, nodes: int, *, spread: bool = True, moving: bool = 
         stick = float(((run.contact_state == 1).mean(axis=0) * share).sum())
         slipped = float(run.displacement("B")[:, 0].max())
     return Row(element_size, nodes, basis.modes, -float(basis.T[1, 1] @ q),
-               float((force / basis.tributary).max()), float(share[force > 0.0].sum()),
+               float((force / basis.contact_areas).max()), float(share[force > 0.0].sum()),
                float(force[middle].sum()), stick, slipped)
 
 
@@ -87,13 +87,13 @@ def main(quick: bool = False) -> None:
     """Print the tables."""
     meshes = ((0.010, 10), (0.005, 20), (0.0025, 40), (0.00125, 80))[: 2 if quick else 4]
     print("| element [mm] | nodes | coordinates | deflection at the load [um] | peak pressure "
-          "[N/mm] | face in contact | force on the middle fifth [N] | sticking | "
+          "[MPa] | face in contact | force on the middle fifth [N] | sticking | "
           "largest x of B [um] |")
     print("|" + "---|" * 9)
     for size, nodes in meshes:
         r = row(size, nodes, moving=nodes <= (10 if quick else 40))
         print(f"| {1e3 * size:g} | {nodes} | {r.modes} | {1e6 * r.deflection:.3f} | "
-              f"{1e-3 * r.peak_pressure:.2f} | {r.contact_share:.1%} | {r.middle_force:.1f} | "
+              f"{1e-6 * r.peak_pressure:.3f} | {r.contact_share:.1%} | {r.middle_force:.1f} | "
               f"{r.stick_share:.1%} | {1e6 * r.slipped:.2f} |".replace("nan%", "-")
               .replace("nan", "-"))
     print("\n| element [mm] | deflection under a load on one node [um] |\n|---|---|")

@@ -14,8 +14,8 @@ Point = str | int | tuple[float, float]
 
 _OF_POINTS = {"displacement": "m", "velocity": "m/s"}
 _OF_NODES = {"normal_force": "N", "friction_force": "N", "penetration": "m",
-             "penetration_rate": "m/s", "slip_velocity": "m/s", "pressure": "N/m",
-             "friction_work": "J"}
+             "penetration_rate": "m/s", "slip_velocity": "m/s", "line_load": "N/m",
+             "pressure": "Pa", "friction_work": "J"}
 _TOTALS = {"total_normal_force": "normal_force", "total_friction_force": "friction_force",
            "total_friction_work": "friction_work"}
 _COMPONENTS = {"x": 0, "y": 1, "phi": 2}
@@ -47,9 +47,9 @@ def history(
         The run.
     quantity : str
         'displacement' or 'velocity' of any point; 'normal_force', 'friction_force',
-        'penetration', 'penetration_rate', 'slip_velocity', 'pressure' or 'friction_work' of a
-        contact node; 'total_normal_force', 'total_friction_force' or 'total_friction_work' of the
-        whole face.
+        'penetration', 'penetration_rate', 'slip_velocity', 'line_load', 'pressure' or
+        'friction_work' of a contact node; 'total_normal_force', 'total_friction_force' or
+        'total_friction_work' of the whole face.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
     component : 'x', 'y' or 'phi'
@@ -59,7 +59,7 @@ def history(
     ------
     InputError
         For a quantity, point or component that does not exist, and for a contact quantity at a
-        point that is not a contact node.
+        point that is not a contact node; for the pressure, if the basis has no thickness.
     """
     require_kind("history", Trajectory, trajectory=trajectory)
     if quantity not in QUANTITIES:

@@ -1,4 +1,4 @@
-"""Impacts: contact phases with velocities, restitution and forces; rest after chatter."""
+"""Impacts: contact phases with impulse, energy taken and velocities; rest after chatter."""
 
 import math
 from dataclasses import dataclass, fields
@@ -37,6 +37,10 @@ class Impacts:
         Largest total normal force [N].
     impulse : (k,) array
         Integral of the total normal force [N s].
+    energy_taken : (k,) array
+        Energy that the normal contact takes from the motion and does not give back by the end of
+        the phase [J]: the integral of the sum of F u' over the nodes. For one mass m that strikes
+        at v and leaves at e v it is ``m v^2 (1 - e^2) / 2``, and the impulse ``m (1 + e) v``.
     """
 
     touch_down: Array
@@ -45,6 +49,7 @@ class Impacts:
     separation_velocity: Array
     peak_force: Array
     impulse: Array
+    energy_taken: Array
 
     def __len__(self) -> int:
         return len(self.touch_down)
@@ -61,7 +66,9 @@ class Impacts:
     def restitution(self) -> Array:
         """Separation velocity over impact velocity (k,): 1 for an elastic impact of one mass.
 
-        It may exceed 1 for a body that returns vibration energy from earlier impacts.
+        It is a ratio of means over the face, not one of energies: for an elastic body it may
+        exceed 1, even where the contact takes energy, as vibration returns what earlier impacts
+        put into it. Impulse and :attr:`energy_taken` describe such an impact.
         """
         return self.separation_velocity / self.impact_velocity
 
@@ -132,13 +139,17 @@ def find_impacts(
 
     phase, pieces = motion.pieces()
     part = np.broadcast_to(_PARTS, (len(phase), len(_PARTS)))
-    force = motion.law_force(*pieces.between(part)).sum(axis=-1)
-    impulse, peak = np.zeros(len(begins)), np.zeros(len(begins))
+    penetration, velocity = pieces.between(part)
+    node_force = motion.law_force(penetration, velocity)
+    force, power = node_force.sum(axis=-1), (node_force * velocity).sum(axis=-1)
+    impulse, energy, peak = np.zeros((3, len(begins)))
     np.add.at(impulse, phase, (pieces.t1 - pieces.t0) * (force @ _WEIGHTS))
+    np.add.at(energy, phase, (pieces.t1 - pieces.t0) * (power @ _WEIGHTS))
     # The force of a two-sided stop may be of either sign.
     np.maximum.at(peak, phase, np.abs(force).max(axis=1, initial=0.0))
     side = np.where(impulse < 0.0, -1.0, 1.0)
-    phases = Impacts(begins, ends, side * begin_rate, -side * end_rate, peak, np.abs(impulse))
+    phases = Impacts(begins, ends, side * begin_rate, -side * end_rate, peak, np.abs(impulse),
+                     energy)
     return _joined(phases, shortest_flight)
 
 
@@ -231,4 +242,4 @@ def _joined(impacts: Impacts, shortest_flight: float) -> Impacts:
     return Impacts(
         impacts.touch_down[first], impacts.lift_off[last], impacts.impact_velocity[first],
         impacts.separation_velocity[last], np.maximum.reduceat(impacts.peak_force, first),
-        np.add.reduceat(impacts.impulse, first))
+        np.add.reduceat(impacts.impulse, first), np.add.reduceat(impacts.energy_taken, first))

@@ -387,9 +387,14 @@ class Trajectory(Summarised):
         return coefficient * self.friction_work / (self.system.basis.tributary * width)
 
     @property
-    def pressure(self) -> Array:
+    def line_load(self) -> Array:
         """Normal force per length of the contact face (N, n) [N/m]."""
         return self.normal_force / self.system.basis.tributary
+
+    @property
+    def pressure(self) -> Array:
+        """Normal force per area (N, n) [Pa]; InputError if the basis has no thickness."""
+        return self.normal_force / self.system.basis.contact_areas
 
     @cached_property
     def contact_state(self) -> NDArray[np.int8]:
@@ -436,14 +441,9 @@ class Trajectory(Summarised):
             drive_spring=spring,
             contact=contact,
             bristles=bristles,
-            drive_work=put["drive"],
-            belt_normal_work=put["belt_normal"],
-            belt_friction_work=put["belt_friction"],
-            load_work=put["load"],
-            circulatory_work=put["circulatory"],
             bristle_work=bristles - bristles[0] - put["bristles"],
-            modal_damping=put["modal_damping"],
-            dashpots=put["dashpots"],
-            contact_damping=put["contact_damping"],
-            friction=put["friction"],
+            **{f"{name}_work": put[name] for name in ("drive", "belt_normal", "belt_friction",
+                                                      "load", "circulatory")},
+            **{name: put[name] for name in ("modal_damping", "dashpots", "contact_damping",
+                                            "friction")},
         )

@@ -1,7 +1,7 @@
 from .base import Bound, FrictionLaw, NormalLaw, NotNegative, PerNode, Positive
 from .check import check_law
 from .friction.bristle import BoucWenFriction, DahlFriction, LuGreFriction
-from .friction.maxwell_slip import IwanFriction, JenkinsFriction
+from .friction.maxwell_slip import FourParameterIwanFriction, IwanFriction, JenkinsFriction
 from .friction.stribeck import (
     ConstantFriction,
     CubicFriction,
@@ -39,6 +39,7 @@ __all__ = [
     "ExponentialContact",
     "ExponentialFriction",
     "Flat",
+    "FourParameterIwanFriction",
     "FourierSeries",
     "FrictionLaw",
     "GalvanettoFriction",

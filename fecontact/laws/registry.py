@@ -60,6 +60,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "product": stribeck.ProductFriction,
             "jenkins": maxwell_slip.JenkinsFriction,
             "iwan": maxwell_slip.IwanFriction,
+            "four-parameter-iwan": maxwell_slip.FourParameterIwanFriction,
             "dahl": bristle.DahlFriction,
             "lugre": bristle.LuGreFriction,
             "bouc-wen": bristle.BoucWenFriction,

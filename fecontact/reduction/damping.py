@@ -39,8 +39,10 @@ class Rayleigh:
 class LossFactor:
     """Damping ratios ``D = loss_factor / 2`` of all modes from the loss factor of the material.
 
-    At resonance, the energy lost per cycle is ``2 pi loss_factor`` times the largest elastic
-    energy.
+    This damping is viscous, and right at the resonance of each mode only: there the energy lost
+    per cycle is ``2 pi loss_factor`` times the largest elastic energy, as that of the material is
+    at every frequency. A mode of frequency f_i that moves with another frequency f loses f / f_i
+    times as much: too little below its resonance, too much above.
 
     Parameters
     ----------

@@ -56,6 +56,7 @@ def basis_from_matrices(
     rigid: int | None = None,
     contact_x: ArrayLike | None = None,
     tributary: ArrayLike | None = None,
+    thickness: float | None = None,
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
@@ -84,6 +85,8 @@ def basis_from_matrices(
     contact_x, tributary : (n,) arrays, optional
         Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes
         [m].
+    thickness : float, optional
+        Out-of-plane thickness of the contact face [m], for pressures.
 
     Raises
     ------
@@ -110,13 +113,13 @@ def basis_from_matrices(
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
     return assembled_basis(
-        w, shapes, given, contact_x=contact_x, tributary=tributary,
+        w, shapes, given, contact_x=contact_x, tributary=tributary, thickness=thickness,
         damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
 
 
 def assembled_basis(
     w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
-    tributary: ArrayLike | None,
+    tributary: ArrayLike | None, thickness: float | None,
 ) -> ModalBasis:
     """Modal basis of modes (d, m) without geometry, from rows of the points."""
     n = rows.contact_nodes
@@ -131,6 +134,7 @@ def assembled_basis(
         tributary=_per_node("tributary", 1.0 / n if tributary is None else tributary, n),
         extra=rows.extra,
         groups=rows.groups,
+        thickness=thickness,
     )
 
 

@@ -91,6 +91,7 @@ def basis_from_modes(
     orthogonality: float = 1e-3,
     contact_x: ArrayLike | None = None,
     tributary: ArrayLike | None = None,
+    thickness: float | None = None,
 ) -> ModalBasis:
     """Modal basis from computed or measured mode shapes.
 
@@ -116,6 +117,8 @@ def basis_from_modes(
         Largest accepted product ``|s_i^T M s_j|`` of two mass-normalised shapes.
     contact_x, tributary : (n,) arrays, optional
         As for :func:`~fecontact.basis_from_matrices`.
+    thickness : float, optional
+        Likewise.
 
     Raises
     ------
@@ -149,7 +152,7 @@ def basis_from_modes(
     order = np.argsort(w, kind="stable")
     return assembled_basis(
         w[order], (S * signs)[:, order], stack_restriction(rows, d), contact_x=contact_x,
-        tributary=tributary, damping=_reordered(damping, order, signs))
+        tributary=tributary, thickness=thickness, damping=_reordered(damping, order, signs))
 
 
 def _shapes(shapes: ArrayLike) -> Array:

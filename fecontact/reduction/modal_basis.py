@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, choices, nearest, require_positive
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, span
 
@@ -100,12 +100,15 @@ class ModalBasis(Summarised):
     groups : tuple of (str, int)
         Names of the contact groups and their numbers of nodes, in the order of the nodes; by
         default one group 'contact'.
+    thickness : float or None
+        Out-of-plane thickness of the body [m], which makes pressures of line loads; None where it
+        is not known.
 
     Raises
     ------
     InputError
-        For arrays of wrong shape, values that are not finite, tributary lengths that are not
-        positive, and groups that do not add up to the contact nodes.
+        For arrays of wrong shape, values that are not finite, tributary lengths or a thickness
+        that are not positive, and groups that do not add up to the contact nodes.
     """
 
     angular_frequencies: Array
@@ -117,6 +120,7 @@ class ModalBasis(Summarised):
     mode_shapes: ModeShapes | None = None
     quality: ReductionQuality | None = None
     groups: tuple[tuple[str, int], ...] = ()
+    thickness: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("angular_frequencies", "damping", "T", "positions", "tributary"):
@@ -128,6 +132,9 @@ class ModalBasis(Summarised):
         if not (self.tributary > 0.0).all():
             raise InputError(f"Modal basis: tributary lengths must be above zero, not "
                              f"{self.tributary.min()}.")
+        if self.thickness is not None:
+            require_positive("Modal basis", thickness=self.thickness)
+            object.__setattr__(self, "thickness", float(self.thickness))
         groups = tuple((str(name), int(count)) for name, count in self.groups)
         groups = groups or (("contact", len(self.tributary)),)
         if sum(count for _, count in groups) != len(self.tributary):
@@ -202,6 +209,18 @@ class ModalBasis(Summarised):
     def contact_x(self) -> Array:
         """Reference abscissae X (n,) of the contact nodes [m]."""
         return self.positions[2 : 2 + self.contact_nodes, 0]
+
+    @property
+    def contact_areas(self) -> Array:
+        """Area (n,) of the contact face represented by each contact node [m^2].
+
+        InputError for a basis without thickness.
+        """
+        if self.thickness is None:
+            raise InputError("There are no areas and pressures: the modal basis has no thickness; "
+                             "give thickness=... [m] where the basis is made, or use the "
+                             "line load [N/m].")
+        return self.tributary * self.thickness
 
     def point_index(self, point: str | int) -> int:
         """Index into ``T`` of B, C, a further named point, or a contact node by its number.

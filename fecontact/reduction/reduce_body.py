@@ -120,6 +120,7 @@ def modal_basis(
         ),
         quality=_quality(body, system, flexibility, w, free_shapes, vibration),
         groups=face.groups,
+        thickness=body.thickness,
     )
 
 

@@ -195,8 +195,13 @@ def peak_friction_force(trajectory: Trajectory) -> float:
     return float(np.abs(trajectory.friction_force.sum(axis=1)).max())
 
 
-def peak_pressure(trajectory: Trajectory) -> float:
+def peak_line_load(trajectory: Trajectory) -> float:
     """Largest normal force per length of the contact face."""
+    return float(trajectory.line_load.max())
+
+
+def peak_pressure(trajectory: Trajectory) -> float:
+    """Largest normal force per area of the contact face."""
     return float(trajectory.pressure.max())
 
 
@@ -277,9 +282,9 @@ SUMMARIES: Mapping[str, Summary] = {
         (largest_displacement, "m"), (amplitude_x, "m"), (amplitude_y, "m"),
         (rms_velocity, "m/s"), (stick_fraction, ""), (slip_fraction, ""), (open_fraction, ""),
         (mean_normal_force, "N"), (peak_normal_force, "N"), (mean_friction_force, "N"),
-        (peak_friction_force, "N"), (peak_pressure, "N/m"), (friction_power, "W"),
-        (belt_power, "W"), (wear_depth, "m"), (wear_rate, "m/s"), (dominant_frequency, "Hz"),
-        (periods, ""), (lyapunov_exponent, "1/s"), (end_time, "s"),
+        (peak_friction_force, "N"), (peak_line_load, "N/m"), (peak_pressure, "Pa"),
+        (friction_power, "W"), (belt_power, "W"), (wear_depth, "m"), (wear_rate, "m/s"),
+        (dominant_frequency, "Hz"), (periods, ""), (lyapunov_exponent, "1/s"), (end_time, "s"),
         (energy_imbalance, ""),
     )
 }

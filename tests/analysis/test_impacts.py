@@ -16,7 +16,13 @@ from fecontact import (
 )
 from fecontact.analysis import find_impacts, find_rests
 from fecontact.integrate import SetValued
-from fecontact.laws import ExponentialFriction, LinearContact, PowerContact, RoughSurface
+from fecontact.laws import (
+    ExponentialFriction,
+    LinearContact,
+    PowerContact,
+    RestitutionContact,
+    RoughSurface,
+)
 
 MASS, C, R, V0 = 0.1, 1e6, 1e-4, 0.05
 DEEPEST = (3.0 * MASS * V0**2 * R / C) ** (1.0 / 3.0)
@@ -51,6 +57,9 @@ def test_restitution_of_uniform_roughness(b, restitution, outputs):
     assert found.impact_velocity == pytest.approx([V0], rel=error)
     assert found.restitution == pytest.approx([restitution], rel=error)
     assert found.impulse == pytest.approx([MASS * V0 * (1.0 + restitution)], rel=error)
+    taken = 0.5 * MASS * V0**2 * (1.0 - restitution**2)
+    assert found.energy_taken == pytest.approx([taken], rel=20.0 * error)
+    assert found.energy_taken == pytest.approx([run.energies.contact_damping[-1]], rel=20.0 * error)
 
 
 @pytest.mark.parametrize(("law", "product", "deepest", "peak"), [
@@ -63,6 +72,7 @@ def test_duration_and_peak_of_elastic_impacts(law, product, deepest, peak):
     assert found.duration == pytest.approx([product * deepest / V0], rel=1e-5)
     assert found.restitution == pytest.approx([1.0], rel=1e-5)
     assert found.impulse == pytest.approx([2.0 * MASS * V0], rel=1e-5)
+    assert found.energy_taken == pytest.approx([0.0], abs=1e-5 * 0.5 * MASS * V0**2)
     assert found.peak_force == pytest.approx([peak], rel=1e-3)
 
 
@@ -72,7 +82,32 @@ def test_restitution_of_hunt_crossley_contact(product, restitution):
     """Its damping ends with the penetration, from where the node flies on."""
     system = ball(PowerContact(1e9, 1.5, damping_factor=product / V0))
     run = simulate(system, 0.002, initial=state(1e-5, -V0), outputs=401, rtol=1e-8)
-    assert find_impacts(run).restitution == pytest.approx([restitution], rel=1e-4)
+    found = find_impacts(run)
+    assert found.restitution == pytest.approx([restitution], rel=1e-4)
+    taken = 0.5 * MASS * V0**2 * (1.0 - restitution**2)
+    assert found.energy_taken == pytest.approx([taken], rel=2e-4)
+
+
+@pytest.mark.parametrize(("model", "e", "product"), [
+    ("exact", 0.9, 0.16648195), ("exact", 0.5, 1.43275053),
+    ("hunt-crossley", 0.9, 0.15), ("hunt-crossley", 0.5, 0.75),
+    ("lankarani-nikravesh", 0.9, 0.1425), ("lankarani-nikravesh", 0.5, 0.5625),
+    ("flores", 0.9, 0.17777777778), ("flores", 0.5, 1.6)])
+def test_impact_with_each_damping_model(model, e, product):
+    """The factor is the published one; the impact has the restitution that belongs to it."""
+    law = RestitutionContact(1e9, e, V0, damping_model=model)
+    assert law.damping_factor == pytest.approx(product / V0, rel=1e-7)
+    got = brentq(lambda e: product * (1.0 + e) - np.log1p(product) + np.log1p(-product * e),
+                 0.0, min(1.0, (1.0 - 1e-9) / product), xtol=1e-12)
+    if model == "exact":
+        assert got == pytest.approx(e, rel=1e-7)
+    else:
+        assert abs(got - e) > 5e-3
+    run = simulate(ball(law), 0.002, initial=state(1e-5, -V0), outputs=801, rtol=1e-8)
+    found = find_impacts(run)
+    assert found.restitution == pytest.approx([got], rel=1e-4)
+    assert found.impulse == pytest.approx([MASS * V0 * (1.0 + got)], rel=1e-4)
+    assert found.energy_taken == pytest.approx([0.5 * MASS * V0**2 * (1.0 - got**2)], rel=1e-3)
 
 
 ZETA, RESTITUTION, HEIGHT, WEIGHT = 0.2, 0.5717400276, 1e-3, 10.0
@@ -146,6 +181,7 @@ def test_flights_shorter_than_asked_for_are_passed_over():
     assert np.isnan(joined.restitution[3])
     assert joined.impulse.sum() == pytest.approx(found.impulse.sum())
     assert joined.impulse[3] == pytest.approx(found.impulse[3:].sum())
+    assert joined.energy_taken[3] == pytest.approx(found.energy_taken[3:].sum())
 
 
 @pytest.mark.parametrize("outputs", [101, 301, 1001])

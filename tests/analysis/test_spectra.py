@@ -109,6 +109,7 @@ def test_histories_by_name():
         ("velocity", 3, "phi"): (trajectory.velocity(3)[:, 2], "rad/s"),
         ("normal_force", 2, "x"): (trajectory.normal_force[:, 2], "N"),
         ("total_friction_force", "B", "x"): (trajectory.friction_force.sum(axis=1), "N"),
+        ("line_load", 1, "x"): (trajectory.line_load[:, 1], "N/m"),
         ("penetration_rate", 0, "x"): (trajectory.penetration_rate[:, 0], "m/s"),
     }
     for given, (values, unit) in cases.items():
@@ -118,8 +119,10 @@ def test_histories_by_name():
     assert history(trajectory, "velocity", 3, "y").title == "velocity y of contact node 3"
     with pytest.raises(InputError, match=r"quantity = 'speed' is not known.*choose from"):
         history(trajectory, "speed")
+    with pytest.raises(InputError, match="the modal basis has no thickness"):
+        history(trajectory, "pressure", 1)
     with pytest.raises(InputError, match="one of contact nodes, not of point = 'B'"):
-        history(trajectory, "pressure")
+        history(trajectory, "line_load")
     with pytest.raises(InputError, match="component = 'z' is not one of B"):
         history(trajectory, "velocity", "B", "z")
     with pytest.raises(InputError, match="Contact node 7"):

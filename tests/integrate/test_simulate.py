@@ -397,9 +397,19 @@ def test_states_of_nodes():
     assert run.contact_state[:, 0].tolist() == [S, S, S, G, G, G, O]
 
 
-def test_pressure_is_force_per_length():
+def test_line_load_is_force_per_length_and_pressure_force_per_area():
     run = simulate(beam(), 0.001, outputs=2)
-    assert run.pressure == pytest.approx(run.normal_force / 0.05, rel=1e-12)
+    assert run.line_load == pytest.approx(run.normal_force / 0.05, rel=1e-12)
+    thickness = run.system.basis.thickness
+    assert run.pressure == pytest.approx(run.normal_force / (0.05 * thickness), rel=1e-12)
+    assert run.system.basis.select([0, 1, 3]).thickness == thickness
+
+
+def test_without_thickness_there_is_no_pressure():
+    run = simulate(oscillator(), 0.01, outputs=2)
+    assert run.line_load == pytest.approx(run.normal_force)
+    with pytest.raises(InputError, match=r"no thickness; give thickness=\.\.\. \[m\]"):
+        _ = run.pressure
 
 
 # Starts ------------------------------------------------------------------------------------------

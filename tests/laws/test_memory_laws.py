@@ -11,6 +11,7 @@ from fecontact import InputError
 from fecontact.laws import (
     BoucWenFriction,
     DahlFriction,
+    FourParameterIwanFriction,
     IwanFriction,
     JenkinsFriction,
     LuGreFriction,
@@ -19,6 +20,8 @@ from fecontact.laws import (
 LAWS = [
     JenkinsFriction(2e6, 0.4), JenkinsFriction((2e6, 1e6), (0.4, 0.7), 1e-7),
     IwanFriction(2e6, 0.4, elements=5), IwanFriction(2e6, 0.4, elements=1),
+    FourParameterIwanFriction(2e6, 0.4, elements=2),
+    FourParameterIwanFriction((2e6, 1e6), 0.4, chi=-0.8, beta=0.0, elements=2, spacing_ratio=1.5),
     DahlFriction(0.4, 2e5), DahlFriction((0.4, 0.5), 2e5, 1.5), DahlFriction(0.4, 2e5, 2.0),
     LuGreFriction(), LuGreFriction(0.8, 0.5, 2e-3, 1.0, 1e5, 30.0, 20.0),
     LuGreFriction(0.8, 0.5, 2e-3, 0.7, 1e5, 30.0, 0.0, 10.0),
@@ -139,6 +142,73 @@ def test_many_iwan_elements_follow_the_parabola():
     R = [memory_outputs(law, 1.0, 25.0, np.full(200, value), p)[0][0] for value in x]
     smooth = np.where(x < 2.0 * limit / k, k * x - (k * x) ** 2 / (4.0 * limit), limit)
     np.testing.assert_allclose(R, smooth, atol=1e-4 * limit)
+
+
+# Segalman's numbers: F_S = 3 N, K_T = 2 N/m, chi = -0.1, beta = 0.1.
+CHI, BETA, PHI_MAX = -0.1, 0.1, 2.87614679
+
+
+def joint(elements, spacing_ratio, chi=CHI, beta=BETA):
+    return FourParameterIwanFriction(2.0, 0.6, 1e-4, chi=chi, beta=beta, elements=elements,
+                                     spacing_ratio=spacing_ratio)
+
+
+def first_loading(law, x, F=5.0):
+    p = parameters(law)[0]
+    return memory_outputs(law, 0.0, F, np.full(law.memory, x), p)[0][0]
+
+
+def loss_of_elements(law, X, F=5.0):
+    """Sum of 4 L (X - L / k) over the elements that slide, of limit L and stiffness k."""
+    springs, limits = law.shares
+    stiffness, limit = 2.0 * springs, 0.6 * F * limits
+    return float((4.0 * limit * np.maximum(0.0, X - limit / stiffness)).sum())
+
+
+@pytest.mark.parametrize(("elements", "ratio", "error"), [(50, 1.1, 2e-3), (400, 1.01, 1e-4)])
+def test_four_parameter_iwan_follows_segalmans_closed_forms(elements, ratio, error):
+    law = joint(elements, ratio)
+    assert first_loading(law, 0.1 * PHI_MAX) == pytest.approx(0.540580035, rel=error)
+    assert loss_of_elements(law, 0.5 * PHI_MAX) == pytest.approx(1.31650745, rel=error)
+    # Macroslip begins at phi_max, from a kink: the delta is the last element that slides.
+    springs, limits = law.shares
+    assert 3.0 * limits[-1] / (2.0 * springs[-1]) == pytest.approx(PHI_MAX, rel=1e-8)
+    for x in (PHI_MAX, 2.0 * PHI_MAX):
+        assert first_loading(law, x) == pytest.approx(3.0, rel=1e-9)
+    left = (3.0 - first_loading(law, 0.999 * PHI_MAX)) / (1e-3 * PHI_MAX)
+    assert left == pytest.approx(2.0 * BETA / (1.0 + BETA), rel=1e-5)
+    assert first_loading(law, 1e-6 * PHI_MAX) == pytest.approx(2e-6 * PHI_MAX, rel=1e-12)
+    # The normal force scales F_S, and phi_max with it.
+    assert first_loading(law, 0.2 * PHI_MAX, 10.0) == pytest.approx(
+        2.0 * first_loading(law, 0.1 * PHI_MAX), rel=1e-12)
+
+
+@pytest.mark.parametrize(("chi", "beta"), [(-0.8, 0.0), (-0.5, 0.1), (-0.1, 1.0)])
+def test_loss_exponent_is_three_plus_chi(chi, beta):
+    law = joint(60, 1.1, chi, beta)
+    arm = (chi + 1.0) / (chi + 2.0)
+    largest = 3.0 * (1.0 + beta) / (2.0 * (beta + arm))
+    r = 3.0 * (chi + 1.0) / (largest ** (chi + 2.0) * (beta + arm))
+    sizes = largest * np.array([0.01, 0.03, 0.1, 0.3])
+    losses = np.array([loss_of_elements(law, X) for X in sizes])
+    exact = 4.0 * r * sizes ** (chi + 3.0) / ((chi + 2.0) * (chi + 3.0))
+    assert losses == pytest.approx(exact, rel=0.01)
+    assert np.polyfit(np.log(sizes), np.log(losses), 1)[0] == pytest.approx(3.0 + chi, abs=0.005)
+
+
+def test_default_elements_keep_the_stated_error():
+    law, fine = joint(16, 1.3), joint(2000, 1.005)
+    for part in (0.02, 0.05, 0.1, 0.2, 0.5, 0.9):
+        X = part * PHI_MAX
+        assert loss_of_elements(law, X) == pytest.approx(loss_of_elements(fine, X), rel=0.06)
+
+
+def test_cycle_of_four_parameter_iwan_loses_what_its_elements_do():
+    """By the rates of the law, over a harmonic cycle; the elements relax within tau."""
+    law = joint(6, 1.5)
+    x, R, _ = to_and_fro(law, 0.5 * PHI_MAX, 5.0, points=1001)
+    assert loss(x, R) == pytest.approx(loss_of_elements(law, 0.5 * PHI_MAX), rel=1e-3)
+    assert loss(x, R) == pytest.approx(1.31650745, rel=0.05)
 
 
 def test_stiffness_is_shared_and_friction_does_not_depend_on_the_sharing():
@@ -284,6 +354,12 @@ def test_scales_are_those_of_the_pre_sliding_deflection():
     (IwanFriction, {"elements": 2.5}, "elements = 2.5 must be a whole number"),
     (IwanFriction, {"elements": (2, 3)}, "elements"),
     (IwanFriction, {"elements": "many"}, "elements = 'many' must be a number"),
+    (FourParameterIwanFriction, {"chi": -1.0}, "chi = -1.0 must be above -1 and at most 0"),
+    (FourParameterIwanFriction, {"chi": 0.1}, "chi = 0.1 must be above -1 and at most 0"),
+    (FourParameterIwanFriction, {"beta": -0.1}, "beta = -0.1 must be zero or above"),
+    (FourParameterIwanFriction, {"beta": (0.1, 0.2)}, "must be a number"),
+    (FourParameterIwanFriction, {"spacing_ratio": 0.9}, "spacing_ratio = 0.9 must be one or above"),
+    (FourParameterIwanFriction, {"elements": 0}, "elements = 0 must be a whole number"),
     (DahlFriction, {"exponent": 0.5}, "DahlFriction: exponent = 0.5 must be one or above"),
     (DahlFriction, {"presliding_stiffness": 0.0}, "presliding_stiffness"),
     (LuGreFriction, {"static_coefficient": 0.2}, "must be at least kinetic_coefficient = 0.55"),
@@ -298,4 +374,6 @@ def test_values_are_checked(kind, values, message):
 
 def test_number_of_elements_is_whole():
     assert IwanFriction(elements=4.0).memory == 4
-    assert IwanFriction().table(np.ones(1)).shape == (1, 4)
+    assert IwanFriction().table(np.ones(1)).shape == (1, 17)
+    assert FourParameterIwanFriction(elements=3.0).memory == 4
+    assert FourParameterIwanFriction(elements=3, beta=0.0).memory == 3

@@ -1,6 +1,7 @@
 """Runs in other formats, read back by other libraries."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ def test_csv_reads_back_to_the_last_bit(trajectory, tmp_path):
         "C velocity phi [rad/s]": trajectory.velocity("C")[:, 2],
         "node 2 displacement y [m]": trajectory.displacement(2)[:, 1],
         "node 1 normal force [N]": trajectory.normal_force[:, 1],
+        "node 1 friction force on the body in -x [N]": trajectory.friction_force[:, 1],
         "node 0 contact state [0 open, 1 stick, 2 slip]": trajectory.contact_state[:, 0],
         "energy kinetic [J]": trajectory.energies.kinetic,
     }
@@ -49,6 +51,13 @@ def test_mat_holds_arrays_names_and_units(trajectory, tmp_path):
                                atol=1e-20)
     assert list(content["point"]) == ["B", "C"]
     assert content["units"]["slip_velocity"] == "m/s"
+    np.testing.assert_array_equal(content["line_load"], trajectory.line_load)
+    assert content["units"]["line_load"] == "N/m"
+    assert "pressure" not in content
+    thick = run(replace(trajectory.system.basis, thickness=0.01), times=3)
+    content = loadmat(export.export_mat(thick, tmp_path / "thick.mat"), simplify_cells=True)
+    np.testing.assert_allclose(content["pressure"], 100.0 * thick.line_load)
+    assert content["units"]["pressure"] == "Pa"
     assert content["status"] == "The run reached its end."
 
 
@@ -63,7 +72,8 @@ def test_xarray_has_named_dimensions(trajectory, tmp_path):
             assert dataset.friction_force.dims == ("time", "node")
             np.testing.assert_array_equal(dataset.friction_force, trajectory.friction_force)
             np.testing.assert_array_equal(dataset.node_x, trajectory.system.basis.contact_x)
-            assert dataset.friction_force.attrs["units"] == "N"
+            assert dataset.friction_force.attrs == {
+                "units": "N", "long_name": "friction force on the body in -x"}
             late = dataset.sel(time=slice(0.01, None))
             assert late.sizes["time"] == np.count_nonzero(trajectory.time >= 0.01)
 

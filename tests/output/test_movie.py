@@ -1,4 +1,5 @@
 import signal
+from dataclasses import replace
 from itertools import islice, pairwise
 
 import imageio_ffmpeg
@@ -192,6 +193,30 @@ def test_contact_nodes_show_their_states_and_forces():
     lean = slanted[slanted[:, 0] < top + 5][:, 1].mean() \
         - slanted[slanted[:, 0] > bottom - 5][:, 1].mean()
     assert lean > 5
+    # Belt, arrow and number agree: slip back, R below zero, which in -x is a force in +x.
+    assert motion.ground_speed == pytest.approx(0.02)
+    assert (trajectory.slip_velocity[2] < 0.0).all()
+    assert (trajectory.friction_force[2] < 0.0).all()
+    assert (motion.forces[2, :, 0] == -trajectory.friction_force[2]).all()
+
+
+def test_arrows_lean_with_the_slope_of_waves():
+    """Without friction the contact force is normal to the wavy ground."""
+    q = np.zeros((2, 5))
+    q[:, 1] = -2e-4
+    trajectory = still(q, waviness=1e-4)
+    system = trajectory.system.with_(friction=ConstantFriction(0.0))
+    for normal, factor in (("surface", 1.0), ("vertical", 0.0)):
+        leaning = type(trajectory)(
+            system.with_(ground=replace(system.ground, normal=normal)), trajectory.time,
+            trajectory.modal_coordinates, trajectory.modal_velocities, trajectory.work)
+        forces = motion_of(leaning).forces
+        assert (forces[:, :, 1] > 0.0).all()
+        k = 2.0 * np.pi / 0.03
+        places = system.basis.contact_x - 0.02 * leaning.time[:, None]
+        slope = 1e-4 * k * np.cos(k * places)
+        np.testing.assert_allclose(forces[:, :, 0], -factor * slope * forces[:, :, 1],
+                                   rtol=1e-6, atol=1e-12)
 
 
 @rendering

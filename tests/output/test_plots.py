@@ -28,7 +28,7 @@ def test_history_shows_each_point_in_suitable_units():
     figure = plot_history(trajectory, ["B", 0, (0.2, 0.02)])
     assert labels(figure) == [
         "displacement x [µm]", "velocity x [mm/s]", "displacement y [µm]", "velocity y [mm/s]",
-        "total normal force [N]", "total friction force [mN]"]
+        "total normal force [N]", "total friction force in -x [mN]"]
     assert [axis.get_xlabel() for axis in figure.axes] == ["", "", "", "", "time [ms]", "time [ms]"]
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend == ["B", "contact node 0", "(0.2, 0.02) m"]
@@ -60,9 +60,14 @@ def test_contact_map_shows_pressure_and_states():
     upper, lower = figure.axes[:2]
     assert upper.get_ylabel() == lower.get_ylabel() == "contact position x [mm]"
     assert lower.get_xlabel() == "time [ms]"
-    assert "contact pressure [N/m]" in labels(figure)
-    np.testing.assert_allclose(mesh_values(upper), trajectory.pressure.T)
+    assert "line load [N/m]" in labels(figure)
+    np.testing.assert_allclose(mesh_values(upper), trajectory.line_load.T)
     assert np.array_equal(mesh_values(lower), trajectory.contact_state.T)
+    thick = run(replace(basis(), thickness=1e-3), times=101)
+    figure = plot_contact_map(thick)
+    assert "contact pressure [kPa]" in labels(figure)
+    np.testing.assert_allclose(1e3 * mesh_values(figure.axes[0]), 1e3 * trajectory.line_load.T)
+    figure = plot_contact_map(trajectory)
     names = [text.get_text() for axis in figure.axes if axis.get_ylabel() == "state"
              for text in axis.get_yticklabels()]
     assert names == ["open", "stick", "slip"]
@@ -104,7 +109,7 @@ def placed(x_mm, length_mm, groups=()):
 
 
 def bands(trajectory):
-    """Ends [mm] of the coloured rows of both maps and, in that order, the pressures shown."""
+    """Ends [mm] of the coloured rows of both maps and, in that order, the line loads shown."""
     found = []
     for axis in plot_contact_map(trajectory).axes[:2]:
         assert axis.get_ylabel() == "contact position x [mm]"
@@ -122,9 +127,9 @@ def test_contact_map_leaves_places_without_contact_face_blank():
     # Faces at 0 to 50 and 150 to 200 mm, the right one given first.
     trajectory = placed([162.5, 187.5, 10.0, 35.0], [25.0, 25.0, 20.0, 30.0],
                         (("right", 2), ("left", 2)))
-    ends, pressure = bands(trajectory)
+    ends, load = bands(trajectory)
     np.testing.assert_allclose(ends, [[0, 20], [20, 50], [150, 175], [175, 200]], atol=1e-9)
-    np.testing.assert_allclose(pressure, trajectory.pressure.T[[2, 3, 0, 1]])
+    np.testing.assert_allclose(load, trajectory.line_load.T[[2, 3, 0, 1]])
 
 
 @pytest.mark.parametrize(("x", "length", "groups", "ends"), [

@@ -52,8 +52,8 @@ def test_impacts_have_their_height(outputs):
     assert drawn(axes[2])[:, 1].min() == pytest.approx(
         -1e3 * SPEED * np.sqrt(MASS / STIFFNESS), rel=0.01)
     assert drawn(axes[3])[:, 1].max() == pytest.approx(1e3 * SPEED, rel=0.01)
-    pressure = np.asarray(plot_contact_map(run).axes[0].collections[0].get_array())
-    assert pressure.max() == pytest.approx(highest, rel=0.01)
+    load = np.asarray(plot_contact_map(run).axes[0].collections[0].get_array())
+    assert load.max() == pytest.approx(highest, rel=0.01)
 
 
 def test_free_oscillation_at_seven_outputs_a_period_is_an_ellipse():

@@ -112,7 +112,8 @@ def test_nodal_contact_forces_add_up_to_the_contact_forces(tmp_path):
 
 @pytest.mark.parametrize("frames", [0, 7])
 def test_read_case_is_equal_to_the_last_bit(tmp_path, frames):
-    written = replace(run(times=31, waviness=3e-6), status=Status.INTERRUPTED,
+    thick = replace(basis(), thickness=0.01)
+    written = replace(run(thick, times=31, waviness=3e-6), status=Status.INTERRUPTED,
                       work=np.random.default_rng(1).normal(size=(31, 8)),
                       statistics={"steps": 12, "seconds": 0.1 + 0.2, "solver": "radau",
                                   "factorisations": np.int64(3), "rtol": np.float64(1e-6)})
@@ -129,6 +130,7 @@ def test_read_case_is_equal_to_the_last_bit(tmp_path, frames):
     for name in ("angular_frequencies", "damping", "T", "positions", "tributary"):
         assert np.array_equal(getattr(read.system.basis, name),
                               getattr(written.system.basis, name)), name
+    assert read.system.basis.thickness == written.system.basis.thickness
     for name in ("nodes", "cells", "outline", "shapes", "stress"):
         assert np.array_equal(getattr(read.system.basis.mode_shapes, name),
                               getattr(written.system.basis.mode_shapes, name)), name

@@ -52,7 +52,7 @@ def test_displacements_and_velocities(run):
 
 def test_contact(run):
     found = values(run, "open_fraction", "slip_fraction", "stick_fraction", "mean_normal_force",
-                   "peak_normal_force", "peak_pressure", "peak_friction_force",
+                   "peak_normal_force", "peak_line_load", "peak_friction_force",
                    "mean_friction_force")
     force = STIFFNESS * DEPTH  # all nodes together
     assert found["open_fraction"] == pytest.approx(0.5, abs=2e-4)
@@ -60,7 +60,7 @@ def test_contact(run):
     assert found["stick_fraction"] < 1e-3
     assert found["peak_normal_force"] == pytest.approx(force, rel=1e-4)
     assert found["mean_normal_force"] == pytest.approx(0.5 * force, rel=2e-4)
-    assert found["peak_pressure"] == pytest.approx(force / 0.2, rel=1e-4)
+    assert found["peak_line_load"] == pytest.approx(force / 0.2, rel=1e-4)
     assert found["peak_friction_force"] == pytest.approx(MU * force, rel=1e-4)
     # faster than the belt for arccos(V / amplitude) / pi of each turn
     forward = np.arccos(V / (1e-4 * 2.0 * np.pi * 400.0)) / np.pi

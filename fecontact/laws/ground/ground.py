@@ -139,6 +139,12 @@ class Ground:
         require_finite("Ground", time=time)
         return self._shape.height(as_floats(abscissa, "Ground: abscissa") - self.travel(time))
 
+    def slope(self, abscissa: ArrayLike, time: float = 0.0) -> Array:
+        """Slope at abscissae of the inertial frame [m] at a time [s]."""
+        require_finite("Ground", time=time)
+        places = as_floats(abscissa, "Ground: abscissa") - self.travel(time)
+        return self._shape.shape(places)[..., 1].copy()
+
     def travel(self, time: float) -> float:
         """Travel [m] since t = 0 at a time [s]."""
         return float(self.motion_kernel.python(float(time), self.motion_parameters())[0])

@@ -1,16 +1,24 @@
-"""Normal laws that are a power of the penetration, with damping proportional to the force."""
+"""Normal laws that are a power of the penetration, with damping proportional to the force.
+
+Hertz: exponent 3/2 for a point contact; 10/9 approximates a line contact.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 
+from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
-from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, PerNode, Positive, UpToOne
+from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive, UpToOne
 from fecontact.laws.signatures import normal_law
 
-DampingModel = Literal["hunt-crossley", "lankarani-nikravesh", "flores"]
+DampingModel = Literal["exact", "hunt-crossley", "lankarani-nikravesh", "flores"]
+
+EXPONENTS = {"point": 1.5, "line": 10.0 / 9.0}
+Exponent = Annotated[PerNode | Literal["point", "line"],
+                     Bound("one or above", lambda x: x >= 1.0)]
 
 
 @normal_law
@@ -41,13 +49,14 @@ class _Power(NormalLaw):
     ----------
     stiffness : float or (n,) sequence
         K of the whole face, or of each node, positive [N/m^n].
-    exponent : float or (n,) sequence
-        n, one or above.
+    exponent : float, (n,) sequence, "point" or "line"
+        n, one or above; by name 3/2 for point contact and 10/9 for line contact.
     damping_factor : float or (n,) sequence
         chi, zero or above [s/m].
     """
 
     kernel: ClassVar = _power
+
 
     @property
     def penetration_scale(self) -> float:
@@ -63,26 +72,44 @@ class _Power(NormalLaw):
         return np.asarray(scale * length / (exponent + 1.0) * s ** (exponent + 1.0))
 
 
+class _Hertz(_Power):
+    """Laws whose exponent may be given by the kind of contact."""
+
+    def __post_init__(self) -> None:
+        given = getattr(self, "exponent")  # noqa: B009 - the field of subclasses
+        if isinstance(given, str):
+            if given not in EXPONENTS:
+                raise InputError(f"{type(self).__name__}: exponent = {given!r} must be a number or "
+                                 f"{choices(EXPONENTS)}{nearest(given, EXPONENTS)}.")
+            object.__setattr__(self, "exponent", EXPONENTS[given])
+        super().__post_init__()
+
+
 @dataclass(frozen=True)
-class PowerContact(_Power):
-    r"""Hertz-type contact with Hunt-Crossley damping.
+class PowerContact(_Hertz):
+    r"""Hertz-type point or line contact with Hunt-Crossley damping.
 
     .. math:: F = K u^n \max(0,\ 1 + \chi v), \qquad u > 0
 
-    u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile;
-    n = 3/2 is a sphere on a plane, n = 1 a linear spring. Damping is proportional to the elastic
-    force, so that F is continuous at first contact.
+    u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
+    n = 3/2 is Hertz's point contact, as of a sphere on a plane; n = 10/9, after Palmgren, is close
+    to a line contact, as of a roller, whose approach has no exact power; n = 1 is a linear spring.
+    Damping is proportional to the elastic force, so that F is continuous at first contact.
+
+    A plane finite-element body already has the compliance of its own line contact, as far as its
+    basis resolves it: a Hertz law on top counts it twice.
 
     References
     ----------
     K. H. Hunt, F. R. E. Crossley, Coefficient of restitution interpreted as damping in
-    vibroimpact, J. Appl. Mech. 42 (1975) 440-445.
+    vibroimpact, J. Appl. Mech. 42 (1975) 440-445. T. A. Harris, M. N. Kotzalas, Essential Concepts
+    of Bearing Technology, 5th ed., CRC Press (2006), for the exponent 10/9.
     """
 
     extensive: ClassVar = frozenset({"stiffness"})
 
     stiffness: Annotated[Positive, Unit("N/m^n")]
-    exponent: OneOrAbove = 1.5
+    exponent: Exponent = 1.5
     damping_factor: Annotated[NotNegative, Unit("s/m")] = 0.0
 
     def table(self, share: Array) -> Array:
@@ -91,35 +118,38 @@ class PowerContact(_Power):
 
 
 @dataclass(frozen=True)
-class RestitutionContact(_Power):
-    r"""Hertz-type contact whose damping is given by a coefficient of restitution e.
+class RestitutionContact(_Hertz):
+    r"""Hertz-type point or line contact, damping given by a coefficient of restitution e.
 
     .. math:: F = K u^n \max(0,\ 1 + \chi v), \qquad u > 0
 
     with chi from e and the impact velocity v_r to which it applies, by the damping model:
 
-    - ``hunt-crossley``: an impact at v_r has exactly the restitution e,
+    - ``exact``: an impact of one mass at v_r has the restitution e,
       chi v_r (1 + e) = ln[(1 + chi v_r) / (1 - chi e v_r)];
+    - ``hunt-crossley``: chi = 3 (1 - e) / (2 v_r), as published, for e close to one;
     - ``lankarani-nikravesh``: chi = 3 (1 - e^2) / (4 v_r), for e close to one;
     - ``flores``: chi = 8 (1 - e) / (5 e v_r), approximate for all e.
 
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
+    For the exponent and finite-element bodies see :class:`PowerContact`.
 
     Parameters
     ----------
     restitution : float or (n,) sequence
-        e, above zero and at most 1; with Lankarani-Nikravesh also zero.
+        e, above zero and at most 1; with Hunt-Crossley and Lankarani-Nikravesh also zero.
     reference_velocity : float or (n,) sequence
         v_r, positive [m/s].
-    damping_model : {"hunt-crossley", "lankarani-nikravesh", "flores"}
+    damping_model : {"exact", "hunt-crossley", "lankarani-nikravesh", "flores"}
         Relation between chi and e.
 
     References
     ----------
-    H. M. Lankarani, P. E. Nikravesh, A contact force model with hysteresis damping for impact
-    analysis of multibody systems, J. Mech. Des. 112 (1990) 369-376. P. Flores et al., On the
-    continuous contact force models for soft materials in multibody dynamics, Multibody Syst. Dyn.
-    25 (2011) 357-375.
+    K. H. Hunt, F. R. E. Crossley, Coefficient of restitution interpreted as damping in
+    vibroimpact, J. Appl. Mech. 42 (1975) 440-445. H. M. Lankarani, P. E. Nikravesh, A contact
+    force model with hysteresis damping for impact analysis of multibody systems, J. Mech. Des. 112
+    (1990) 369-376. P. Flores et al., On the continuous contact force models for soft materials in
+    multibody dynamics, Multibody Syst. Dyn. 25 (2011) 357-375.
     """
 
     extensive: ClassVar = frozenset({"stiffness"})
@@ -128,12 +158,12 @@ class RestitutionContact(_Power):
     stiffness: Annotated[Positive, Unit("N/m^n")]
     restitution: PerNode
     reference_velocity: Annotated[Positive, Unit("m/s")]
-    exponent: OneOrAbove = 1.5
-    damping_model: DampingModel = "hunt-crossley"
+    exponent: Exponent = 1.5
+    damping_model: DampingModel = "exact"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.damping_model == "lankarani-nikravesh":
+        if self.damping_model in ("hunt-crossley", "lankarani-nikravesh"):
             self.require("zero to 1", lambda e: (e >= 0) & (e <= 1), "restitution")
         else:
             self.require("above zero and at most 1", lambda e: (e > 0) & (e <= 1), "restitution")
@@ -142,12 +172,14 @@ class RestitutionContact(_Power):
     def damping_factor(self) -> float | Array:
         """Damping factor chi [s/m], of the face or (n,) of each node."""
         e = np.asarray(self.restitution, dtype=float)
-        if self.damping_model == "lankarani-nikravesh":
+        if self.damping_model == "hunt-crossley":
+            product = 1.5 * (1.0 - e)
+        elif self.damping_model == "lankarani-nikravesh":
             product = 0.75 * (1.0 - e**2)
         elif self.damping_model == "flores":
             product = 1.6 * (1.0 - e) / e
         else:
-            product = np.vectorize(_hunt_crossley, otypes=[float])(e)
+            product = np.vectorize(_exact_product, otypes=[float])(e)
         factor = product / np.asarray(self.reference_velocity, dtype=float)
         return factor if factor.ndim else float(factor)
 
@@ -158,7 +190,7 @@ class RestitutionContact(_Power):
         return np.column_stack([stiffness, np.ones_like(share), exponent, factor])
 
 
-def _hunt_crossley(e: float) -> float:
+def _exact_product(e: float) -> float:
     """Solve x (1 + e) = ln[(1 + x) / (1 - e x)] for x = chi v > 0; zero for e = 1."""
     from scipy.optimize import brentq
 

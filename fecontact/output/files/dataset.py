@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 
 _NODES = {
     "normal_force": "N", "friction_force": "N", "penetration": "m", "slip_velocity": "m/s",
-    "pressure": "N/m", "friction_work": "J", "contact_state": "0 open, 1 stick, 2 slip",
+    "line_load": "N/m", "friction_work": "J", "contact_state": "0 open, 1 stick, 2 slip",
 }
+# Where the name alone does not tell the sign.
+_TITLES = {"friction_force": "friction force on the body in -x"}
 _AXES = ("x", "y", "phi")
 
 
@@ -57,7 +59,8 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
     """Stored and derived quantities of a run.
 
     Displacements and velocities [x, y, phi] of B, C, other named points and the contact nodes,
-    forces and states of the contact nodes, energies, modal coordinates.
+    forces and states of the contact nodes, their pressures if the basis has a thickness, energies,
+    modal coordinates.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
     basis, q, rate = (trajectory.system.basis, trajectory.modal_coordinates,
@@ -72,6 +75,8 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
                 "pam,tm->tpa", rows, modal), unit)
     for name, unit in _NODES.items():
         found[name] = Variable(("time", "node"), getattr(trajectory, name), unit)
+    if basis.thickness is not None:
+        found["pressure"] = Variable(("time", "node"), trajectory.pressure, "Pa")
     energies = trajectory.energies
     for name in energies.__dataclass_fields__:
         found[f"energy_{name}"] = Variable(("time",), getattr(energies, name), "J")
@@ -90,7 +95,7 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
              for key, variable in coordinates(trajectory).items()}
     found: dict[str, NDArray[Any]] = {"time [s]": trajectory.time}
     for name, variable in variables(trajectory).items():
-        title = name.removeprefix("node_").replace("_", " ")
+        title = _TITLES.get(name, name.removeprefix("node_").replace("_", " "))
         if "mode" in variable.dims:
             continue
         if variable.dims == ("time",):
@@ -125,12 +130,14 @@ def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
         raise MissingLibraryError("xarray is not installed; install it with pip install "
                                   "'fecontact[xarray]'.") from None
 
-    def array(variable: Variable) -> Any:
-        return DataArray(variable.values, dims=variable.dims, attrs={"units": variable.unit})
+    def array(name: str, variable: Variable) -> Any:
+        named = {"long_name": _TITLES[name]} if name in _TITLES else {}
+        return DataArray(variable.values, dims=variable.dims,
+                         attrs={"units": variable.unit, **named})
 
     return Dataset(
-        {name: array(variable) for name, variable in variables(trajectory).items()},
-        coords={name: array(variable) for name, variable in coordinates(trajectory).items()},
+        {name: array(name, variable) for name, variable in variables(trajectory).items()},
+        coords={name: array(name, variable) for name, variable in coordinates(trajectory).items()},
         attrs={"title": "fecontact run", "status": trajectory.status.value})
 
 

@@ -78,8 +78,18 @@ def von_mises(field: ModeShapes, q: Array) -> Array:
 
 
 def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
-    """Forces (F, n, 2) of the ground on the contact nodes, [-R, F] [N]."""
-    return np.stack([-trajectory.friction_force[which], trajectory.normal_force[which]], axis=-1)
+    """Forces (F, n, 2) of the ground on the contact nodes, [-R - F y_R', F] [N].
+
+    y_R' is the slope of the ground below a node, or zero for contact forces that stay vertical.
+    """
+    normal, along = trajectory.normal_force[which], -trajectory.friction_force[which]
+    ground, basis = trajectory.system.ground, trajectory.system.basis
+    if ground.wavy and ground.normal == "surface":
+        places = basis.contact_x + trajectory.modal_coordinates[which] @ basis.contact_T[:, 0].T
+        along = along - normal * np.array([
+            ground.slope(place, time)
+            for place, time in zip(places, trajectory.time[which], strict=True)])
+    return np.stack([along, normal], axis=-1)
 
 
 def nodal_contact_force(trajectory: Trajectory, which: Any = slice(None)) -> Array:

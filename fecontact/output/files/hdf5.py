@@ -139,6 +139,8 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     group.attrs["extra"] = list(basis.extra)
     group.attrs["groups"] = [name for name, _ in basis.groups]
     group.attrs["group_sizes"] = [count for _, count in basis.groups]
+    if basis.thickness is not None:
+        group.attrs["thickness"] = basis.thickness
     if basis.quality is not None:
         quality = group.create_group("quality")
         for name, value in vars(basis.quality).items():
@@ -174,7 +176,8 @@ def stored_basis(group: Any) -> ModalBasis:
         mode_shapes=(_read_mode_shapes(member(group, "mode_shapes"), m, len(T))
                      if "mode_shapes" in group else None),
         quality=_read_quality(member(group, "quality"), m, len(T)) if "quality" in group else None,
-        groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)))
+        groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
+        thickness=float(group.attrs["thickness"]) if "thickness" in group.attrs else None)
 
 
 def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:

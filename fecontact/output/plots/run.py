@@ -81,7 +81,8 @@ def plot_history(
                         *thinned(time, value[:, row] / factor), color=colours[number],
                         linewidth=1.2 if number else 2.0, label=point_name(point))
         for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
-                                   (axes[2, 1], "friction force", trajectory.friction_force)):
+                                   (axes[2, 1], "friction force in -x",
+                                    trajectory.friction_force)):
             total = forces.sum(axis=1)
             factor = _labelled(axis, f"total {name}", "N", total)
             axis.plot(*thinned(time, total / factor), color="#303030")
@@ -147,12 +148,13 @@ def plot_phase(
 
 
 def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
-    """Plot pressure [N/m] and state of the contact nodes over time and position.
+    """Plot pressure [Pa] and state of the contact nodes over time and position.
 
-    In runs with more output times than columns of the picture, a column shows the largest
-    pressure and the most frequent state of its times. The band of a node is as wide as its
-    tributary length; places without contact face stay blank. States are open, stick and slip, or
-    open and contact if all friction forces of the run are zero.
+    For a basis without thickness, the line load [N/m] takes the place of the pressure. In runs with
+    more output times than columns of the picture, a column shows the largest pressure and the most
+    frequent state of its times. The band of a node is as wide as its tributary length; places
+    without contact face stay blank. States are open, stick and slip, or open and contact if all
+    friction forces of the run are zero.
 
     Parameters
     ----------
@@ -180,12 +182,15 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
         time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
         places, nodes, place_label = _place_edges(trajectory)
 
-        pressure = np.maximum.reduceat(trajectory.pressure, starts, axis=0)
-        factor, pressure_symbol = suitable_unit(float(pressure.max()), "N/m")
+        name, unit, load = (
+            ("line load", "N/m", trajectory.line_load) if trajectory.system.basis.thickness is None
+            else ("contact pressure", "Pa", trajectory.pressure))
+        highest = np.maximum.reduceat(load, starts, axis=0)
+        factor, load_symbol = suitable_unit(float(highest.max()), unit)
         image = upper.pcolormesh(
-            edges / time_unit, places, _rows(pressure / factor, nodes), cmap="viridis", vmin=0.0,
-            vmax=float(pressure.max()) / factor or 1.0)
-        figure.colorbar(image, ax=upper, label=f"contact pressure [{pressure_symbol}]", pad=0.01)
+            edges / time_unit, places, _rows(highest / factor, nodes), cmap="viridis", vmin=0.0,
+            vmax=float(highest.max()) / factor or 1.0)
+        figure.colorbar(image, ax=upper, label=f"{name} [{load_symbol}]", pad=0.01)
 
         states = state_names(trajectory)
         state = np.minimum(trajectory.contact_state, len(states) - 1)

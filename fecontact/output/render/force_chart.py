@@ -20,7 +20,9 @@ _DARK, _GRID, _CURSOR = "#303030", "#e4e2de", (178, 24, 43)
 
 @dataclass(frozen=True, eq=False)
 class ForceChart:
-    """A strip with the sums of the normal and the friction forces over the time that is drawn.
+    """A strip with the sums of the forces on the body over the time that is drawn.
+
+    The normal forces are positive in +y, friction in +x, as the arrows of the scene: -R.
 
     Attributes
     ----------
@@ -62,7 +64,8 @@ class ForceChart:
         part = (first <= trajectory.time) & (trajectory.time <= last)
         time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
         forces = {"normal force": (trajectory.normal_force, _DARK),
-                  "friction force": (trajectory.friction_force, STATE_COLOURS["slip"])}
+                  "friction on the body, +x": (-trajectory.friction_force,
+                                               STATE_COLOURS["slip"])}
         totals = {name: (force[part].sum(axis=1), colour)
                   for name, (force, colour) in forces.items() if force.any() or name[0] == "n"}
         largest = max(float(np.abs(total).max()) for total, _ in totals.values())

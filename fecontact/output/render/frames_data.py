@@ -75,7 +75,7 @@ class Motion:
 
     @cached_property
     def forces(self) -> Array:
-        """Forces (F, n, 2) on the contact nodes, [-R, F] [N]."""
+        """Forces (F, n, 2) of the ground on the contact nodes, along x and y [N]."""
         return contact_forces(self.trajectory, self.indices)
 
     @cached_property
@@ -148,6 +148,14 @@ class Motion:
         """Drawn travel (F,) of the ground [m]."""
         ground = self.trajectory.system.ground
         return self._drift_scale * np.array([ground.travel(float(time)) for time in self.times])
+
+    @cached_property
+    def ground_speed(self) -> float:
+        """Mean speed of the ground over the frames, positive in +x [m/s]."""
+        ground, first, last = self.trajectory.system.ground, self.times[0], self.times[-1]
+        if last == first:
+            return ground.velocity(float(first))
+        return (ground.travel(float(last)) - ground.travel(float(first))) / float(last - first)
 
     @property
     def _gap(self) -> float:

@@ -175,13 +175,17 @@ class Overlay:
             self._text(figure, x + 0.013, 0.80, name)
             x += 0.09
         force = self.motion.largest_force
-        self._text(figure, 0.55, 0.34, "contact force")
+        self._text(figure, 0.55, 0.34, "force on body")
         if force > 0.0:
             figure.add_artist(FancyArrow(
-                0.69, 0.34, 0.045, 0.0, width=0.05, head_width=0.2, head_length=0.013,
+                0.68, 0.34, 0.035, 0.0, width=0.05, head_width=0.2, head_length=0.013,
                 length_includes_head=True, color=FORCE_COLOUR, linewidth=0.0))
-        self._text(figure, 0.745 if force > 0.0 else 0.69, 0.34,
-                   f"largest {quantity(force, 'N')}" if force > 0.0 else "none")
+        self._text(figure, 0.725 if force > 0.0 else 0.68, 0.34,
+                   f"up to {quantity(force, 'N')}" if force > 0.0 else "none")
+        if speed := self.motion.ground_speed:
+            heading = "→" if speed > 0.0 else "←"
+            self._text(figure, 0.97, 0.34, f"ground {heading} {quantity(abs(speed), 'm/s')}",
+                       ha="right")
 
 
 def _short(value: float) -> str:
