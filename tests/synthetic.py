@@ -6,6 +6,7 @@ import scipy.sparse as sp
 from fecontact import ContactSystem, Ground, ModalBasis, Trajectory
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.reduction import ModeShapes
+from fecontact.system.kernels import POWERS
 
 YOUNGS_MODULUS = 2.1e11
 
@@ -92,5 +93,5 @@ def run(body=None, times=101, size=2e-5, waviness=0.0, speed=0.02):
     middle = slice(times // 3, times // 2)
     rate[middle] = 0.0
     rate[middle, 0] = speed
-    return Trajectory(system, t, q, rate, np.zeros((times, 8)), statistics={"steps": 17,
-                                                                            "seconds": 0.25})
+    return Trajectory(system, t, q, rate, np.zeros((times, len(POWERS))),
+                      statistics={"steps": 17, "seconds": 0.25})

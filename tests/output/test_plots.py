@@ -175,15 +175,15 @@ def test_contact_map_without_friction_shows_contact():
 
 def test_energies_leave_out_what_is_zero():
     trajectory = run(times=101)
-    work = np.zeros((101, 8))
-    work[:, 7] = 1e-3 * np.linspace(0.0, 1.0, 101)
+    work = np.zeros((101, len(kernels.POWERS)))
+    work[:, kernels.FRICTION] = 1e-3 * np.linspace(0.0, 1.0, 101)
     figure = plot_energies(replace(trajectory, work=work))
     assert labels(figure) == ["stored energy [mJ]", "work put in [J]", "energy lost [mJ]"]
     shown = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
     assert shown == [["kinetic", "elastic", "contact", "total"], ["total"], ["friction", "total"]]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(),
                                1e3 * trajectory.energies.kinetic)
-    np.testing.assert_allclose(figure.axes[2].lines[0].get_ydata(), 1e3 * work[:, 7])
+    np.testing.assert_allclose(figure.axes[2].lines[0].get_ydata(), 1e3 * work[:, kernels.FRICTION])
 
 
 def test_modes_are_titled_by_their_frequencies():

@@ -12,8 +12,9 @@ from systems import impact_oscillator
 from fecontact import ContactSystem, Ground, InputError, RigidStart, Trajectory, simulate
 from fecontact.laws import ConstantFriction, RoughSurface
 from fecontact.sweeps.summaries import SUMMARIES, functions_for, summarise, unit_of
+from fecontact.system.kernels import FRICTION, POWERS
 
-V, STIFFNESS, DEPTH, MU = 0.02, 3e5, 4e-5, 0.3
+V, STIFFNESS, DEPTH, MU, THICKNESS = 0.02, 3e5, 4e-5, 0.3, 0.05
 TURNS = 8  # of the oscillation in the run of 0.02 s
 
 
@@ -21,15 +22,16 @@ TURNS = 8  # of the oscillation in the run of 0.02 s
 def run():
     """Sliding forth and back by 0.1 mm at 400 Hz on a belt, pressed in for the first half."""
     system = ContactSystem(
-        synthetic.basis(contact_nodes=4), normal=RoughSurface(STIFFNESS, 1e-9, 0.0),
+        replace(synthetic.basis(contact_nodes=4), thickness=THICKNESS),
+        normal=RoughSurface(STIFFNESS, 1e-9, 0.0),
         friction=ConstantFriction(MU, smoothing_slope=1e9), ground=Ground(speed=V))
     t = np.linspace(0.0, 0.02, 8001)
     w = 2.0 * np.pi * TURNS / 0.02
     q, rate = np.zeros((len(t), 5)), np.zeros((len(t), 5))
     q[:, 0], rate[:, 0] = 1e-4 * np.sin(w * t), 1e-4 * w * np.cos(w * t)
     q[:, 1] = np.where(t <= 0.01, -DEPTH, 3e-5)
-    work = np.outer(t, np.arange(8.0))
-    work[:, 7] = 5.0 * t
+    work = np.outer(t, np.arange(float(len(POWERS))))
+    work[:, FRICTION] = 5.0 * t
     return Trajectory(system, t, q, rate, work,
                       node_friction_work=np.outer(t, [1.0, 2.0, 4.0, 3.0]))
 
@@ -52,7 +54,7 @@ def test_displacements_and_velocities(run):
 
 def test_contact(run):
     found = values(run, "open_fraction", "slip_fraction", "stick_fraction", "mean_normal_force",
-                   "peak_normal_force", "peak_line_load", "peak_friction_force",
+                   "peak_normal_force", "peak_line_load", "peak_pressure", "peak_friction_force",
                    "mean_friction_force")
     force = STIFFNESS * DEPTH  # all nodes together
     assert found["open_fraction"] == pytest.approx(0.5, abs=2e-4)
@@ -61,6 +63,8 @@ def test_contact(run):
     assert found["peak_normal_force"] == pytest.approx(force, rel=1e-4)
     assert found["mean_normal_force"] == pytest.approx(0.5 * force, rel=2e-4)
     assert found["peak_line_load"] == pytest.approx(force / 0.2, rel=1e-4)
+    assert found["peak_pressure"] == pytest.approx(force / (0.2 * THICKNESS), rel=1e-4)
+    assert (unit_of("peak_line_load"), unit_of("peak_pressure")) == ("N/m", "Pa")
     assert found["peak_friction_force"] == pytest.approx(MU * force, rel=1e-4)
     # faster than the belt for arccos(V / amplitude) / pi of each turn
     forward = np.arccos(V / (1e-4 * 2.0 * np.pi * 400.0)) / np.pi
@@ -113,7 +117,7 @@ def test_number_of_periods(run):
         q[:, 0] += 1e-4 * size * np.sin(w * t)
         rate[:, 0] += 1e-4 * size * w * np.cos(w * t)
     system = run.system.with_(**{"drive.angular_frequency": 2.0 * np.pi})
-    motion = Trajectory(system, t, q, rate, np.zeros((len(t), 8)))
+    motion = Trajectory(system, t, q, rate, np.zeros((len(t), len(POWERS))))
     assert values(motion, "periods") == {"periods": 2.0}
     assert values(replace(motion, modal_coordinates=q + 1e-5 * t[:, None]), "periods") == {
         "periods": 0.0}
