@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from fecontact import ContactSystem, Drive, Status, Study, basis_from_matrices, simulate
+from fecontact import (
+    ContactSystem,
+    Drive,
+    InputError,
+    Status,
+    Study,
+    basis_from_matrices,
+    simulate,
+)
 from fecontact.analysis import receptance
 from fecontact.integrate import Rodas5P, Scipy, SetValued
 from fecontact.laws import ConstantFriction, Harmonic, PrescribedForce
@@ -41,7 +49,7 @@ def test_transmissibility_is_that_of_the_textbook():
     assert abs(response(np.sqrt(2.0))) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("solver", [Rodas5P(), Scipy("DOP853"), SetValued()],
+@pytest.mark.parametrize("solver", [Rodas5P(), Scipy("Radau"), SetValued()],
                          ids=lambda solver: solver.name)
 @pytest.mark.parametrize("r", [0.7, np.sqrt(2.0), 3.0])
 def test_mass_follows_its_base(solver, r):
@@ -119,5 +127,5 @@ dashpots = "relative"
     assert study.system().drive.dashpots == "relative"
     assert Study.from_toml(study.to_toml()).drive == study.drive
     assert Study.from_toml(text.replace('dashpots = "relative"\n', "")).drive.dashpots == "absolute"
-    with pytest.raises(ValueError, match=r"dashpots = .relativ. must be .*mean .relative."):
+    with pytest.raises(InputError, match='dashpots = "relativ" must be "absolute" or "relative"'):
         Study.from_toml(text.replace('"relative"', '"relativ"'))
