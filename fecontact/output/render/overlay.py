@@ -166,8 +166,8 @@ class Overlay:
         from matplotlib.lines import Line2D
         from matplotlib.patches import FancyArrow
 
-        self._text(figure, 0.55, 0.80, "contact nodes")
-        x = 0.70
+        self._text(figure, 0.49, 0.80, "contact nodes")
+        x = 0.64
         for name in self.motion.state_names:
             figure.add_artist(Line2D([x], [0.80], marker="o", markersize=8.5 * self.size,
                                      markerfacecolor=NODE_COLOURS[name], markeredgecolor=DARK,
@@ -175,12 +175,12 @@ class Overlay:
             self._text(figure, x + 0.013, 0.80, name)
             x += 0.09
         force = self.motion.largest_force
-        self._text(figure, 0.55, 0.34, "force on body")
+        self._text(figure, 0.49, 0.34, "force on body")
         if force > 0.0:
             figure.add_artist(FancyArrow(
-                0.68, 0.34, 0.035, 0.0, width=0.05, head_width=0.2, head_length=0.013,
+                0.615, 0.34, 0.035, 0.0, width=0.05, head_width=0.2, head_length=0.013,
                 length_includes_head=True, color=FORCE_COLOUR, linewidth=0.0))
-        self._text(figure, 0.725 if force > 0.0 else 0.68, 0.34,
+        self._text(figure, 0.66 if force > 0.0 else 0.615, 0.34,
                    f"up to {quantity(force, 'N')}" if force > 0.0 else "none")
         if speed := self.motion.ground_speed:
             heading = "→" if speed > 0.0 else "←"
