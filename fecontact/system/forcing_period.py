@@ -31,7 +31,7 @@ def common_period(system: ContactSystem) -> float | None:
         (f"drive.motion_{axis}", motion)
         for axis, stiffness, motion in zip("xy", (drive.stiffness_x, drive.stiffness_y),
                                            drive.motions, strict=True) if stiffness]
-    given += [(f"load.forces.{k}", force.signal) for k, force in enumerate(system.load.forces)]
+    given += [(f"load.{name}", signal) for name, signal in system.load.signals.items()]
     periods = []
     for name, source in given:
         if isinstance(source, Constant) or (isinstance(source, _REPEATING)
