@@ -127,7 +127,7 @@ class PointLoad:
         For an unknown component, or an invalid point or signal.
     """
 
-    point: str | int | tuple[float, float] = "C"
+    point: Annotated[str | int | tuple[float, float], Unit("m")] = "C"
     component: Literal["x", "y", "phi"] = "y"
     signal: Signal = field(kw_only=True)
 

@@ -30,6 +30,7 @@ def plot_stress(
     fields : BodyFields
         What :func:`fecontact.static_solution` or :meth:`fecontact.ModalBasis.fields` gives.
     component : 'von_mises', 'xx', 'yy', 'zz' or 'xy'
+        The stress that colours the body.
     scale : float, optional
         Magnification of displacements; by default chosen so that the largest is clearly visible.
     path : str or Path, optional
