@@ -8,6 +8,7 @@ from meshes_for_tests import rectangle
 
 import fecontact as fc
 from fecontact import BoundaryLoad, Load, PointLoad
+from fecontact.integrate import SetValued
 from fecontact.laws import (
     Constant,
     ConstantFriction,
@@ -215,7 +216,7 @@ def test_boundary_loads_push_into_the_body_and_run_round_it():
             moment = arm[0] * way[1] - arm[1] * way[0]
             np.testing.assert_allclose(found, size * np.array([*way, moment]),
                                        atol=1e-12 * size)
-    with pytest.raises(fc.InputError, match="no boundary 'tops' .did you mean 'top'"):
+    with pytest.raises(fc.InputError, match=r"no boundary 'tops' \(did you mean 'top'"):
         beam(Load(boundaries=[BoundaryLoad("tops", 1.0)]))
 
 
@@ -252,6 +253,22 @@ def test_loads_are_parameters_of_the_system():
         changed.arrays.constant_load,
         4e4 * system.basis.boundary_row("top")[0] - 1.6 * system.basis.inertia_rows[1])
     assert "gravity (0, -1.6) m/s²" in repr(changed)
+
+
+def test_a_block_slides_as_coulomb_says_on_a_base_that_shakes():
+    """Set-valued friction on an accelerated base: stick below mu g, then a - mu g."""
+    rows = np.zeros((1, 3, 2))
+    rows[0, 0, 0] = rows[0, 1, 1] = 1.0
+    basis = fc.basis_from_matrices(MASS * np.eye(2), np.diag([0.0, 1e6]), {"contact": rows},
+                                   translations=np.eye(2))
+    system = fc.ContactSystem(
+        basis, normal=PrescribedForce(MASS * G), friction=ConstantFriction(0.3),
+        load=Load(base_acceleration_x=Step(0.1, -5.0)))
+    times = np.linspace(0.0, 0.5, 26)
+    run = fc.simulate(system, 0.5, initial=np.zeros(4), outputs=times, solver=SetValued())
+    wanted = 0.5 * (5.0 - 0.3 * G) * np.maximum(times - 0.1, 0.0) ** 2
+    np.testing.assert_allclose(run.displacement(0)[:, 0], wanted, atol=1e-5 * wanted.max())
+    assert run.energies.load_work[-1] == pytest.approx(MASS * 5.0 * wanted[-1], rel=1e-4)
 
 
 # Residual vectors ---------------------------------------------------------------------------------

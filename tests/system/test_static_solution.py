@@ -30,8 +30,8 @@ def test_a_bar_under_its_own_weight():
     np.testing.assert_allclose(fields.displacement[:, 0],
                                RHO * 9.81 * x * (LENGTH - 0.5 * x) / E, atol=1e-14)
     np.testing.assert_allclose(fields.stress[:, 0], RHO * 9.81 * (LENGTH - x), atol=1.0)
-    u, stress = fields.at((LENGTH, 0.033))
-    assert u[0] == pytest.approx(RHO * 9.81 * LENGTH**2 / (2.0 * E), rel=1e-10)
+    end = fields.at((LENGTH, 0.033))[0][0]
+    assert end == pytest.approx(RHO * 9.81 * LENGTH**2 / (2.0 * E), rel=1e-10)
     # Halfway through a base acceleration that does the same to it.
     same = fc.static_solution(bar({"left": "xy"}), Load(
         base_acceleration_x=Harmonic(-9.81, 1.0)), time=0.5 * np.pi)
@@ -60,7 +60,7 @@ def test_pressure_and_force_on_a_bar():
     pressed = fc.static_solution(bar({"left": "x", "corner": "y"}, nu=0.3, points={
         "corner": (0.0, 0.0)}), Load(boundaries=[BoundaryLoad("right", p)]))
     np.testing.assert_allclose(pressed.displacement,
-                               -p / E * pressed.nodes * [1.0, -0.3], atol=1e-15)
+                               -p / E * pressed.nodes * [1.0, -0.3], atol=1e-13)
     pulled = fc.static_solution(bar({"left": "xy"}), Load(forces=[
         PointLoad("right", "x", signal=Constant(p * HEIGHT * THICKNESS))]))
     np.testing.assert_allclose(pulled.displacement[:, 0], p / E * pulled.nodes[:, 0], atol=1e-14)
