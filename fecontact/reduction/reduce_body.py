@@ -191,7 +191,7 @@ def loading(
     require_kind("modal_basis", (list, tuple), loads=loads)
     found = [np.zeros((2 * len(body.nodes), 0))]
     for load in loads:
-        if load == "gravity":
+        if str(load) == "gravity":
             found.append(inertia_forces(body))
         elif isinstance(load, str) and load in body.mesh.boundaries and load not in points:
             found.append(boundary_forces(body, load))

@@ -375,7 +375,7 @@ LOADED = """
 geometry = { shape = "beam" }
 body = { thickness = 0.01, fixed = { left = "xy" } }
 normal = { stiffness = 1e6, roughness_height = 5.2e-6, damping = 6.0 }
-friction = { law = "constant", coefficient = 0.2 }
+friction = { law = "constant", friction_coefficient = 0.2 }
 gap = 1e-4
 
 [basis]

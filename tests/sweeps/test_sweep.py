@@ -75,7 +75,7 @@ def test_workers_know_the_places_of_loads(study, tmp_path):
     force = {"point": [0.05, 0.03], "signal": {"law": "constant", "value": -1.0}}
     loaded = study.with_(**{"load.forces": [force]})
     table = sweep(loaded, {"ground.speed": [1e-3, 2e-3]}, Serial(), folder=tmp_path / "f")
-    assert not table.failed.any()
+    assert not table.failed
 
 
 def test_numbers_of_laws_change_as_they_do_in_the_study(study):

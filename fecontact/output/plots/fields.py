@@ -61,8 +61,7 @@ def plot_stress(
     factor, unit = suitable_unit(float(np.abs(stress).max()), "Pa")
     largest = float(np.abs(stress).max() / factor) or 1.0
     name = "von Mises stress" if component == "von_mises" else f"stress {component}"
-    colours = {"cmap": "viridis", "vmin": 0.0} if component == "von_mises" else {
-        "cmap": "RdBu_r", "vmin": -largest}
+    signed = component != "von_mises"
     cells = fields.cells
     if cells.shape[1] == 4:
         cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
@@ -70,7 +69,8 @@ def plot_stress(
     with new_figure(_WIDTH, drawn_height, path) as figure:
         axis = figure.subplots()
         drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress / factor,
-                               shading="gouraud", vmax=largest, rasterized=True, **colours)
+                               shading="gouraud", cmap="RdBu_r" if signed else "viridis",
+                               vmin=-largest if signed else 0.0, vmax=largest, rasterized=True)
         for nodes, colour in ((fields.nodes, "#8c8c8c"), (places, "#303030")):
             axis.add_collection(LineCollection(list(nodes[fields.outline]), colors=colour,
                                                linewidths=0.8))
