@@ -8,6 +8,7 @@ from .core.errors import (
     ModelWarning,
 )
 from .fem.elastic_body import ElasticBody, Material
+from .fem.fields import BodyFields
 from .fem.generate import Beam, Block, Pendulum, generate
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
@@ -18,7 +19,7 @@ from .integrate.initial_state import RigidStart
 from .integrate.sensitivity import sensitivity
 from .integrate.simulate import simulate
 from .integrate.trajectory import ContactState, Status, Trajectory
-from .laws.excitation import Drive, Load, PointLoad
+from .laws.excitation import BoundaryLoad, Drive, Load, PointLoad
 from .laws.ground.ground import Ground
 from .output.files.case import read_case, write_case
 from .output.render.movie import render
@@ -32,6 +33,7 @@ from .sweeps.sweep import sweep
 from .system.contact_system import ContactSystem
 from .system.forcing_period import forcing_period
 from .system.gap import Crown
+from .system.static_solution import static_solution
 from .system.statics import static_equilibrium
 
 __version__: str
@@ -40,6 +42,8 @@ __all__ = [
     "AnalysisError",
     "Beam",
     "Block",
+    "BodyFields",
+    "BoundaryLoad",
     "ContactState",
     "ContactSystem",
     "Crown",
@@ -85,6 +89,7 @@ __all__ = [
     "sensitivity",
     "simulate",
     "static_equilibrium",
+    "static_solution",
     "study",
     "sweep",
     "sweeps",

@@ -1,6 +1,7 @@
 from .output.files.branches import read_branch, read_branches, write_branch, write_branches
 from .output.files.dataset import to_xarray
 from .output.files.export import export_csv, export_mat, export_netcdf
+from .output.files.fields import export_fields
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .reduction.matrix_files import AssembledMatrix, read_matrix
@@ -10,6 +11,7 @@ from .sweeps.table import read_table
 __all__ = [
     "AssembledMatrix",
     "export_csv",
+    "export_fields",
     "export_mat",
     "export_netcdf",
     "export_pvd",

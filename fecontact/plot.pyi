@@ -8,6 +8,7 @@ from .output.plots.analysis import (
 from .output.plots.basins import plot_basins
 from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.diagram_insets import Inset, phase_inset
+from .output.plots.fields import plot_stress
 from .output.plots.figure import new_figure
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
@@ -40,6 +41,7 @@ __all__ = [
     "plot_spectrogram",
     "plot_spectrum",
     "plot_stability_map",
+    "plot_stress",
     "plot_strobed",
     "plot_sweep",
     "rendering_problem",

@@ -176,10 +176,24 @@ def check_set_valued(names, printed, folder):
     assert 0.97 < float(printed) <= 1.0 + 1e-9
 
 
+def check_loads(names, printed, folder):
+    first, second = printed.splitlines()
+    # Beam theory: q L^4 / (8 E I) and q L^2 / (2 kappa G A), with the weight.
+    E, nu = 2.1e11, 0.3
+    q = 0.02 * (5e5 + 7850.0 * 9.81 * 0.1)
+    area, inertia = 0.1 * 0.02, 0.02 * 0.1**3 / 12.0
+    wanted = q / (8.0 * E * inertia) + q / 2.0 / (5.0 / 6.0 * E / 2.0 / (1.0 + nu) * area)
+    assert float(first.split()[0]) == pytest.approx(-1e3 * wanted, rel=3e-3)
+    assert float(second) < 1e-6
+    assert np.abs(names["resting"].displacement).max() < np.abs(names["same"].displacement).max()
+    assert (folder / "stress.png").stat().st_size > 10_000
+    assert (folder / "stress.vtu").exists()
+
+
 CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
-          "set-valued.md": check_set_valued}
+          "set-valued.md": check_set_valued, "loads.md": check_loads}
 
 
 def test_every_page_with_code_is_known():

@@ -15,6 +15,7 @@ from fecontact.core.errors import InputError, MeshError, choices, nearest, requi
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.interpolation import interpolation
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
@@ -96,7 +97,19 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
     distance = np.linalg.norm(body.nodes - centre, axis=1)
     if distance.min() < 1e-9 * mesh.extent:
         return node_rows(body, int(np.argmin(distance)))
-    return _inner_rows(body, centre, name)
+    return Rows(rotating_rows(len(body.nodes), *interpolation(
+        body.nodes, body.basis.element_dofs.T, centre, f"Point {name}")), centre)
+
+
+def rotating_rows(count: int, nodes: Integers, weights: Array) -> Any:
+    """Sparse rows (3, 2 N) from weights (3, k) of the value and its derivatives at k of N nodes."""
+    import scipy.sparse as sp
+
+    value, slope_x, slope_y = weights
+    data = np.concatenate([value, value, -0.5 * slope_y, 0.5 * slope_x])
+    row = np.repeat([0, 1, 2, 2], len(nodes))
+    column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
+    return sp.csr_array(sp.coo_array((data, (row, column)), shape=(3, 2 * count)))
 
 
 def node_rows(body: ElasticBody, node: int) -> Rows:
@@ -209,27 +222,3 @@ def _node_set_rows(body: ElasticBody, nodes: Integers) -> Rows:
     column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
     shape = (3, 2 * len(body.nodes))
     return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), centre)
-
-
-def _inner_rows(body: ElasticBody, place: Array, name: str) -> Rows:
-    import scipy.sparse as sp
-
-    basis = body.basis
-    try:
-        cell = int(basis.mesh.element_finder(mapping=basis.mapping)(place[:1], place[1:])[0])
-    except ValueError:
-        raise InputError(f"Point {name}: ({place[0]:g}, {place[1]:g}) lies outside the body, which "
-                         f"spans x = {body.nodes[:, 0].min():g} ... {body.nodes[:, 0].max():g}, "
-                         f"y = {body.nodes[:, 1].min():g} ... {body.nodes[:, 1].max():g}."
-                         ) from None
-    local = basis.mapping.invF(place[:, None, None], tind=np.array([cell]))[:, 0]
-    dofs = basis.element_dofs[:, cell]
-    functions = [basis.elem.gbasis(basis.mapping, local, i, tind=np.array([cell]))[0]
-                 for i in range(len(dofs))]
-    value = np.array([float(f[0, 0]) for f in functions])
-    slope = np.array([f.grad[:, 0, 0] for f in functions])
-    data = np.concatenate([value, value, -0.5 * slope[:, 1], 0.5 * slope[:, 0]])
-    row = np.repeat([0, 1, 2, 2], len(dofs))
-    column = np.concatenate([2 * dofs, 2 * dofs + 1, 2 * dofs, 2 * dofs + 1])
-    shape = (3, 2 * len(body.nodes))
-    return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), place)

@@ -3,8 +3,11 @@
 import math
 from dataclasses import dataclass, field
 from numbers import Integral
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
+
+from fecontact.core.checks import as_floats, as_pair, require_kind
 from fecontact.core.errors import (
     InputError,
     choices,
@@ -113,12 +116,13 @@ class Drive:
 
 @dataclass(frozen=True)
 class PointLoad:
-    """Time-dependent force or moment on the body at a point.
+    """Force or moment on the body at a point, constant or in time.
 
     Parameters
     ----------
-    point : str or int
-        'B', 'C' or a further named point; a contact node by its number from 0.
+    point : str, int or (x, y)
+        'B', 'C' or a further named point; a contact node by its number from 0; or a place in the
+        body [m].
     component : 'x', 'y' or 'phi'
         A force along +x, along +y (away from the ground), or a moment counter-clockwise.
     signal : Signal
@@ -130,16 +134,18 @@ class PointLoad:
         For an unknown component, or an invalid point or signal.
     """
 
-    point: str | int = "C"
+    point: Annotated[str | int | tuple[float, float], Unit("m")] = "C"
     component: Literal["x", "y", "phi"] = "y"
     signal: Signal = field(kw_only=True)
 
     def __post_init__(self) -> None:
         if isinstance(self.point, Integral) and not isinstance(self.point, bool):
             object.__setattr__(self, "point", int(self.point))
+        elif isinstance(self.point, tuple | list):
+            object.__setattr__(self, "point", as_pair(self.point, "PointLoad: point"))
         elif not isinstance(self.point, str):
-            raise InputError(f"PointLoad: point = {self.point!r} must be the name of a point or "
-                             f"the number of a contact node.")
+            raise InputError(f"PointLoad: point = {self.point!r} must be the name of a point, the "
+                             f"number of a contact node, or a place (x, y).")
         if self.component not in _COMPONENTS:
             raise InputError(f"PointLoad: component = {self.component!r} must be one of "
                              f"{choices(_COMPONENTS)}"
@@ -148,32 +154,104 @@ class PointLoad:
 
 
 @dataclass(frozen=True)
-class Load:
-    """Constant load ``[0, -normal, 0]`` on the body at C (4.1-6), and time-dependent loads.
+class BoundaryLoad:
+    """Uniform pressure and shear on a named boundary of the body, constant or in time.
+
+    They follow neither the motion nor the rotation of the body. The force is the stress times the
+    length of the boundary times the thickness of the body.
 
     Parameters
     ----------
-    normal : float
-        F_N0, positive towards the ground [N].
-    forces : sequence of PointLoad
-        Further forces and moments.
+    boundary : str
+        Name of a boundary of the mesh.
+    pressure : float or Signal
+        Along the inward normal: positive presses on the body [Pa].
+    shear : float or Signal
+        Along the boundary with the body on the left, counter-clockwise around it: to +x on a
+        bottom, +y on a right side, -x on a top [Pa].
 
     Raises
     ------
     InputError
-        For values that are not finite, or forces that are not PointLoad.
+        For values that are neither finite numbers nor signals, or without a load.
+    """
+
+    boundary: str
+    pressure: Annotated[float | Signal, Unit("Pa")] = 0.0
+    shear: Annotated[float | Signal, Unit("Pa")] = 0.0
+
+    def __post_init__(self) -> None:
+        require_kind("BoundaryLoad", str, boundary=self.boundary)
+        for name in ("pressure", "shear"):
+            if not isinstance(getattr(self, name), Signal):
+                require_finite("BoundaryLoad", **{name: getattr(self, name)})
+        if not isinstance(self.pressure, Signal) and not isinstance(self.shear, Signal) and not (
+                self.pressure or self.shear):
+            raise InputError(f"BoundaryLoad: pressure and shear on '{self.boundary}' are zero; "
+                             f"give one of them, or leave the load out.")
+
+
+@dataclass(frozen=True)
+class Load:
+    r"""Loads on the body: at C (4.1-6), at points, along boundaries, and on its mass.
+
+    Gravity acts on all mass with the force rho g per volume. Base acceleration is for a body whose
+    supports, ground and driven ends are carried by an accelerated base: all displacements are
+    relative to the base, in whose frame the inertial force -rho a acts on all mass.
+
+    Parameters
+    ----------
+    normal : float
+        F_N0, positive towards the ground [N]: the constant load ``[0, -normal, 0]`` at C.
+    forces : sequence of PointLoad
+        Further forces and moments at points.
+    gravity : (float, float)
+        Acceleration g in x and y, (0, -9.81) towards ground below the body [m/s^2].
+    base_acceleration_x, base_acceleration_y : Signal, optional
+        Acceleration a of the base in the inertial frame [m/s^2].
+    boundaries : sequence of BoundaryLoad
+        Pressure and shear along boundaries.
+
+    Raises
+    ------
+    InputError
+        For values that are not finite, forces that are not PointLoad, and the like.
     """
 
     normal: Annotated[float, Unit("N")] = 0.0
     forces: tuple[PointLoad, ...] = ()
+    gravity: Annotated[tuple[float, float], Unit("m/s^2")] = (0.0, 0.0)
+    base_acceleration_x: Annotated[Signal | None, Unit("m/s^2")] = None
+    base_acceleration_y: Annotated[Signal | None, Unit("m/s^2")] = None
+    boundaries: tuple[BoundaryLoad, ...] = ()
 
     def __post_init__(self) -> None:
         require_finite("Load", normal=self.normal)
-        given = self.forces
-        if not isinstance(given, tuple | list) or not all(
-                isinstance(force, PointLoad) for force in given):
-            raise InputError(f"Load: forces = {given!r} must be a list of PointLoad.")
-        object.__setattr__(self, "forces", tuple(given))
+        gravity = as_floats(self.gravity, "Load: gravity")
+        if gravity.shape != (2,) or not np.isfinite(gravity).all():
+            raise InputError(f"Load: gravity = {self.gravity!r} must be two finite numbers, the "
+                             f"accelerations in x and y [m/s^2].")
+        object.__setattr__(self, "gravity", tuple(gravity.tolist()))
+        for name, kind in (("forces", PointLoad), ("boundaries", BoundaryLoad)):
+            given = getattr(self, name)
+            if not isinstance(given, tuple | list) or not all(
+                    isinstance(item, kind) for item in given):
+                raise InputError(f"Load: {name} = {given!r} must be a list of {kind.__name__}.")
+            object.__setattr__(self, name, tuple(given))
+        for name in ("base_acceleration_x", "base_acceleration_y"):
+            if getattr(self, name) is not None:
+                _require_signal("Load", name, getattr(self, name))
+
+    @property
+    def signals(self) -> dict[str, Signal]:
+        """What is given in time, by its dotted name: forces, base acceleration, boundary loads."""
+        given: list[tuple[str, Any]] = [
+            (f"forces.{k}", force.signal) for k, force in enumerate(self.forces)]
+        given += [(name, getattr(self, name))
+                  for name in ("base_acceleration_x", "base_acceleration_y")]
+        given += [(f"boundaries.{k}.{name}", getattr(load, name))
+                  for k, load in enumerate(self.boundaries) for name in ("pressure", "shear")]
+        return {name: value for name, value in given if isinstance(value, Signal)}
 
 
 def _require_signal(owner: str, name: str, given: object) -> None:

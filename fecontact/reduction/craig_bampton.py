@@ -17,7 +17,9 @@ from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.residual_vectors import Flexibility, diagonalised
 
 
-def craig_bampton(system: FreeSystem, rows: Any, count: int) -> tuple[Array, Array]:
+def craig_bampton(
+    system: FreeSystem, rows: Any, count: int, loads: Array | None = None
+) -> tuple[Array, Array]:
     """Frequencies (m,) and mass-normalised shapes (f, m) of a Craig-Bampton basis.
 
     Parameters
@@ -28,12 +30,14 @@ def craig_bampton(system: FreeSystem, rows: Any, count: int) -> tuple[Array, Arr
         The interface; dependent and motionless rows are left out.
     count : int
         Number of fixed-interface modes, zero or more.
+    loads : (f, l) array, optional
+        Further loads whose static response is added.
 
     Returns
     -------
     w, shapes
         First the rigid modes, with frequency exactly zero, then the modes of the reduced body;
-        m is at most ``count`` plus the numbers of independent rows and of rigid modes.
+        m is at most ``count`` plus the numbers of independent rows, of loads and of rigid modes.
     """
     flexibility = Flexibility(system, rows)
     patterns = _independent(flexibility)
@@ -41,8 +45,9 @@ def craig_bampton(system: FreeSystem, rows: Any, count: int) -> tuple[Array, Arr
     deflections = flexibility.deflections(patterns)
     fixed = _fixed_interface_modes(system, flexibility.rows.T @ patterns, deflections, motion,
                                    count)
+    answers = [] if loads is None else [system.deflection(loads)]
     squares, shapes = diagonalised(
-        system, system.without_rigid(np.hstack([deflections, fixed])))
+        system, system.without_rigid(np.hstack([deflections, fixed, *answers])))
     rigid = system.rigid.shape[1]
     return (np.concatenate([np.zeros(rigid), np.sqrt(squares)]),
             np.hstack([system.rigid, shapes]))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
@@ -57,6 +58,7 @@ def basis_from_matrices(
     contact_x: ArrayLike | None = None,
     tributary: ArrayLike | None = None,
     thickness: float | None = None,
+    translations: ArrayLike | None = None,
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
@@ -87,6 +89,9 @@ def basis_from_matrices(
         [m].
     thickness : float, optional
         Out-of-plane thickness of the contact face [m], for pressures.
+    translations : (2, d) array, optional
+        The degrees of freedom in unit translations of the whole body in x and in y, fixed ones
+        too; needed for gravity and base acceleration.
 
     Raises
     ------
@@ -101,6 +106,7 @@ def basis_from_matrices(
     d = M.matrix.shape[0]
     C = _damping_matrix(damping, M)
     given = stack_restriction(rows, d)
+    inertia = inertia_of(M.matrix, translations)
     held = K.matrix.diagonal() >= _HELD
     if held.all():
         raise InputError(f"{K.name} holds every degree of freedom (entries of 1e35 or more).")
@@ -108,20 +114,24 @@ def basis_from_matrices(
         M, K = M.without(held), K.without(held)
         given = replace(given, restriction=given.restriction[:, ~held])
         C = None if C is None else C[~held][:, ~held]
+        inertia = None if inertia is None else inertia[~held]
         d = M.matrix.shape[0]
     M, K = _symmetric(M), _symmetric(K)
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
     return assembled_basis(
         w, shapes, given, contact_x=contact_x, tributary=tributary, thickness=thickness,
-        damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
+        inertia=inertia, damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
 
 
 def assembled_basis(
     w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
-    tributary: ArrayLike | None, thickness: float | None,
+    tributary: ArrayLike | None, thickness: float | None, inertia: Array | None = None,
 ) -> ModalBasis:
-    """Modal basis of modes (d, m) without geometry, from rows of the points."""
+    """Modal basis of modes (d, m) without geometry, from rows of the points.
+
+    ``inertia`` (d, 2) are forces of unit accelerations in x and y, see :func:`inertia_of`.
+    """
     n = rows.contact_nodes
     T = np.asarray(rows.restriction @ shapes).reshape(-1, 3, len(w))
     positions = np.zeros((len(T), 2))
@@ -135,7 +145,22 @@ def assembled_basis(
         extra=rows.extra,
         groups=rows.groups,
         thickness=thickness,
+        inertia_rows=None if inertia is None else inertia.T @ shapes,
     )
+
+
+def inertia_of(mass: Any, translations: ArrayLike | None) -> Array | None:
+    """Forces (d, 2) of unit accelerations in x and y, from unit translations (2, d), if given.
+
+    InputError for another shape, or values that are not finite.
+    """
+    if translations is None:
+        return None
+    given, d = as_floats(translations, "translations"), mass.shape[0]
+    if given.shape != (2, d) or not np.isfinite(given).all():
+        raise InputError(f"translations must be (2, {d}) finite numbers, the degrees of freedom in "
+                         f"unit translations in x and in y, not of shape {given.shape}.")
+    return np.asarray(mass @ given.T)
 
 
 def given_matrix(kind: str, given: Any) -> Given:

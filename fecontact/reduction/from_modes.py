@@ -10,7 +10,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.eigenmodes import fixed_signs
-from fecontact.reduction.from_matrices import assembled_basis, given_matrix
+from fecontact.reduction.from_matrices import assembled_basis, given_matrix, inertia_of
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.restriction import stack_restriction
 
@@ -92,6 +92,7 @@ def basis_from_modes(
     contact_x: ArrayLike | None = None,
     tributary: ArrayLike | None = None,
     thickness: float | None = None,
+    translations: ArrayLike | None = None,
 ) -> ModalBasis:
     """Modal basis from computed or measured mode shapes.
 
@@ -119,6 +120,8 @@ def basis_from_modes(
         As for :func:`~fecontact.basis_from_matrices`.
     thickness : float, optional
         Likewise.
+    translations : (2, d) array, optional
+        Likewise; needs the mass matrix.
 
     Raises
     ------
@@ -131,6 +134,10 @@ def basis_from_modes(
     if (mass is None) == (modal_mass is None):
         raise InputError("Give either mass, the mass matrix, or modal_mass, the modal masses of "
                          "the shapes (1 for mass-normalised ones).")
+    if translations is not None and mass is None:
+        raise InputError("translations need mass, the mass matrix, for the inertia of the body; "
+                         "give it instead of modal_mass.")
+    inertia = None if mass is None else inertia_of(given_matrix("mass", mass).matrix, translations)
     if mass is not None:
         found = normalisation(S, mass)
         masses = found.modal_masses
@@ -152,7 +159,8 @@ def basis_from_modes(
     order = np.argsort(w, kind="stable")
     return assembled_basis(
         w[order], (S * signs)[:, order], stack_restriction(rows, d), contact_x=contact_x,
-        tributary=tributary, thickness=thickness, damping=_reordered(damping, order, signs))
+        tributary=tributary, thickness=thickness, damping=_reordered(damping, order, signs),
+        inertia=inertia)
 
 
 def _shapes(shapes: ArrayLike) -> Array:

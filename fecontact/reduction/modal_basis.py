@@ -1,15 +1,18 @@
 """The modal basis: eigenfrequencies, damping and the rows of T at the points of interest."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_positive
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, listed, span
+from fecontact.fem.fields import BodyFields
+from fecontact.fem.interpolation import interpolation
+from fecontact.fem.points import rotating_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +35,8 @@ class ModeShapes:
         Displacements and rotation of the P points from those of the nodes (node by node, x then y),
         so that ``T = restriction @ shapes``; its transpose distributes a force at a point over the
         nodes.
+    elements : (E, k) integer array, optional
+        Nodes of each finite element: corners, mid-sides, centre; by default the cells.
     """
 
     nodes: Array
@@ -40,6 +45,16 @@ class ModeShapes:
     shapes: Array
     stress: Array
     restriction: Any
+    elements: Integers | None = None
+
+    def rows_at(self, place: Sequence[float], name: str) -> Array:
+        """Displacement x, y and rotation (3, m) of the modes at a place within an element.
+
+        InputError, with ``name`` in front, for a place outside the body.
+        """
+        elements = self.cells if self.elements is None else self.elements
+        rows = rotating_rows(len(self.nodes), *interpolation(self.nodes, elements, place, name))
+        return np.asarray(rows @ self.shapes.reshape(2 * len(self.nodes), -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +71,21 @@ class ReductionQuality:
         ``|K s - w^2 M s| / (|K| |s|)`` of each mode s; small for eigenmodes only.
     orthogonality : float
         Largest entry of ``shapes^T M shapes - 1``.
-    participation : (2, m) array
-        ``s^T M 1`` for translations in x and in y [kg^(1/2)]; its square is the effective mass.
     compliance : (P, 2) array
         Elastic displacement of each point in x and y per unit force there, of the full body (loads
         are balanced by supports and inertia) [m/N].
+    load_compliance : (1 + b, 2) array
+        Work ``f^T u`` of the loads in the elastic displacement under them, of the full body:
+        gravity of 1 m/s^2 in x and y [N m], then for each of the b boundaries pressure and
+        shear of 1 Pa.
     """
 
     mass: float
     vibration_modes: int
     residuals: Array
     orthogonality: float
-    participation: Array
     compliance: Array
+    load_compliance: Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,6 +120,13 @@ class ModalBasis(Summarised):
     thickness : float or None
         Out-of-plane thickness of the body [m], which makes pressures of line loads; None where it
         is not known.
+    inertia_rows : (2, m) array or None
+        ``1^T M s`` of the modes s for translations in x and in y [kg^(1/2)]: the modal forces of a
+        unit acceleration; its squares are the effective masses. None if the mass is not known.
+    boundaries : tuple of str
+        Named boundaries on which loads can act.
+    boundary_rows : (b, 2, m) array
+        Modal forces of a pressure of 1 Pa on each of them, and of a shear of 1 Pa.
 
     Raises
     ------
@@ -121,9 +145,16 @@ class ModalBasis(Summarised):
     quality: ReductionQuality | None = None
     groups: tuple[tuple[str, int], ...] = ()
     thickness: float | None = None
+    inertia_rows: Array | None = None
+    boundaries: tuple[str, ...] = ()
+    boundary_rows: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
 
     def __post_init__(self) -> None:
-        for name in ("angular_frequencies", "damping", "T", "positions", "tributary"):
+        m = len(self.angular_frequencies)
+        if not self.boundaries and not np.size(self.boundary_rows):
+            object.__setattr__(self, "boundary_rows", np.zeros((0, 2, m)))
+        given = ["angular_frequencies", "damping", "T", "positions", "tributary", "boundary_rows"]
+        for name in [*given, *(() if self.inertia_rows is None else ("inertia_rows",))]:
             array = np.array(getattr(self, name), dtype=float, order="C")
             if not np.isfinite(array).all():
                 raise InputError(f"Modal basis: {name} holds values that are not finite.")
@@ -141,10 +172,11 @@ class ModalBasis(Summarised):
             raise InputError(f"Modal basis: the contact groups {groups} do not add up to the "
                              f"{len(self.tributary)} contact nodes.")
         object.__setattr__(self, "groups", groups)
-        m = len(self.angular_frequencies)
         points = 2 + len(self.tributary) + len(self.extra)
-        for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2))):
-            if getattr(self, name).shape != shape:
+        for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2)),
+                            ("inertia_rows", (2, m)),
+                            ("boundary_rows", (len(self.boundaries), 2, m))):
+            if getattr(self, name) is not None and getattr(self, name).shape != shape:
                 raise InputError(f"Modal basis: {name} must have shape {shape}, not "
                                  f"{getattr(self, name).shape}.")
 
@@ -249,6 +281,47 @@ class ModalBasis(Summarised):
         rows = self.T[:, :2, elastic] / self.angular_frequencies[elastic]
         return np.asarray((rows**2).sum(axis=2))
 
+    @property
+    def elastic_load_compliance(self) -> Array:
+        """``f^T u`` of gravity and of the boundary loads as in ReductionQuality, in elastic modes.
+
+        (1 + b, 2); NaN for gravity without rows of inertia.
+        """
+        gravity = np.full((2, self.modes), np.nan) if self.inertia_rows is None else (
+            self.inertia_rows)
+        elastic = self.angular_frequencies > 0.0
+        rows = np.concatenate([gravity[None], self.boundary_rows])[..., elastic]
+        return np.asarray(((rows / self.angular_frequencies[elastic]) ** 2).sum(axis=2))
+
+    def boundary_row(self, boundary: str) -> Array:
+        """Rows (2, m) of :attr:`boundary_rows` by name; InputError for an unknown boundary."""
+        if boundary not in self.boundaries:
+            raise InputError(f"The basis has no boundary '{boundary}'"
+                             f"{nearest(boundary, self.boundaries)}; its boundaries are: "
+                             f"{choices(self.boundaries) or 'none'}.")
+        return np.asarray(self.boundary_rows[self.boundaries.index(boundary)])
+
+    def fields(self, q: ArrayLike) -> BodyFields:
+        """Displacement and stress over the body at modal coordinates q (m,).
+
+        For example ``basis.fields(static_equilibrium(system))``. Stresses are as good as the modes
+        are for the loads: see ``loads`` of :func:`~fecontact.modal_basis`.
+
+        Raises
+        ------
+        InputError
+            For a basis without shapes over the body, or another number of coordinates.
+        """
+        shapes, values = self.mode_shapes, as_floats(q, "The modal coordinates")
+        if shapes is None:
+            raise InputError("The modal basis holds no shapes over the body; make it with "
+                             "modal_basis(body, ...).")
+        if values.shape != (self.modes,):
+            raise InputError(f"The modal coordinates must have shape ({self.modes},), not "
+                             f"{values.shape}.")
+        return BodyFields(shapes.nodes, shapes.cells if shapes.elements is None
+                          else shapes.elements, shapes.shapes @ values, shapes.stress @ values)
+
     def with_dashpots(self, dashpots: Mapping[str | int, tuple[float, float]]) -> "ModalBasis":
         """A copy with dashpots between points of the body and the inertial frame.
 
@@ -295,10 +368,11 @@ class ModalBasis(Summarised):
             angular_frequencies=self.angular_frequencies[chosen],
             damping=self.damping[np.ix_(chosen, chosen)],
             T=self.T[:, :, chosen],
+            inertia_rows=None if self.inertia_rows is None else self.inertia_rows[:, chosen],
+            boundary_rows=self.boundary_rows[..., chosen],
             mode_shapes=None if given is None else replace(
                 given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
             quality=None if quality is None else replace(
                 quality, residuals=quality.residuals[chosen],
-                participation=quality.participation[:, chosen],
                 vibration_modes=int(np.count_nonzero(chosen < quality.vibration_modes))),
         )

@@ -8,8 +8,10 @@ import numpy as np
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.types import Array, Integers
+from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.fields import body_elements, linear_cells, stress_of
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
@@ -32,6 +34,7 @@ def modal_basis(
     damping: Damping = 0.0,
     reduction: Reduction = "vibration",
     tolerance: float = 0.1,
+    loads: Sequence[Place] = (),
 ) -> ModalBasis:
     """Mass-normalised modes, and T at B, C and the contact nodes.
 
@@ -61,7 +64,10 @@ def modal_basis(
         contact nodes, for exact static deflections there; or fixed-interface and constraint modes.
     tolerance : float
         For 'residual': largest fraction of its static compliance that may be missing at any of
-        these points, in x or y. Zero keeps all residual vectors.
+        these points, in x or y, or for one of the loads. Zero keeps all residual vectors.
+    loads : sequence of 'gravity' or place
+        Further loads whose static response is added, if not for 'vibration': 'gravity' (and base
+        acceleration), pressure and shear on a boundary, forces at a further point or place.
 
     Raises
     ------
@@ -89,12 +95,16 @@ def modal_basis(
     further = [place_rows(body, place, name) for name, place in points.items()]
     restriction = sp.csr_array(sp.vstack(
         [*(row.matrix for row in named), face.matrix, *(row.matrix for row in further)]))
+    if loads and reduction == "vibration":
+        raise InputError("loads complete the modes only with reduction = 'residual' or "
+                         "'craig-bampton'; choose one of these, or leave loads out.")
     system = FreeSystem.of(body)
+    completing = loading(body, system, loads, points)
     # Forces act at B, C and the contact nodes in x and y; there are no moments.
     loaded = np.flatnonzero(np.arange(restriction.shape[0]) % 3 < 2)
     flexibility = Flexibility(system, sp.csr_array(restriction[loaded] @ body.expansion))
     w, free_shapes, vibration = _modes(system, flexibility, modes, reduction, tolerance,
-                                       used=2 * (2 + len(face.tributary)))
+                                       2 * (2 + len(face.tributary)), completing)
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
@@ -102,6 +112,10 @@ def modal_basis(
         given = as_floats(damping, "The damping")
         if given.shape == (modes,) and len(w) > modes:
             damping = np.append(given, np.full(len(w) - modes, given[-1]))
+    names = tuple(body.mesh.boundaries)
+    forces = np.stack([inertia_forces(body), *(boundary_forces(body, name) for name in names)])
+    rows = np.asarray(forces.transpose(0, 2, 1) @ shapes)
+    elements = body_elements(body)
     return ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),
@@ -112,25 +126,29 @@ def modal_basis(
         extra=tuple(points),
         mode_shapes=ModeShapes(
             nodes=body.nodes,
-            cells=linear_cells(body),
+            cells=linear_cells(body.nodes, elements),
             outline=_halved(body.edge_nodes(body.mesh.outline)),
             shapes=shapes.reshape(-1, 2, len(w)),
-            stress=modal_stress(body, shapes),
+            stress=stress_of(body, shapes),
             restriction=restriction,
+            elements=elements,
         ),
-        quality=_quality(body, system, flexibility, w, free_shapes, vibration),
+        quality=_quality(body, system, flexibility, w, free_shapes, vibration, forces),
         groups=face.groups,
         thickness=body.thickness,
+        inertia_rows=rows[0],
+        boundaries=names,
+        boundary_rows=rows[1:],
     )
 
 
 def _modes(
     system: FreeSystem, flexibility: Flexibility, count: int, reduction: Reduction,
-    tolerance: float, used: int,
+    tolerance: float, used: int, loads: Array,
 ) -> tuple[Array, Array, int]:
     """Frequencies, shapes and number of the eigenmodes among them."""
     if reduction == "craig-bampton":
-        w, shapes = craig_bampton(system, flexibility.rows[:used], count)
+        w, shapes = craig_bampton(system, flexibility.rows[:used], count, loads)
         return w, shapes, system.rigid.shape[1]
     w, shapes = free_modes(system, count)
     if reduction == "vibration":
@@ -138,54 +156,51 @@ def _modes(
     if count < system.rigid.shape[1]:
         raise InputError(f"modes = {count} must be at least the number of rigid modes, "
                          f"{system.rigid.shape[1]}, for reduction = 'residual'.")
-    more, completing = residual_modes(flexibility.of_first(used), w, shapes, tolerance)
+    more, completing = residual_modes(flexibility.of_first(used), w, shapes, tolerance,
+                                      loads)
     return np.concatenate([w, more]), np.hstack([shapes, completing]), count
 
 
 def _quality(
     body: ElasticBody, system: FreeSystem, flexibility: Flexibility, w: Array, shapes: Array,
-    vibration: int,
+    vibration: int, forces: Array,
 ) -> ReductionQuality:
+    """``forces`` (1 + b, 2 N, 2) are those of gravity and of the boundary loads."""
     inertia = system.mass @ shapes
-    ones = np.eye(2)[np.arange(2 * len(body.nodes)) % 2]
+    free = np.hstack([body.expansion.T @ one for one in forces])
     return ReductionQuality(
         mass=float(body.mesh.area * body.thickness * body.material.density),
         vibration_modes=vibration,
         residuals=backward_error(system.stiffness, system.mass, w**2, shapes),
         orthogonality=float(np.abs(shapes.T @ inertia - np.eye(len(w))).max()),
-        participation=(ones.T @ body.mass) @ (body.expansion @ shapes),
         compliance=np.maximum(np.diag(flexibility.compliance), 0.0).reshape(-1, 2),
+        load_compliance=(free * system.deflection(free)).sum(axis=0).reshape(-1, 2)
+        * _deforms(system, free).reshape(-1, 2),
     )
 
 
-def linear_cells(body: ElasticBody) -> Integers:
-    """First-order cells between all displacement nodes, counter-clockwise."""
-    # 64-bit indices, as in files.
-    dofs = body.basis.element_dofs.astype(np.int64)
-    if body.degree == 1:
-        cells = dofs.T
-    elif len(dofs) == 6:
-        a, b, c, ab, bc, ac = dofs
-        cells = np.concatenate([np.column_stack(cell) for cell in (
-            (a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac))])
-    else:
-        a, b, c, d, ab, bc, cd, ad, m = dofs
-        cells = np.concatenate([np.column_stack(cell) for cell in (
-            (a, ab, m, ad), (ab, b, bc, m), (m, bc, c, cd), (ad, m, cd, d))])
-    side = body.nodes[cells[:, :3]]
-    (ux, uy), (vx, vy) = (side[:, 1] - side[:, 0]).T, (side[:, 2] - side[:, 0]).T
-    return np.where((ux * vy - uy * vx < 0.0)[:, None], cells[:, ::-1], cells)
+def _deforms(system: FreeSystem, forces: Array) -> Array:
+    """Whether forces (f, k) are more than what accelerates the body as a whole."""
+    rest = forces - system.inertia @ (system.rigid.T @ forces)
+    return np.asarray(np.abs(rest).max(axis=0) > 1e-9 * np.abs(forces).max(axis=0))
 
 
-def modal_stress(body: ElasticBody, shapes: Array) -> Array:
-    """Stresses xx, yy, zz, xy (N, 4, m) of displacement fields (2 N, m), means at nodes [Pa]."""
-    dx, dy = body.gradients
-    direct, lateral, shear = body.elasticity
-    u, v = shapes[0::2], shapes[1::2]
-    xx, yy, slide = dx @ u, dy @ v, dy @ u + dx @ v
-    sxx, syy = direct * xx + lateral * yy, lateral * xx + direct * yy
-    szz = body.material.poisson_ratio * (sxx + syy) * (body.plane == "strain")
-    return np.stack([sxx, syy, szz, shear * slide], axis=1)
+def loading(
+    body: ElasticBody, system: FreeSystem, loads: Sequence[Place], points: Mapping[str, Place]
+) -> Array:
+    """Forces (f, k) on the free degrees of freedom of named loads, two for each."""
+    require_kind("modal_basis", (list, tuple), loads=loads)
+    found = [np.zeros((2 * len(body.nodes), 0))]
+    for load in loads:
+        if str(load) == "gravity":
+            found.append(inertia_forces(body))
+        elif isinstance(load, str) and load in body.mesh.boundaries and load not in points:
+            found.append(boundary_forces(body, load))
+        else:
+            place = points.get(load, load) if isinstance(load, str) else load
+            found.append(place_rows(body, place, f"of loads ({load})").matrix[:2].T.toarray())
+    forces = np.asarray(body.expansion.T @ np.hstack(found))
+    return forces[:, _deforms(system, forces)] if forces.shape[1] else forces
 
 
 def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:

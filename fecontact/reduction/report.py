@@ -24,10 +24,10 @@ class BasisReport:
     @property
     def effective_mass(self) -> Array:
         """Share (2, m) of the body's mass that moves with each mode, in x and in y."""
-        quality = self.basis.quality
-        if quality is None:
+        quality, rows = self.basis.quality, self.basis.inertia_rows
+        if quality is None or rows is None:
             return np.full((2, self.basis.modes), np.nan)
-        return np.asarray(quality.participation**2 / quality.mass)
+        return np.asarray(rows**2 / quality.mass)
 
     @cached_property
     def compliance_error(self) -> Array:
@@ -38,12 +38,20 @@ class BasisReport:
         quality = self.basis.quality
         if quality is None:
             return np.full((len(self.basis.T), 2), np.nan)
-        whole = quality.compliance
-        # Compliances are differences of rigid contributions; smaller ones are round-off.
-        real = whole > 1e-10 * whole.max(initial=0.0)
-        error = 1.0 - np.divide(self.basis.elastic_compliance, whole, out=np.ones_like(whole),
-                                where=real)
-        return np.asarray(np.where(real, error, 0.0))
+        return _missing(self.basis.elastic_compliance, quality.compliance)
+
+    @cached_property
+    def load_error(self) -> Array:
+        """Fraction (1 + b, 2) of the elastic response to loads that is missing in the basis.
+
+        Gravity in x and y, then pressure and shear on each of ``basis.boundaries``; zero for loads
+        that do not deform the body.
+        """
+        quality, kept = self.basis.quality, self.basis.elastic_load_compliance
+        if quality is None:
+            return np.full(kept.shape, np.nan)
+        return np.concatenate([_missing(kept[:1], quality.load_compliance[:1]),
+                               _missing(kept[1:], quality.load_compliance[1:])])
 
     @property
     def contact_error(self) -> Array:
@@ -108,6 +116,15 @@ class BasisReport:
         return [("BC"[point], "xy"[axis], float(self.compliance_error[point, axis]))
                 for point, axis in ((0, 0), (0, 1), (1, 1)) if rows[point, axis]]
 
+    def _load_lines(self) -> list[str]:
+        assert self.basis.quality is not None
+        gravity, *boundaries = self.load_error
+        whole = self.basis.quality.load_compliance[1:]
+        return [f"missing static response to gravity: x {gravity[0]:.2%}, y {gravity[1]:.2%}",
+                *(f"missing static response to loads on '{name}': pressure {pressure:.2%}, shear "
+                  f"{shear:.2%}" for name, (pressure, shear), work in zip(
+                      self.basis.boundaries, boundaries, whole, strict=True) if work.any())]
+
     def __str__(self) -> str:
         basis, mass = self.basis, self.effective_mass
         lines = [f"{'mode':>4s} {'frequency [Hz]':>15s} {'damping':>9s} {'mass x':>8s} "
@@ -126,6 +143,7 @@ class BasisReport:
                       f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
                       *(f"missing static compliance at {name}: {axis} {error:.2%}"
                         for name, axis, error in self._loaded_points()),
+                      *self._load_lines(),
                       f"effective mass kept: x {mass[0].sum():.2%}, y {mass[1].sum():.2%}",
                       f"mass-orthogonality: {self.orthogonality:.1e}"]
         if self.highest_frequency_hz > 0.0:
@@ -141,3 +159,11 @@ class BasisReport:
         if quality is None or mode < quality.vibration_modes:
             return "vibration"
         return "reduced" if quality.vibration_modes == self.basis.rigid_modes else "completing"
+
+
+def _missing(kept: Array, whole: Array) -> Array:
+    """Missing fractions of compliances; zero where there is none."""
+    # Compliances are differences of rigid contributions; smaller ones are round-off.
+    real = whole > 1e-10 * whole.max(initial=0.0)
+    error = 1.0 - np.divide(kept, whole, out=np.ones_like(whole), where=real)
+    return np.asarray(np.where(real, np.maximum(error, 0.0), 0.0))

@@ -93,19 +93,24 @@ def leading_patterns(whole: Array, kept: Array, tolerance: float) -> Array:
 
 
 def residual_modes(
-    flexibility: Flexibility, w: Array, shapes: Array, tolerance: float
+    flexibility: Flexibility, w: Array, shapes: Array, tolerance: float, loads: Array
 ) -> tuple[Array, Array]:
     """Frequencies (p,) and shapes (f, p) that complete the modes (f, m) at the rows.
 
-    They span the residual vectors of the leading force patterns, are orthogonal to the modes and
-    to each other in mass and stiffness, and mass-normalised.
+    They span the residual vectors of the leading force patterns and those of loads (f, l) of whose
+    static response more than the tolerance is missing, are orthogonal to the modes and to each
+    other in mass and stiffness, and mass-normalised.
     """
     system = flexibility.system
     kept = modal_compliance(flexibility.rows, w, shapes)
     patterns = leading_patterns(flexibility.compliance, kept, tolerance)
-    if not patterns.shape[1]:
+    deflections = system.deflection(loads)
+    whole_work = (loads * deflections).sum(axis=0)
+    work = ((loads.T @ shapes[:, w > 0.0] / w[w > 0.0]) ** 2).sum(axis=1)
+    lacking = whole_work - work > max(tolerance, 1e-12) * whole_work
+    if not patterns.shape[1] and not lacking.any():
         return np.zeros(0), np.zeros((len(shapes), 0))
-    vectors = flexibility.deflections(patterns)
+    vectors = np.hstack([flexibility.deflections(patterns), deflections[:, lacking]])
     inertia = system.mass @ shapes
     for _ in range(2):
         vectors -= shapes @ (inertia.T @ vectors)

@@ -122,7 +122,11 @@ class BasisSettings:
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Static shapes added to the vibration modes.
     tolerance : float
-        For 'residual': fraction of the static compliance at the points that may be neglected.
+        For 'residual': fraction of the static compliance at the points, and of the response to the
+        loads, that may be neglected.
+    loads : list of places
+        Loads whose static response is added to the modes, for 'residual' and 'craig-bampton':
+        'gravity' (and base acceleration), boundaries (pressure and shear), points (forces).
     dashpots : mapping of point to [b_x, b_y]
         Viscous dampers between points, or contact nodes by number, and the inertial frame
         [N s/m].
@@ -139,6 +143,7 @@ class BasisSettings:
     damping: float | tuple[float, ...] | Rayleigh | LossFactor = 0.0
     reduction: Literal["vibration", "residual", "craig-bampton"] = "vibration"
     tolerance: float = 0.1
+    loads: tuple[Place, ...] = ()
     dashpots: Annotated[Mapping[str, tuple[float, float]], Unit("N s/m")] = field(
         default_factory=dict)
     select: tuple[int, ...] | None = None
@@ -161,7 +166,7 @@ class BasisSettings:
         basis = modal_basis(
             body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
             C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
-            damping=self.damping)
+            damping=self.damping, loads=self.loads)
         if self.dashpots:
             basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
                                          for point, values in self.dashpots.items()})

@@ -391,7 +391,11 @@ def contact_system(study: "Study", basis: ModalBasis, title: str) -> ContactSyst
             require_sound(law)
     for force in study.load.forces:
         with located(f"{title}: [load.forces]:"):
-            basis.point_index(force.point)
+            if not isinstance(force.point, tuple):
+                basis.point_index(force.point)
+    for load in study.load.boundaries:
+        with located(f"{title}: [load.boundaries]:"):
+            basis.boundary_row(load.boundary)
     with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
         gap = gap_values(study.gap, basis.contact_x)
     parts: dict[str, Any] = {part: getattr(study, part) for part in PART_CLASSES}

@@ -68,8 +68,9 @@ class Bases:
             raise AnalysisError(f"{self.store.basis_file(key)} cannot be written "
                                 f"({(error.strerror or str(error)).lower()}).") from None
         # Fields are large; workers that write them have access to the folder anyway.
+        at_places = any(isinstance(force.point, tuple) for force in self.study.load.forces)
         self.ready[key] = (self.store.basis_file(key).absolute() if batch.frames
-                           else packed(basis, shapes=False))
+                           else packed(basis, shapes=at_places))
 
     def _released(self) -> list[Job]:
         free = [batch for keys, batch in self.held if keys <= self.ready.keys()]

@@ -6,15 +6,12 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.compiled import CompiledLaw
-from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.kernels import SystemArrays
-
-_COMPONENTS = ("x", "y", "phi")
-
+from fecontact.system.loads import load_rows
 
 LawGroup = tuple[slice, Array, Any]
 
@@ -28,7 +25,7 @@ def system_arrays(
     The groups are contact nodes that share a law: their place, each one's part of their face, and
     the law; see :meth:`fecontact.ContactSystem.law_groups`.
     """
-    B, C = basis.T[0], basis.T[1]
+    B = basis.T[0]
     stiffness = np.diag(basis.angular_frequencies**2)
     damping = basis.damping.copy()
     springs = np.array([drive.stiffness_x, drive.stiffness_y], dtype=float)
@@ -37,25 +34,24 @@ def system_arrays(
                        (1, drive.stiffness_y, drive.damping_y)):
         stiffness += c * np.outer(B[axis], B[axis])
         damping += b * np.outer(B[axis], B[axis])
-    n, m = basis.contact_nodes, basis.modes
+    n = basis.contact_nodes
     friction_groups = list(friction_groups)
     normal, normal_parameters = _law_table(normal_groups)
     friction, friction_parameters = _law_table(friction_groups)
     memory = [np.full(nodes.stop - nodes.start, law.memory, dtype=np.int64)
               for nodes, _, law in friction_groups]
-    loads = load.forces
-    load_shapes = [basis.T[basis.point_index(force.point), _COMPONENTS.index(force.component)]
-                   for force in loads]
+    constant_load, load_shapes = load_rows(basis, load)
+    signals = load.signals.values()
     scale = ground.friction_scale_kernel
     return SystemArrays(
         stiffness=stiffness,
         damping=damping,
         modal_damping=basis.damping.copy(),
-        constant_load=-load.normal * C[1],
+        constant_load=constant_load,
         drive_shapes=np.array(B[:2], dtype=float),
         drive_stiffness=springs,
         drive_damping=dashpots if drive.dashpots == "relative" else np.zeros(2),
-        load_shapes=np.array(load_shapes, dtype=float).reshape(-1, m),
+        load_shapes=load_shapes,
         Tx=basis.contact_T[:, 0].copy(),
         Ty=basis.contact_T[:, 1].copy(),
         abscissa=basis.contact_x.copy(),
@@ -67,36 +63,17 @@ def system_arrays(
         friction_scale_parameters=ground.friction_scale_parameters(),
         ground_motion_parameters=ground.motion_parameters(),
         drive_parameters=_rows([motion.parameters() for motion in drive.motions]),
-        load_parameters=_rows([force.signal.parameters() for force in loads]),
+        load_parameters=_rows([signal.parameters() for signal in signals]),
         normal=normal,
         friction=friction,
         memory=np.concatenate(memory),
         drive=_addresses(motion.kernel for motion in drive.motions),
-        load=_addresses(force.signal.kernel for force in loads),
+        load=_addresses(signal.kernel for signal in signals),
         profile=ground.profile_kernel.address,
         friction_scale=0 if scale is None else scale.address,
         ground_motion=ground.motion_kernel.address,
         leans=int(ground.normal == "surface"),
     )
-
-
-def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
-    """Raise InputError for a drive or load in a direction in which no mode moves its point."""
-    acting: list[tuple[str, str | int, str]] = [
-        (f"Drive: {name} = {value!r}", "B", axis)
-        for axis, name, value in (("x", "stiffness_x", drive.stiffness_x),
-                                  ("x", "damping_x", drive.damping_x),
-                                  ("y", "stiffness_y", drive.stiffness_y),
-                                  ("y", "damping_y", drive.damping_y)) if value]
-    if load.normal:
-        acting.append((f"Load: normal = {load.normal!r}", "C", "y"))
-    acting += [(f"Load: a force at {force.point!r} with component {force.component!r}", force.point,
-                force.component) for force in load.forces]
-    for what, point, component in acting:
-        if not basis.T[basis.point_index(point), _COMPONENTS.index(component)].any():
-            turn = "turns" if component == "phi" else f"moves along {component}"
-            raise InputError(f"{what} has no effect, as {point!r} {turn} in no mode of the basis; "
-                             f"leave it out, or give the basis rows for that point.")
 
 
 def _bristles(friction_groups: list[LawGroup], n: int) -> Array:

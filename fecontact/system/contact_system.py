@@ -21,8 +21,9 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
-from fecontact.system.arrays import require_motion, system_arrays
+from fecontact.system.arrays import system_arrays
 from fecontact.system.gap import Gap, gap_values
+from fecontact.system.loads import require_motion
 
 NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a rough "
                  "surface with its stiffness and roughness_height, or another law: `fecontact "
@@ -140,8 +141,7 @@ class ContactSystem(Summarised):
             ("ground", quantity(ground.speed, "m/s")
              + (f", {quantity(high - low, 'm')} from valley to peak" if ground.wavy else "")),
             ("drive", listed(stiffness) + (f", {moved:.5g} Hz" if moved else "")),
-            ("load", quantity(self.load.normal, "N")
-             + (f", {len(self.load.forces)} in time" if self.load.forces else "")),
+            ("load", _load_summary(self.load)),
         ]
 
     def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
@@ -196,7 +196,7 @@ class ContactSystem(Summarised):
     def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
         """Times between two [s] at which drive, loads or ground motion have kinks, ascending."""
         given: tuple[Any, ...] = (
-            *self.drive.motions, *(force.signal for force in self.load.forces), self.ground)
+            *self.drive.motions, *self.load.signals.values(), self.ground)
         return tuple(sorted({time for source in given
                              for time in source.breakpoints(start, end)}))
 
@@ -206,7 +206,7 @@ class ContactSystem(Summarised):
         Waves pass at the largest speed of the ground between the two times [s].
         """
         given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
-        given += [force.signal for force in self.load.forces]
+        given += self.load.signals.values()
         given += [self.ground.motion] if self.ground.motion is not None else []
         periods = [source.shortest_period for source in given]
         wavelength, speed = self.ground.shortest_wavelength, self.ground.largest_speed(start, end)
@@ -318,6 +318,17 @@ class ContactSystem(Summarised):
         return InputError(f"The system has no parameter '{_outer_name(self, name)}'"
                           f"{nearest(name, names)}; "
                           f"its parameters are: {choices(names)}.")
+
+
+def _load_summary(load: Load) -> str:
+    parts = [quantity(load.normal, "N")]
+    if any(load.gravity):
+        parts.append(f"gravity ({load.gravity[0]:.4g}, {load.gravity[1]:.4g}) m/s²")
+    if load.boundaries:
+        parts.append(f"on {listed([one.boundary for one in load.boundaries])}")
+    if load.signals:
+        parts.append(f"{len(load.signals)} in time")
+    return ", ".join(parts)
 
 
 def _law_names(law: Any) -> str:

@@ -30,7 +30,7 @@ def common_period(system: ContactSystem) -> float | None:
     given: list[tuple[str, Any]] = [
         (f"drive.motion_{axis}", motion)
         for axis, acts, motion in zip("xy", drive.moves, drive.motions, strict=True) if acts]
-    given += [(f"load.forces.{k}", force.signal) for k, force in enumerate(system.load.forces)]
+    given += [(f"load.{name}", signal) for name, signal in system.load.signals.items()]
     periods = []
     for name, source in given:
         if isinstance(source, Constant) or (isinstance(source, _REPEATING)

@@ -5,6 +5,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, require_finite
 from fecontact.core.types import Array
+from fecontact.laws.excitation import Load
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
 from fecontact.system import kernels as kernels
@@ -273,7 +274,7 @@ def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
     load = arrays.constant_load.copy()
     springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
     given = [*zip(springs, system.drive.motions, strict=True),
-             *zip(arrays.load_shapes, (force.signal for force in system.load.forces), strict=True)]
+             *zip(arrays.load_shapes, system.load.signals.values(), strict=True)]
     for shape, source in given:
         if isinstance(source, Constant):
             load += source.value * shape
@@ -307,7 +308,9 @@ def _reason(system: ContactSystem, problem: _Balance, friction: bool) -> str:
         return (f"There is no {kind}: nothing holds the body against "
                 f"{_named(system, direction)}; give it a spring at B (drive.stiffness_x, "
                 f"drive.stiffness_y) or a support.")
-    return (f"There is no {kind}: under load.normal = {system.load.normal:g} N the body lifts off "
+    load = system.load
+    more = " and the further loads" if load != Load(load.normal) else ""
+    return (f"There is no {kind}: under load.normal = {load.normal:g} N{more} the body lifts off "
             f"or tips over; check the sign and place of the load, and the length of the contact.")
 
 

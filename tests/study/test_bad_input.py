@@ -241,6 +241,17 @@ load.forces [{}]
 load.forces [{point="Q",signal={law="constant",value=1},component="x"}] forces
 load.forces [3]
 load.forces.0.signal 3
+load.forces [{point=[9,9],signal={law="constant",value=1}}] outside
+load.gravity 3
+load.gravity [0]
+load.gravity [0,nan] gravity
+load.base_acceleration_x 3
+load.boundaries 3
+load.boundaries [{boundary="nix",pressure=1}] nix
+load.boundaries [{boundary="top"}] zero
+load.boundaries [{boundary="top",pressure="a"}]
+basis.loads 3
+basis.loads ["gravity"] residual
 simulation.t_end 0
 simulation.t_end nan
 simulation.t_end inf

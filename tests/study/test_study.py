@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fecontact import (
+    BoundaryLoad,
     ContactSystem,
     ElasticBody,
     FecontactError,
@@ -20,7 +21,11 @@ from fecontact import (
     Study,
     generate,
     modal_basis,
+    read_case,
     simulate,
+    static_equilibrium,
+    static_solution,
+    write_case,
     write_mesh,
 )
 from fecontact.cli.templates import TEMPLATES, template
@@ -364,3 +369,74 @@ def test_mesh_files_that_are_no_plane_meshes(tmp_path):
         study = Study.from_toml(f'[geometry]\nfile = "{name}"', tmp_path / "s.toml")
         with pytest.raises((MeshError, InputError), match=message):
             study.mesh()
+
+
+LOADED = """
+geometry = { shape = "beam" }
+body = { thickness = 0.01, fixed = { left = "xy" } }
+normal = { stiffness = 1e6, roughness_height = 5.2e-6, damping = 6.0 }
+friction = { law = "constant", friction_coefficient = 0.2 }
+gap = 1e-4
+
+[basis]
+modes = 3
+contact_nodes = 4
+damping = 0.01
+reduction = "residual"
+tolerance = 0.0
+loads = ["gravity", "top", [0.15, 0.012]]
+
+[load]
+gravity = [0.0, -9.81]
+base_acceleration_x = { law = "harmonic", amplitude = 3.0, angular_frequency = 500.0 }
+
+[[load.boundaries]]
+boundary = "top"
+pressure = 2e4
+shear = { law = "step", time = 1e-3, value = 1e4 }
+
+[[load.forces]]
+point = [0.15, 0.012]
+signal = { law = "constant", value = -20.0 }
+
+[simulation]
+t_end = 2e-3
+outputs = 41
+"""
+
+
+def test_loads_of_a_study(tmp_path):
+    study = Study.from_toml(LOADED)
+    assert Study.from_toml(study.to_toml()) == study
+    system = study.system()
+    load = system.load
+    assert load.gravity == (0.0, -9.81)
+    assert list(load.signals) == ["forces.0", "base_acceleration_x", "boundaries.0.shear"]
+    run = study.run()
+    assert run.energies.imbalance < 1e-4
+    write_case(tmp_path / "loads.vtkhdf", run)
+    again = read_case(tmp_path / "loads.vtkhdf").trajectory.system
+    for name in ("constant_load", "load_shapes", "load_parameters"):
+        np.testing.assert_array_equal(getattr(again.arrays, name), getattr(system.arrays, name))
+    # At rest the modes and the elements agree where the beam does not touch.
+    free = study.with_(gap=1.0).system()
+    q = static_equilibrium(free)
+    fields = static_solution(study.elastic_body(), Load(
+        gravity=(0.0, -9.81), forces=load.forces,
+        boundaries=[BoundaryLoad("top", 2e4)]))
+    np.testing.assert_allclose(free.basis.fields(q).displacement, fields.displacement,
+                               atol=1e-8 * abs(fields.displacement).max())
+    moon = study.with_(**{"load.gravity": [0.0, -1.6], "load.boundaries.0.pressure": 1e4})
+    assert moon.load.gravity == (0.0, -1.6)
+    assert moon.load.boundaries[0].pressure == 1e4
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"load.boundaries.0.boundary": "tap"},
+     r"\[load.boundaries\]: The basis has no boundary 'tap' \(did you mean 'top'"),
+    ({"load.forces.0.point": [9.0, 0.0]}, r"a force: \(9, 0\) lies outside the body"),
+    ({"basis.reduction": "vibration"}, r"\[basis\]: loads complete the modes only with"),
+])
+def test_loads_of_a_study_that_do_not_fit_its_body(changes, message):
+    with pytest.raises(InputError, match=message):
+        Study.from_toml(LOADED).with_(**changes).system()

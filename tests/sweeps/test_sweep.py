@@ -71,6 +71,13 @@ def test_any_executor_gives_the_same_files(study, tmp_path):
     assert folders["serial"] == folders["threads"] == folders["processes"]
 
 
+def test_workers_know_the_places_of_loads(study, tmp_path):
+    force = {"point": [0.05, 0.03], "signal": {"law": "constant", "value": -1.0}}
+    loaded = study.with_(**{"load.forces": [force]})
+    table = sweep(loaded, {"ground.speed": [1e-3, 2e-3]}, Serial(), folder=tmp_path / "f")
+    assert not table.failed
+
+
 def test_numbers_of_laws_change_as_they_do_in_the_study(study):
     for name, value in (("ground.speed", 3), ("friction.decay", 2.5), ("drive.damping_x", 0.5),
                         ("load.normal", 9.0), ("normal.stiffness", 1e6), ("simulation.rtol", 1e-5),

@@ -16,6 +16,7 @@ from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWER_COUNT
+from fecontact.system.loads import work_of_loads
 
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
@@ -243,12 +244,12 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
     # Velocities that drive and loads bring about in each mode, within a step where it is slow.
     springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
     pushes = [(springs, [motion.largest for motion in drive.motions]),
-              (arrays.load_shapes, [force.signal.largest for force in system.load.forces])]
+              (arrays.load_shapes, [signal.largest for signal in system.load.signals.values()])]
     push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
     driven = push / np.maximum(np.sqrt(np.diag(arrays.stiffness)), 1.0 / longest)
     energy = (0.5 * state[m : 2 * m] @ state[m : 2 * m]
               + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
-              + abs(system.load.normal) * depth
+              + work_of_loads(system.basis, system.load, depth)
               + sum(0.5 * c * motion.largest**2 for c, motion in zip(
                   (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
               + 0.5 * driven @ driven)

@@ -10,6 +10,7 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import NODE_POWERS, POWERS, powers, right_hand_side
+from fecontact.system.loads import work_of_loads
 
 
 def integrate(
@@ -165,7 +166,7 @@ def energy_scale(system: ContactSystem, state: Array) -> float:
     springs = 0.5 * sum(
         c * motion.largest**2
         for c, motion in zip((drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
-    pressed = abs(system.load.normal) * system.penetration_scale
+    pressed = work_of_loads(system.basis, system.load, system.penetration_scale)
     return float(start + springs + pressed) or np.inf
 
 

@@ -137,6 +137,11 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
     group.attrs["extra"] = list(basis.extra)
+    if basis.inertia_rows is not None:
+        group.create_dataset("inertia_rows", data=basis.inertia_rows)
+    if basis.boundaries:
+        group.create_dataset("boundary_rows", data=basis.boundary_rows)
+        group["boundary_rows"].attrs["names"] = list(basis.boundaries)
     group.attrs["groups"] = [name for name, _ in basis.groups]
     group.attrs["group_sizes"] = [count for _, count in basis.groups]
     if basis.thickness is not None:
@@ -150,6 +155,8 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     shapes = group.create_group("mode_shapes")
     for name in _MODE_SHAPES:
         shapes.create_dataset(name, data=getattr(basis.mode_shapes, name))
+    if basis.mode_shapes.elements is not None:
+        shapes.create_dataset("elements", data=basis.mode_shapes.elements)
     restriction = basis.mode_shapes.restriction.tocsr()
     for name in ("data", "indices", "indptr"):
         shapes.create_dataset(f"restriction/{name}", data=getattr(restriction, name))
@@ -170,13 +177,23 @@ def stored_basis(group: Any) -> ModalBasis:
     extra = tuple(str(name) for name in np.atleast_1d(group.attrs["extra"]))
     names, sizes = (np.atleast_1d(group.attrs[name]) for name in ("groups", "group_sizes"))
     require_lengths("'group_sizes'", len(names), sizes)
+    boundaries: tuple[str, ...] = ()
+    loads: dict[str, Any] = {}
+    if "inertia_rows" in group:
+        loads["inertia_rows"] = array(group, "inertia_rows", (2, m))
+    if "boundary_rows" in group:
+        stored = member(group, "boundary_rows")
+        boundaries = tuple(str(name) for name in np.atleast_1d(stored.attrs["names"]))
+        loads["boundary_rows"] = array(group, "boundary_rows", (len(boundaries), 2, m))
     return ModalBasis(
         w, array(group, "damping", (m, m)), T, array(group, "positions", (len(T), 2)),
         array(group, "tributary", (None,)), extra=extra,
         mode_shapes=(_read_mode_shapes(member(group, "mode_shapes"), m, len(T))
                      if "mode_shapes" in group else None),
-        quality=_read_quality(member(group, "quality"), m, len(T)) if "quality" in group else None,
+        quality=(_read_quality(member(group, "quality"), m, len(T), len(boundaries))
+                 if "quality" in group else None),
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
+        boundaries=boundaries, **loads,
         thickness=float(group.attrs["thickness"]) if "thickness" in group.attrs else None)
 
 
@@ -198,15 +215,24 @@ def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
                                shape=shape)
     return ModeShapes(nodes, cells, indices(group, "outline", (None, 2), N),
                       array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
-                      sound_sparse(restriction))
+                      sound_sparse(restriction), _elements(group, N))
 
 
-def _read_quality(group: Any, modes: int, points: int) -> ReductionQuality:
+def _elements(group: Any, nodes: int) -> Any:
+    if "elements" not in group:
+        return None
+    elements = indices(group, "elements", (None, None), nodes)
+    if elements.shape[1] not in (3, 4, 6, 9):
+        raise DamagedError(f"elements have {elements.shape[1]} nodes, not 3, 4, 6 or 9")
+    return elements
+
+
+def _read_quality(group: Any, modes: int, points: int, boundaries: int) -> ReductionQuality:
     mass, count, orthogonality = (
         values(member(group, name)).item() for name in ("mass", "vibration_modes",
                                                         "orthogonality"))
     return ReductionQuality(
         mass=float(mass), vibration_modes=int(count), orthogonality=float(orthogonality),
         residuals=array(group, "residuals", (modes,)),
-        participation=array(group, "participation", (2, modes)),
-        compliance=array(group, "compliance", (points, 2)))
+        compliance=array(group, "compliance", (points, 2)),
+        load_compliance=array(group, "load_compliance", (1 + boundaries, 2)))

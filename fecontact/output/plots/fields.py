@@ -1,0 +1,83 @@
+"""Plots of stress over a body."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fecontact.core.checks import require_kind, require_scale
+from fecontact.core.errors import require_choice
+from fecontact.core.units import suitable_unit
+from fecontact.fem.fields import BodyFields
+from fecontact.output.plots.figure import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_STRESSES = ("xx", "yy", "zz", "xy")
+_DRAWN_DISPLACEMENT = 0.07  # largest one by default, relative to the body's extent
+_WIDTH, _LARGEST, _LEAST = 9.0, 8.0, 2.0  # inches: width, and limits of the height
+
+
+def plot_stress(
+    fields: BodyFields, *, component: str = "von_mises", scale: float | None = None,
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot a stress over the deformed body, and its undeformed outline.
+
+    Parameters
+    ----------
+    fields : BodyFields
+        What :func:`fecontact.static_solution` or :meth:`fecontact.ModalBasis.fields` gives.
+    component : 'von_mises', 'xx', 'yy', 'zz' or 'xy'
+        The stress that colours the body.
+    scale : float, optional
+        Magnification of displacements; by default chosen so that the largest is clearly visible.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For an unknown component, a scale that is not a number above zero, another
+        suffix, or a file that cannot be written.
+    """
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    require_kind("plot_stress", BodyFields, fields=fields)
+    require_choice("plot_stress", "component", component, ("von_mises", *_STRESSES))
+    if scale is not None:
+        require_scale("plot_stress", scale)
+    stress = fields.von_mises if component == "von_mises" else (
+        fields.stress[:, _STRESSES.index(component)])
+    moved = float(np.linalg.norm(fields.displacement, axis=1).max())
+    if scale is None:
+        extent = float(np.linalg.norm(np.ptp(fields.nodes, axis=0)))
+        scale = _DRAWN_DISPLACEMENT * extent / moved if moved else 1.0
+    places = fields.nodes + scale * fields.displacement
+    everything = np.vstack([fields.nodes, places])
+    width, height = np.ptp(everything, axis=0)
+    factor, unit = suitable_unit(float(np.abs(stress).max()), "Pa")
+    largest = float(np.abs(stress).max() / factor) or 1.0
+    name = "von Mises stress" if component == "von_mises" else f"stress {component}"
+    signed = component != "von_mises"
+    cells = fields.cells
+    if cells.shape[1] == 4:
+        cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    drawn_height = float(np.clip(0.75 * _WIDTH * height / width, _LEAST, _LARGEST))
+    with new_figure(_WIDTH, drawn_height, path) as figure:
+        axis = figure.subplots()
+        drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress / factor,
+                               shading="gouraud", cmap="RdBu_r" if signed else "viridis",
+                               vmin=-largest if signed else 0.0, vmax=largest, rasterized=True)
+        for nodes, colour in ((fields.nodes, "#8c8c8c"), (places, "#303030")):
+            axis.add_collection(LineCollection(list(nodes[fields.outline]), colors=colour,
+                                               linewidths=0.8))
+        margin = 0.02 * max(width, height)
+        low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin
+        axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
+                 xlabel="x [m]", ylabel="y [m]",
+                 title=f"displacements times {scale:.3g}" if moved else "")
+        figure.colorbar(drawn, ax=axis, label=f"{name} [{unit}]")
+    return figure

@@ -1,0 +1,120 @@
+"""Loads of a system as modal forces."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array
+from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.signals.base import Signal
+from fecontact.reduction.modal_basis import ModalBasis
+
+_COMPONENTS = ("x", "y", "phi")
+
+
+@dataclass(frozen=True)
+class ActingLoad:
+    """A part of the load: the modal forces ``value row``.
+
+    Attributes
+    ----------
+    what : str
+        Its name for messages.
+    row : (m,) array
+    value : float or Signal
+    still : str
+        What does not move if the row is zero, and how.
+    """
+
+    what: str
+    row: Array
+    value: float | Signal
+    still: str
+
+
+def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
+    """Parts of a load that are not zero; those in time in the order of ``load.signals``.
+
+    Raises
+    ------
+    InputError
+        For points or boundaries that the basis does not have, gravity or base acceleration with a
+        basis without rows of inertia, and places outside the body or for a basis without shapes.
+    """
+    if load.normal:
+        yield ActingLoad(f"normal = {load.normal!r}", basis.T[1, 1], -load.normal,
+                         "'C' moves along y")
+    for axis, g in enumerate(load.gravity):
+        if g:
+            what = f"gravity = {load.gravity}"
+            yield ActingLoad(what, _inertia(basis, what)[axis], g,
+                             f"the body moves along {'xy'[axis]}")
+    for force in load.forces:
+        turn = "turns" if force.component == "phi" else f"moves along {force.component}"
+        yield ActingLoad(f"a force at {force.point!r} with component {force.component!r}",
+                         _point_rows(basis, force.point)[_COMPONENTS.index(force.component)],
+                         force.signal, f"{force.point!r} {turn}")
+    for axis, signal in enumerate((load.base_acceleration_x, load.base_acceleration_y)):
+        if signal is not None:
+            what = f"base_acceleration_{'xy'[axis]}"
+            yield ActingLoad(what, -_inertia(basis, what)[axis], signal,
+                             f"the body moves along {'xy'[axis]}")
+    for one in load.boundaries:
+        for row, name in zip(basis.boundary_row(one.boundary), ("pressure", "shear"), strict=True):
+            value = getattr(one, name)
+            if isinstance(value, Signal) or value:
+                yield ActingLoad(f"{name} on '{one.boundary}'", row, value,
+                                 f"'{one.boundary}' moves along with it")
+
+
+def load_rows(basis: ModalBasis, load: Load) -> tuple[Array, Array]:
+    """Constant modal forces (m,), and those (k, m) of unit values of ``load.signals``."""
+    constant, in_time = np.zeros(basis.modes), []
+    for part in acting_loads(basis, load):
+        if isinstance(part.value, Signal):
+            in_time.append(part.row)
+        else:
+            constant = constant + part.value * part.row
+    return constant, np.array(in_time, dtype=float).reshape(-1, basis.modes)
+
+
+def work_of_loads(basis: ModalBasis, load: Load, depth: float) -> float:
+    """Magnitude of the work of the constant loads when the body moves by a small depth [J]."""
+    constant, _ = load_rows(basis, replace(load, normal=0.0))
+    largest = np.abs(basis.T[:, :2]).max(axis=(0, 1))
+    moved = np.divide(depth, largest, out=np.zeros(basis.modes), where=largest > 0.0)
+    return float(abs(load.normal) * depth + np.abs(constant) @ moved)
+
+
+def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
+    """Raise InputError for a drive or load in a direction in which no mode moves its point."""
+    acting = [(f"Drive: {name} = {value!r}", basis.T[0, axis], f"'B' moves along {'xy'[axis]}")
+              for axis, name, value in ((0, "stiffness_x", drive.stiffness_x),
+                                        (0, "damping_x", drive.damping_x),
+                                        (1, "stiffness_y", drive.stiffness_y),
+                                        (1, "damping_y", drive.damping_y)) if value]
+    acting += [(f"Load: {part.what}", part.row, part.still) for part in acting_loads(basis, load)]
+    for what, row, still in acting:
+        if not row.any():
+            raise InputError(f"{what} has no effect, as {still} in no mode of the basis; leave it "
+                             f"out, or give the basis rows for that point.")
+
+
+def _inertia(basis: ModalBasis, what: str) -> Array:
+    if basis.inertia_rows is None:
+        raise InputError(f"Load: {what} needs the inertia of the body, but the basis has no "
+                         f"inertia_rows; make it from a body, or give translations with its "
+                         f"mass matrix.")
+    return basis.inertia_rows
+
+
+def _point_rows(basis: ModalBasis, point: str | int | tuple[float, float]) -> Array:
+    """Rows (3, m) of a named point, a contact node or a place."""
+    if not isinstance(point, tuple):
+        return np.asarray(basis.T[basis.point_index(point)])
+    if basis.mode_shapes is None:
+        raise InputError(f"Load: a force at {point} needs shapes over the body, which the basis "
+                         f"does not hold; use a named point.")
+    return basis.mode_shapes.rows_at(point, "Load: a force")

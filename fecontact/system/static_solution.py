@@ -1,0 +1,112 @@
+"""Static displacement and stress of an elastic body without contact, by its finite elements."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, InputError, require_finite
+from fecontact.core.types import Array
+from fecontact.fem.body_forces import boundary_forces, inertia_forces
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.fields import BodyFields, body_elements, stress_of
+from fecontact.fem.points import Place, place_rows
+from fecontact.laws.excitation import Load
+from fecontact.laws.signals.base import Signal
+from fecontact.reduction.eigenmodes import FreeSystem
+
+_COMPONENTS = ("x", "y", "phi")
+
+# Largest resultant of the loads, relative to their size, that a free direction may have.
+_BALANCED = 1e-9
+
+
+def static_solution(
+    body: ElasticBody,
+    load: Load,
+    *,
+    points: Mapping[str, Place] | None = None,
+    time: float = 0.0,
+) -> BodyFields:
+    """Displacement and stress of a body at rest under loads, ``K u = f`` with its supports.
+
+    The body is not in contact; for the rest state of a contact system see
+    :func:`~fecontact.static_equilibrium` and :meth:`~fecontact.ModalBasis.fields`. A body with
+    rigid modes must be under loads in balance; its displacement has no rigid part then.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        With supports that hold it, or none.
+    load : Load
+        Forces at points of the mesh or at places, gravity, base acceleration, and loads on named
+        boundaries. Those in time act with their values at ``time``.
+    points : mapping of name to place, optional
+        Further names of points, as for :func:`~fecontact.modal_basis`, 'C' among them.
+    time : float
+        [s]
+
+    Raises
+    ------
+    InputError, MeshError
+        For names that the mesh does not have, places outside the body, numbers of contact nodes.
+    AnalysisError
+        If the loads push the body in a direction in which nothing holds it.
+    """
+    require_kind("static_solution", ElasticBody, body=body)
+    require_kind("static_solution", Load, load=load)
+    require_kind("static_solution", Mapping, points={} if points is None else points)
+    require_finite("static_solution", time=time)
+    system = FreeSystem.of(body)
+    force = body.expansion.T @ nodal_forces(body, load, points or {}, time)
+    _require_balance(body, system, force)
+    u = np.asarray(body.expansion @ system.deflection(force))
+    return BodyFields(body.nodes, body_elements(body), u.reshape(-1, 2),
+                      stress_of(body, u[:, None])[:, :, 0])
+
+
+def nodal_forces(
+    body: ElasticBody, load: Load, points: Mapping[str, Place], time: float
+) -> Array:
+    """Nodal forces (2 N,) of a load at a time; errors as of :func:`static_solution`."""
+
+    def value(given: float | Signal) -> float:
+        return float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
+
+    def at(point: str | int | tuple[float, float]) -> Array:
+        if isinstance(point, int):
+            raise InputError(f"static_solution: a force at contact node {point} cannot be placed, "
+                             f"as there are no contact nodes; give its name or place.")
+        place = points.get(point, point) if isinstance(point, str) else point
+        name = point if isinstance(point, str) else "of a force"
+        return np.asarray(place_rows(body, place, name).matrix.toarray())
+
+    total = np.zeros(2 * len(body.nodes))
+    if load.normal:
+        total -= load.normal * at("C")[1]
+    for force in load.forces:
+        total += value(force.signal) * at(force.point)[_COMPONENTS.index(force.component)]
+    carried = [0.0 if signal is None else value(signal)
+               for signal in (load.base_acceleration_x, load.base_acceleration_y)]
+    acceleration = np.array(load.gravity) - carried
+    if acceleration.any():
+        total += inertia_forces(body) @ acceleration
+    for one in load.boundaries:
+        total += boundary_forces(body, one.boundary) @ [value(one.pressure), value(one.shear)]
+    return total
+
+
+def _require_balance(body: ElasticBody, system: FreeSystem, force: Array) -> None:
+    """Raise AnalysisError if forces (f,) have a resultant along a rigid mode."""
+    if not system.rigid.shape[1] or not force.any():
+        return
+    # Work in each rigid mode, against the sum of the magnitudes of its parts.
+    work, size = system.rigid.T @ force, np.abs(system.rigid).T @ np.abs(force)
+    pushed = np.abs(work) > _BALANCED * size
+    if not pushed.any():
+        return
+    mode = np.asarray(body.expansion @ system.rigid[:, int(np.argmax(pushed))]).reshape(-1, 2)
+    turns = np.ptp(mode, axis=0).max() > 1e-6 * np.abs(mode).max()
+    way = "a rotation" if turns else f"a translation in {'xy'[int(np.argmax(np.abs(mode[0])))]}"
+    raise AnalysisError(f"There is no static solution: nothing holds the body against {way}, in "
+                        f"which the loads push it; support it with fixed, or balance the loads.")
