@@ -11,6 +11,9 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, span
 
+# Arrays that a basis may lack.
+OPTIONAL = ("stiffness", "centrifugal_load")
+
 
 @dataclass(frozen=True, eq=False)
 class ModeShapes:
@@ -75,16 +78,19 @@ class ReductionQuality:
 class ModalBasis(Summarised):
     """Mass-normalised modes ``q`` of a body and its motion at the points of interest.
 
-    The equations of motion are ``q'' + damping q' + angular_frequencies^2 q = T^T f`` (4.1-1),
-    the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for each, x tangential to
-    the ground, y away from it, phi counter-clockwise.
+    The equations of motion are ``q'' + damping q' + stiffness_matrix q = T^T f + centrifugal_load``
+    (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless ``stiffness`` is
+    given; the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for each, x tangential
+    to the ground, y away from it, phi counter-clockwise.
 
     Attributes
     ----------
     angular_frequencies : (m,) array
-        [rad/s], ascending; exactly zero for rigid modes.
+        Of the symmetric part of the stiffness without rotation [rad/s], ascending; exactly zero
+        for rigid modes.
     damping : (m, m) array
-        Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D.
+        Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D. Its skew part is
+        gyroscopic and does no work.
     T : (P, 3, m) array
         Rows of excitation point B, load point C, the n contact nodes and further named points.
     positions : (P, 2) array
@@ -100,6 +106,11 @@ class ModalBasis(Summarised):
     groups : tuple of (str, int)
         Names of the contact groups and their numbers of nodes, in the order of the nodes; by
         default one group 'contact'.
+    stiffness : (m, m) array or None
+        Full modal stiffness [1/s^2] where it is not ``diag(angular_frequencies^2)``: modes coupled
+        by circulatory forces, its skew part, or by rotation.
+    centrifugal_load : (m,) array or None
+        Constant modal forces of the rotation on the undeformed body.
 
     Raises
     ------
@@ -117,9 +128,13 @@ class ModalBasis(Summarised):
     mode_shapes: ModeShapes | None = None
     quality: ReductionQuality | None = None
     groups: tuple[tuple[str, int], ...] = ()
+    stiffness: Array | None = None
+    centrifugal_load: Array | None = None
 
     def __post_init__(self) -> None:
-        for name in ("angular_frequencies", "damping", "T", "positions", "tributary"):
+        for name in ("angular_frequencies", "damping", "T", "positions", "tributary", *OPTIONAL):
+            if name in OPTIONAL and getattr(self, name) is None:
+                continue
             array = np.array(getattr(self, name), dtype=float, order="C")
             if not np.isfinite(array).all():
                 raise InputError(f"Modal basis: {name} holds values that are not finite.")
@@ -136,22 +151,27 @@ class ModalBasis(Summarised):
         object.__setattr__(self, "groups", groups)
         m = len(self.angular_frequencies)
         points = 2 + len(self.tributary) + len(self.extra)
-        for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2))):
-            if getattr(self, name).shape != shape:
+        for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2)),
+                            ("stiffness", (m, m)), ("centrifugal_load", (m,))):
+            given = getattr(self, name)
+            if given is not None and given.shape != shape:
                 raise InputError(f"Modal basis: {name} must have shape {shape}, not "
-                                 f"{getattr(self, name).shape}.")
+                                 f"{given.shape}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes, frequencies, damping, contact nodes and points."""
         hertz = [f"{value:.5g}" for value in self.frequencies_hz[self.rigid_modes :]]
         middle = hertz if len(hertz) < 6 else [*hertz[:3], "...", hertz[-1]]
         diagonal = (self.damping == np.diag(np.diag(self.damping))).all()
+        full = "full matrix" + _skew(self.damping, ", in part gyroscopic")
         groups = [f"{count} {name}" for name, count in self.groups]
         return [
             ("modes", f"{self.modes}, {self.rigid_modes} rigid"),
             ("frequencies", f"{', '.join(middle)} Hz" if hertz else "none"),
-            ("damping", "none" if not self.damping.any() else "full matrix" if not diagonal
+            ("damping", "none" if not self.damping.any() else full if not diagonal
              else f"ratios {span(self.damping_ratios[self.rigid_modes :])}"),
+            *([] if self.stiffness is None else
+              [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 else "")),
             ("points", listed(["B", "C", *self.extra])),
@@ -173,6 +193,11 @@ class ModalBasis(Summarised):
     def frequencies_hz(self) -> Array:
         """Eigenfrequencies (m,) [Hz]."""
         return self.angular_frequencies / (2.0 * np.pi)
+
+    @property
+    def stiffness_matrix(self) -> Array:
+        """Modal stiffness (m, m) [1/s^2]: ``stiffness``, or ``diag(angular_frequencies^2)``."""
+        return np.diag(self.angular_frequencies**2) if self.stiffness is None else self.stiffness
 
     @property
     def rigid_modes(self) -> int:
@@ -225,7 +250,10 @@ class ModalBasis(Summarised):
 
     @property
     def elastic_compliance(self) -> Array:
-        """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes."""
+        """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes.
+
+        That of uncoupled modes: of the body without circulatory forces and rotation.
+        """
         elastic = self.angular_frequencies > 0.0
         rows = self.T[:, :2, elastic] / self.angular_frequencies[elastic]
         return np.asarray((rows**2).sum(axis=2))
@@ -276,6 +304,9 @@ class ModalBasis(Summarised):
             angular_frequencies=self.angular_frequencies[chosen],
             damping=self.damping[np.ix_(chosen, chosen)],
             T=self.T[:, :, chosen],
+            stiffness=None if self.stiffness is None else self.stiffness[np.ix_(chosen, chosen)],
+            centrifugal_load=None if self.centrifugal_load is None else
+            self.centrifugal_load[chosen],
             mode_shapes=None if given is None else replace(
                 given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
             quality=None if quality is None else replace(
@@ -283,3 +314,7 @@ class ModalBasis(Summarised):
                 participation=quality.participation[:, chosen],
                 vibration_modes=int(np.count_nonzero(chosen < quality.vibration_modes))),
         )
+
+
+def _skew(matrix: Array, words: str) -> str:
+    return words if (matrix != matrix.T).any() else ""

@@ -29,7 +29,7 @@ def system_arrays(
     the law; see :meth:`fecontact.ContactSystem.law_groups`.
     """
     B, C = basis.T[0], basis.T[1]
-    stiffness = np.diag(basis.angular_frequencies**2)
+    stiffness = np.array(basis.stiffness_matrix)
     damping = basis.damping.copy()
     springs = np.array([drive.stiffness_x, drive.stiffness_y], dtype=float)
     dashpots = np.array([drive.damping_x, drive.damping_y], dtype=float)
@@ -46,12 +46,15 @@ def system_arrays(
     loads = load.forces
     load_shapes = [basis.T[basis.point_index(force.point), _COMPONENTS.index(force.component)]
                    for force in loads]
+    constant_load = -load.normal * C[1]
+    if basis.centrifugal_load is not None:
+        constant_load = constant_load + basis.centrifugal_load
     scale = ground.friction_scale_kernel
     return SystemArrays(
         stiffness=stiffness,
         damping=damping,
         modal_damping=basis.damping.copy(),
-        constant_load=-load.normal * C[1],
+        constant_load=constant_load,
         drive_shapes=np.array(B[:2], dtype=float),
         drive_stiffness=springs,
         drive_damping=dashpots if drive.dashpots == "relative" else np.zeros(2),

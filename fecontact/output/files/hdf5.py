@@ -22,7 +22,7 @@ from fecontact.core.files.stored import (
     values,
 )
 from fecontact.core.interrupts import held_back_interrupt
-from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
+from fecontact.reduction.modal_basis import OPTIONAL, ModalBasis, ModeShapes, ReductionQuality
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
 _MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
@@ -136,6 +136,9 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     """Write a basis into an HDF5 group."""
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
+    for name in OPTIONAL:
+        if getattr(basis, name) is not None:
+            group.create_dataset(name, data=getattr(basis, name))
     group.attrs["extra"] = list(basis.extra)
     group.attrs["groups"] = [name for name, _ in basis.groups]
     group.attrs["group_sizes"] = [count for _, count in basis.groups]
@@ -174,7 +177,10 @@ def stored_basis(group: Any) -> ModalBasis:
         mode_shapes=(_read_mode_shapes(member(group, "mode_shapes"), m, len(T))
                      if "mode_shapes" in group else None),
         quality=_read_quality(member(group, "quality"), m, len(T)) if "quality" in group else None,
-        groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)))
+        groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
+        stiffness=array(group, "stiffness", (m, m)) if "stiffness" in group else None,
+        centrifugal_load=(array(group, "centrifugal_load", (m,))
+                          if "centrifugal_load" in group else None))
 
 
 def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
