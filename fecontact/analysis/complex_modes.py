@@ -13,7 +13,7 @@ from fecontact.system.contact_system import ContactSystem
 def complex_modes(
     body: ModalBasis | ContactSystem, linearised_at: Initial | None = None, *, time: float = 0.0
 ) -> ComplexModes:
-    r"""Complex modes of the linearised equations: frequencies, damping, right and left eigenvectors.
+    r"""Complex modes of linearised equations: frequencies, damping, right and left eigenvectors.
 
     Those of
 

@@ -96,8 +96,9 @@ def receptance(
     .. math:: H(\omega) = (i \omega)^p\, T_r
         \big[K + c\, T_B^T T_B + i \omega (D + b\, T_B^T T_B) - \omega^2 I\big]^{-1} T_e^T
 
-    with the stiffness and damping matrices K, D of the basis, the springs c and dashpots b of the drive, whose far ends are fixed, and p = 0, 1, 2 for
-    receptance, mobility, accelerance. Linearisation at a state adds the stiffness and damping of
+    with the stiffness and damping matrices K, D of the basis, the springs c and dashpots b of the
+    drive, whose far ends are fixed, and p = 0, 1, 2 for receptance, mobility, accelerance.
+    Linearisation at a state adds the stiffness and damping of
     the contact by the Jacobian; a sticking node acts as a dashpot with the friction slope dR/dv.
     The result says if the state is unstable; the response is then that of the linear equations
     only and cannot be observed.

@@ -19,9 +19,9 @@ _DEFECTIVE = 1e-14
 class ComplexModes(Summarised):
     """Complex modes of x' = A x, one for each pair l = -D w +- i w sqrt(1 - D^2).
 
-    As in brake-squeal analysis. Right eigenvectors are the shapes, ``A r = l r``; left ones, ``l_e^T
-    A = l l_e^T`` without conjugation, say how strongly forces excite a mode and how it changes with
-    the parameters. Both are biorthonormal, ``left.T @ right = 1``.
+    As in brake-squeal analysis. Right eigenvectors r, ``A r = l r``, are the shapes; left ones s,
+    ``s^T A = l s^T`` without conjugation, say how strongly forces excite a mode and how it changes
+    with the parameters. They are biorthonormal, ``left.T @ right = 1``.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class ComplexModes(Summarised):
         return np.asarray(np.where(np.isnan(size), np.inf, size))
 
     def sensitivity(self, derivative: ArrayLike) -> ComplexArray:
-        """Derivatives (r,) of the eigenvalues, l^T (dA/dp) r, from dA/dp (d, d).
+        """Derivatives (r,) of the eigenvalues, s^T (dA/dp) r, from dA/dp (d, d).
 
         Raises
         ------

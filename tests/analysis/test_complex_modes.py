@@ -2,23 +2,13 @@
 
 import numpy as np
 import pytest
-from tests.systems import mode_coupling
+from systems import mode_coupling, rotor
 
 from fecontact import InputError, basis_from_matrices
 from fecontact.analysis import ComplexModes, complex_modes
 from fecontact.bifurcation import contact_field, find_equilibrium
 
 MU = "friction.friction_coefficient"
-
-
-def rotor(speed, stiffness=1e4, external=2.0, rotating=1.0):
-    """A Jeffcott rotor in the fixed frame: damping that rotates is in part circulatory."""
-    row = np.zeros((3, 2))
-    row[0, 0] = row[1, 1] = 1.0
-    circulatory = rotating * speed * np.array([[0.0, 1.0], [-1.0, 0.0]])
-    return basis_from_matrices(np.eye(2), stiffness * np.eye(2) + circulatory,
-                               {"contact": row[None], "B": row},
-                               damping=(external + rotating) * np.eye(2))
 
 
 def test_jeffcott_rotor_whirls_from_300_on():
@@ -52,7 +42,7 @@ def test_left_eigenvectors_are_biorthonormal():
     A = rng.standard_normal((9, 9))
     modes = ComplexModes.of(A)
     assert modes.left.T @ modes.right == pytest.approx(np.eye(len(modes.eigenvalues)), abs=1e-12)
-    assert modes.left.T @ A == pytest.approx(modes.eigenvalues[:, None] * modes.left.T, abs=1e-12)
+    assert pytest.approx(modes.eigenvalues[:, None] * modes.left.T, abs=1e-12) == modes.left.T @ A
     assert A @ modes.right == pytest.approx(modes.eigenvalues * modes.right, abs=1e-12)
     assert 2 * len(modes.eigenvalues) + len(modes.real_eigenvalues) == 9
     change = rng.standard_normal((9, 9))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from synthetic import basis
-from tests.analysis.test_complex_modes import rotor
+from systems import rotor
 
 from fecontact import InputError
 from fecontact.analysis import ComplexModes, complex_modes

@@ -90,8 +90,8 @@ class Equilibrium:
     def eigenvalue_slopes(self, parameter: str) -> ComplexArray:
         """Derivatives (r,) of the eigenvalues of :attr:`modes` to a parameter.
 
-        Those of the equilibrium that moves with the parameter: ``l^T (dA/dp) r`` with the left and
-        right eigenvectors and the change of the Jacobian A along the equilibria, by differences
+        Those of the equilibrium that moves with the parameter: ``s^T (dA/dp) r`` with the left and
+        right eigenvectors s, r and the change of the Jacobian A along the equilibria, by differences
         of fourth order.
 
         Raises
@@ -110,7 +110,8 @@ class Equilibrium:
         def jacobian(place: int) -> Array:
             values = self.values.copy()
             values[index] += place * step
-            return field.derivatives(t, (self.state + place * step * moving)[None], values)[1][0]
+            state = self.state + place * step * moving
+            return field.derivatives(t, state[None], values)[1][0]
 
         # One-sided where the other side is out of the parameter's range.
         for weights in _DIFFERENCES:

@@ -138,17 +138,12 @@ def render_mode(
     progress : bool or callable, optional
         As for :func:`fecontact.render`.
 
-    Returns
-    -------
-    Path
-        The movie, the folder, or the first picture.
+    Returns the movie, the folder, or the first picture.
 
     Raises
     ------
-    InputError
-        For values outside these ranges, a basis without shapes, or a path that cannot be written.
-    MissingLibraryError
-        If this computer cannot render pictures or encode movies.
+    InputError, MissingLibraryError
+        For a number out of range, a basis without shapes, and as :func:`fecontact.render`.
     """
     require_kind("render_mode", ModalBasis, basis=basis)
     require_kind("render_mode", (ComplexModes, type(None)), modes=modes)

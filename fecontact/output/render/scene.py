@@ -1,10 +1,9 @@
 """Scene of a picture, drawn by VTK: body, ground, contact nodes and forces."""
 
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from typing_extensions import Self
 
 from fecontact.core.types import Array
 from fecontact.output.plots.style import STATE_COLOURS
