@@ -1,7 +1,8 @@
 """Numbers of a modal basis by dotted names, for maps, branches and sensitivities.
 
 ``damping_ratios.I``: damping ratio of mode I, of a diagonal damping matrix; ``damping.I.J`` and
-``stiffness.I.J``: entries of the modal matrices [1/s, 1/s^2]. Modes are counted from 0.
+``stiffness.I.J``: entries of the modal matrices [1/s, 1/s^2]; ``rotation.speed``: speed of a body
+that rotates [rad/s]. Modes are counted from 0.
 """
 
 from collections.abc import Mapping
@@ -11,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
 
-NAMES = ("basis.damping_ratios.I", "basis.damping.I.J", "basis.stiffness.I.J")
+NAMES = ("basis.damping_ratios.I", "basis.damping.I.J", "basis.stiffness.I.J",
+         "basis.rotation.speed")
+_SPEED = "rotation.speed"
 
 
 def basis_parameter(basis: ModalBasis, name: str) -> float:
@@ -26,6 +29,11 @@ def basis_parameter(basis: ModalBasis, name: str) -> float:
     InputError
         If there is no such number.
     """
+    if name == _SPEED:
+        if basis.rotation is None:
+            raise InputError("The system has no parameter 'basis.rotation.speed': its body does "
+                             "not rotate.")
+        return basis.rotation.speed
     kind, place = _place(basis, name)
     return float(_values(basis, kind)[place])
 
@@ -39,6 +47,9 @@ def with_basis_parameters(basis: ModalBasis, changes: Mapping[str, Any]) -> Moda
         If there is no such number, or a value is not finite or negative where it is a ratio.
     """
     for name, value in changes.items():
+        if name == _SPEED:
+            basis = basis.with_rotation_speed(value)
+            continue
         kind, place = _place(basis, name)
         if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
             raise InputError(f"basis.{name} = {value!r} must be a finite number.")
@@ -70,7 +81,7 @@ def _place(basis: ModalBasis, name: str) -> tuple[str, tuple[int, ...]]:
     lengths = {"damping_ratios": 1, "damping": 2, "stiffness": 2}
     if lengths.get(kind) != len(numbers) or not all(text.isdecimal() for text in numbers):
         raise InputError(f"The system has no parameter 'basis.{name}'; numbers of the basis are "
-                         f"{', '.join(NAMES)}, with numbers I and J of modes from 0.")
+                         f"{choices(NAMES)}, with numbers I and J of modes from 0.")
     place = tuple(int(text) for text in numbers)
     if max(place) >= basis.modes:
         raise InputError(f"The system has no parameter 'basis.{name}': the basis has {basis.modes} "

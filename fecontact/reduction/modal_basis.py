@@ -7,12 +7,32 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.types import Array, Integers
-from fecontact.core.units import Summarised, listed, span
+from fecontact.core.units import Summarised, listed, quantity, span
 
-# Arrays that a basis may lack.
-OPTIONAL = ("stiffness", "centrifugal_load")
+
+@dataclass(frozen=True, eq=False)
+class ModalRotation:
+    """Rotation of a body in its modes: what a basis adds to damping, stiffness and load.
+
+    Attributes
+    ----------
+    speed : float
+        Angular speed W of the body and its frame, positive counter-clockwise [rad/s].
+    coriolis : (m, m) array
+        Skew; ``W coriolis`` is part of the damping.
+    stiffening : (m, m) array
+        Symmetric; ``W^2 stiffening``, of the centrifugal stress and force, is part of the
+        stiffness.
+    load : (m,) array
+        ``W^2 load`` is the centrifugal force on the undeformed body.
+    """
+
+    speed: float
+    coriolis: Array
+    stiffening: Array
+    load: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +129,8 @@ class ModalBasis(Summarised):
     stiffness : (m, m) array or None
         Full modal stiffness [1/s^2] where it is not ``diag(angular_frequencies^2)``: modes coupled
         by circulatory forces, its skew part, or by rotation.
-    centrifugal_load : (m,) array or None
-        Constant modal forces of the rotation on the undeformed body.
+    rotation : ModalRotation or None
+        Rotation of the body, whose Coriolis and stiffening terms damping and stiffness include.
 
     Raises
     ------
@@ -129,11 +149,11 @@ class ModalBasis(Summarised):
     quality: ReductionQuality | None = None
     groups: tuple[tuple[str, int], ...] = ()
     stiffness: Array | None = None
-    centrifugal_load: Array | None = None
+    rotation: ModalRotation | None = None
 
     def __post_init__(self) -> None:
-        for name in ("angular_frequencies", "damping", "T", "positions", "tributary", *OPTIONAL):
-            if name in OPTIONAL and getattr(self, name) is None:
+        for name in ("angular_frequencies", "damping", "T", "positions", "tributary", "stiffness"):
+            if name == "stiffness" and self.stiffness is None:
                 continue
             array = np.array(getattr(self, name), dtype=float, order="C")
             if not np.isfinite(array).all():
@@ -152,7 +172,7 @@ class ModalBasis(Summarised):
         m = len(self.angular_frequencies)
         points = 2 + len(self.tributary) + len(self.extra)
         for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2)),
-                            ("stiffness", (m, m)), ("centrifugal_load", (m,))):
+                            ("stiffness", (m, m))):
             given = getattr(self, name)
             if given is not None and given.shape != shape:
                 raise InputError(f"Modal basis: {name} must have shape {shape}, not "
@@ -172,6 +192,8 @@ class ModalBasis(Summarised):
              else f"ratios {span(self.damping_ratios[self.rigid_modes :])}"),
             *([] if self.stiffness is None else
               [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
+            *([] if self.rotation is None else
+              [("rotation", quantity(self.rotation.speed, "rad/s"))]),
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 else "")),
             ("points", listed(["B", "C", *self.extra])),
@@ -198,6 +220,25 @@ class ModalBasis(Summarised):
     def stiffness_matrix(self) -> Array:
         """Modal stiffness (m, m) [1/s^2]: ``stiffness``, or ``diag(angular_frequencies^2)``."""
         return np.diag(self.angular_frequencies**2) if self.stiffness is None else self.stiffness
+
+    @property
+    def centrifugal_load(self) -> Array:
+        """Constant modal forces (m,) of the rotation; zero without one."""
+        if self.rotation is None:
+            return np.zeros(self.modes)
+        return self.rotation.speed**2 * self.rotation.load
+
+    def with_rotation_speed(self, speed: float) -> "ModalBasis":
+        """A copy whose body rotates at another speed [rad/s]; InputError if it does not rotate."""
+        require_finite("with_rotation_speed", speed=speed)
+        given = self.rotation
+        if given is None:
+            raise InputError("The body of this modal basis does not rotate; make the basis by "
+                             "modal_basis(body, ..., rotation=Rotation(speed)).")
+        return replace(
+            self, damping=self.damping + (speed - given.speed) * given.coriolis,
+            stiffness=self.stiffness_matrix + (speed**2 - given.speed**2) * given.stiffening,
+            rotation=replace(given, speed=float(speed)))
 
     @property
     def rigid_modes(self) -> int:
@@ -298,15 +339,16 @@ class ModalBasis(Summarised):
                 chosen[-1] >= self.modes):
             raise InputError(f"modes {list(modes)} must be different numbers from 0 to "
                              f"{self.modes - 1}, at least one.")
-        given, quality = self.mode_shapes, self.quality
+        given, quality, turning = self.mode_shapes, self.quality, self.rotation
         return replace(
             self,
             angular_frequencies=self.angular_frequencies[chosen],
             damping=self.damping[np.ix_(chosen, chosen)],
             T=self.T[:, :, chosen],
             stiffness=None if self.stiffness is None else self.stiffness[np.ix_(chosen, chosen)],
-            centrifugal_load=None if self.centrifugal_load is None else
-            self.centrifugal_load[chosen],
+            rotation=None if turning is None else replace(
+                turning, coriolis=turning.coriolis[np.ix_(chosen, chosen)],
+                stiffening=turning.stiffening[np.ix_(chosen, chosen)], load=turning.load[chosen]),
             mode_shapes=None if given is None else replace(
                 given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
             quality=None if quality is None else replace(

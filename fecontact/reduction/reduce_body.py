@@ -1,6 +1,7 @@
 """Modal reduction of a finite-element body."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,11 +12,13 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.points import Place, Rows, place_rows
+from fecontact.fem.rotation import Rotation
 from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
 from fecontact.reduction.residual_vectors import Flexibility, residual_modes
+from fecontact.reduction.rotating import modal_rotation
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
@@ -32,6 +35,7 @@ def modal_basis(
     damping: Damping = 0.0,
     reduction: Reduction = "vibration",
     tolerance: float = 0.1,
+    rotation: Rotation | None = None,
 ) -> ModalBasis:
     """Mass-normalised modes, and T at B, C and the contact nodes.
 
@@ -62,6 +66,9 @@ def modal_basis(
     tolerance : float
         For 'residual': largest fraction of its static compliance that may be missing at any of
         these points, in x or y. Zero keeps all residual vectors.
+    rotation : Rotation, optional
+        The body rotates, and its displacements are those in the frame that rotates with it. The
+        modes are those at rest, coupled by the terms of the rotation.
 
     Raises
     ------
@@ -74,6 +81,7 @@ def modal_basis(
     require_kind("modal_basis", ElasticBody, body=body)
     points = {} if points is None else points
     require_kind("points", Mapping, points=points)
+    require_kind("modal_basis", (Rotation, type(None)), rotation=rotation)
     require_finite("modal_basis", tolerance=tolerance)
     for name in points:
         require_kind("points", str, name=name)
@@ -102,7 +110,8 @@ def modal_basis(
         given = as_floats(damping, "The damping")
         if given.shape == (modes,) and len(w) > modes:
             damping = np.append(given, np.full(len(w) - modes, given[-1]))
-    return ModalBasis(
+    turning = None if rotation is None else modal_rotation(body, system, rotation, shapes)
+    basis = ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),
         T=(restriction @ shapes).reshape(-1, 3, len(w)),
@@ -120,7 +129,9 @@ def modal_basis(
         ),
         quality=_quality(body, system, flexibility, w, free_shapes, vibration),
         groups=face.groups,
+        rotation=None if turning is None else replace(turning, speed=0.0),
     )
+    return basis if turning is None else basis.with_rotation_speed(turning.speed)
 
 
 def _modes(

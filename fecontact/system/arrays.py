@@ -46,15 +46,12 @@ def system_arrays(
     loads = load.forces
     load_shapes = [basis.T[basis.point_index(force.point), _COMPONENTS.index(force.component)]
                    for force in loads]
-    constant_load = -load.normal * C[1]
-    if basis.centrifugal_load is not None:
-        constant_load = constant_load + basis.centrifugal_load
     scale = ground.friction_scale_kernel
     return SystemArrays(
         stiffness=stiffness,
         damping=damping,
         modal_damping=basis.damping.copy(),
-        constant_load=constant_load,
+        constant_load=basis.centrifugal_load - load.normal * C[1],
         drive_shapes=np.array(B[:2], dtype=float),
         drive_stiffness=springs,
         drive_damping=dashpots if drive.dashpots == "relative" else np.zeros(2),

@@ -91,7 +91,8 @@ def damped_coupling(mu=0.9, **changes):
     mass = basis_from_matrices(np.eye(2), [[2.0, 1.0], [1.0, 2.0 / 3.0]],
                                {"contact": row[None], "B": row, "C": row})
     system = ContactSystem(mass, normal=LinearContact(4.0 / 3.0),
-                           friction=ConstantFriction(mu, 1e9), ground=Ground(speed=-100.0), load=Load(1.0))
+                           friction=ConstantFriction(mu, 1e9), ground=Ground(speed=-100.0),
+                           load=Load(1.0))
     return system.with_(**changes)
 
 

@@ -91,8 +91,8 @@ class Equilibrium:
         """Derivatives (r,) of the eigenvalues of :attr:`modes` to a parameter.
 
         Those of the equilibrium that moves with the parameter: ``s^T (dA/dp) r`` with the left and
-        right eigenvectors s, r and the change of the Jacobian A along the equilibria, by differences
-        of fourth order.
+        right eigenvectors s, r and the change of the Jacobian A along the equilibria, by
+        differences of fourth order.
 
         Raises
         ------

@@ -22,7 +22,12 @@ from fecontact.core.files.stored import (
     values,
 )
 from fecontact.core.interrupts import held_back_interrupt
-from fecontact.reduction.modal_basis import OPTIONAL, ModalBasis, ModeShapes, ReductionQuality
+from fecontact.reduction.modal_basis import (
+    ModalBasis,
+    ModalRotation,
+    ModeShapes,
+    ReductionQuality,
+)
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
 _MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
@@ -136,9 +141,12 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     """Write a basis into an HDF5 group."""
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
-    for name in OPTIONAL:
-        if getattr(basis, name) is not None:
-            group.create_dataset(name, data=getattr(basis, name))
+    if basis.stiffness is not None:
+        group.create_dataset("stiffness", data=basis.stiffness)
+    if basis.rotation is not None:
+        rotation = group.create_group("rotation")
+        for name, value in vars(basis.rotation).items():
+            rotation.create_dataset(name, data=value)
     group.attrs["extra"] = list(basis.extra)
     group.attrs["groups"] = [name for name, _ in basis.groups]
     group.attrs["group_sizes"] = [count for _, count in basis.groups]
@@ -179,8 +187,7 @@ def stored_basis(group: Any) -> ModalBasis:
         quality=_read_quality(member(group, "quality"), m, len(T)) if "quality" in group else None,
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
         stiffness=array(group, "stiffness", (m, m)) if "stiffness" in group else None,
-        centrifugal_load=(array(group, "centrifugal_load", (m,))
-                          if "centrifugal_load" in group else None))
+        rotation=_read_rotation(member(group, "rotation"), m) if "rotation" in group else None)
 
 
 def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
@@ -202,6 +209,12 @@ def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
     return ModeShapes(nodes, cells, indices(group, "outline", (None, 2), N),
                       array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
                       sound_sparse(restriction))
+
+
+def _read_rotation(group: Any, modes: int) -> ModalRotation:
+    return ModalRotation(
+        float(values(member(group, "speed")).item()), array(group, "coriolis", (modes, modes)),
+        array(group, "stiffening", (modes, modes)), array(group, "load", (modes,)))
 
 
 def _read_quality(group: Any, modes: int, points: int) -> ReductionQuality:
