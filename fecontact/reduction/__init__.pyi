@@ -1,12 +1,13 @@
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
-from .modal_basis import ModeShapes, ReductionQuality
+from .modal_basis import ModalRotation, ModeShapes, ReductionQuality
 from .report import BasisReport
 from .restriction import rows_from_dofs
 
 __all__ = [
     "BasisReport",
+    "ModalRotation",
     "ModeShapes",
     "ReductionQuality",
     "eigenfrequencies_hz",

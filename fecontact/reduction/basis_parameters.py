@@ -7,12 +7,11 @@ that rotates [rad/s]. Modes are counted from 0.
 
 from collections.abc import Mapping
 from dataclasses import replace
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError, choices, require_finite
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -51,16 +50,17 @@ def with_basis_parameters(basis: ModalBasis, changes: Mapping[str, Any]) -> Moda
             basis = basis.with_rotation_speed(value)
             continue
         kind, place = _place(basis, name)
-        if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
-            raise InputError(f"basis.{name} = {value!r} must be a finite number.")
+        require_finite("ContactSystem", **{f"basis.{name}": value})
         values = np.array(_values(basis, kind))
         values[place] = value
+        if kind == "stiffness":
+            basis = replace(basis, stiffness=values)
+            continue
         if kind == "damping_ratios":
             if value < 0.0:
                 raise InputError(f"basis.{name} = {value!r} must be zero or above.")
             values = np.diag(2.0 * values * basis.angular_frequencies + _rigid_damping(basis))
-            kind = "damping"
-        basis = replace(basis, **{kind: values})
+        basis = replace(basis, damping=values)
     return basis
 
 
