@@ -13,6 +13,7 @@ from .fem.generate import Beam, Block, Pendulum, generate
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
 from .fem.points import Patch
+from .fem.rotation import Rotation
 from .integrate.ensemble import ensemble
 from .integrate.events import Event, event
 from .integrate.initial_state import RigidStart
@@ -66,6 +67,7 @@ __all__ = [
     "PointLoad",
     "Rayleigh",
     "RigidStart",
+    "Rotation",
     "Status",
     "Study",
     "Trajectory",

@@ -14,6 +14,7 @@ from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
+from .output.render.mode_movie import render_mode
 from .output.render.movie import picture
 from .output.render.offscreen import rendering_problem
 from .sweeps.plots import plot_sobol, plot_strobed, plot_sweep
@@ -44,5 +45,6 @@ __all__ = [
     "plot_stress",
     "plot_strobed",
     "plot_sweep",
+    "render_mode",
     "rendering_problem",
 ]

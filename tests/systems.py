@@ -150,6 +150,16 @@ def mode_coupling(damping=0.0, mu=0.1):
                          load=Load(1.0))
 
 
+def rotor(speed, stiffness=1e4, external=2.0, rotating=1.0):
+    """A Jeffcott rotor in the fixed frame: damping that rotates is in part circulatory."""
+    row = np.zeros((3, 2))
+    row[0, 0] = row[1, 1] = 1.0
+    circulatory = rotating * speed * np.array([[0.0, 1.0], [-1.0, 0.0]])
+    return basis_from_matrices(np.eye(2), stiffness * np.eye(2) + circulatory,
+                               {"contact": row[None], "B": row},
+                               damping=(external + rotating) * np.eye(2))
+
+
 def beam(n=4, modes=6, **parts):
     """A steel beam on rough ground, and below what moves it there."""
     body = ElasticBody(rectangle(0.2, 0.02, 12, 2), Material(), 0.01)

@@ -94,11 +94,11 @@ def receptance(
     r"""Response of a body to harmonic forces at its points.
 
     .. math:: H(\omega) = (i \omega)^p\, T_r
-        \big[\operatorname{diag}(w_i^2) + c\, T_B^T T_B + i \omega (D + b\, T_B^T T_B)
-        - \omega^2 I\big]^{-1} T_e^T
+        \big[K + c\, T_B^T T_B + i \omega (D + b\, T_B^T T_B) - \omega^2 I\big]^{-1} T_e^T
 
-    with the springs c and dashpots b of the drive, whose far ends are fixed, and p = 0, 1, 2 for
-    receptance, mobility, accelerance. Linearisation at a state adds the stiffness and damping of
+    with the stiffness and damping matrices K, D of the basis, the springs c and dashpots b of the
+    drive, whose far ends are fixed, and p = 0, 1, 2 for receptance, mobility, accelerance.
+    Linearisation at a state adds the stiffness and damping of
     the contact by the Jacobian; a sticking node acts as a dashpot with the friction slope dR/dv.
     The result says if the state is unstable; the response is then that of the linear equations
     only and cannot be observed.
@@ -154,7 +154,7 @@ def receptance(
         if isinstance(body, ContactSystem):
             stiffness, damping = body.arrays.stiffness, body.arrays.damping
         else:
-            stiffness, damping = np.diag(basis.angular_frequencies**2), basis.damping
+            stiffness, damping = basis.stiffness_matrix, basis.damping
         into, out, terms = pushed.T, seen, (stiffness, damping, np.eye(m))
         growing = _growing(np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -damping]]))
     values = _response(2.0 * np.pi * f, terms, into, out)

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from fecontact.fem.mesh import Mesh
     from fecontact.integrate.events import Events
     from fecontact.integrate.trajectory import Trajectory
+    from fecontact.system.complex_modes import ComplexModes
 
 ROUGH_SLOPE = 0.3  # of the ground, above which a vertical normal force is a rough assumption
 
@@ -50,6 +51,14 @@ def run_table(trajectory: "Trajectory") -> Any:
         *((f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()),
     ]
     return table("", "", rows=rows)
+
+
+def complex_table(modes: "ComplexModes") -> Any:
+    """Frequencies and damping ratios of complex modes, and which of them grow."""
+    rows = [(str(number), f"{hertz:.6g}", f"{ratio:.3%}", "grows" if ratio < 0.0 else "")
+            for number, (hertz, ratio) in enumerate(zip(
+                modes.frequencies_hz.tolist(), modes.damping_ratios.tolist(), strict=True))]
+    return table("mode", "frequency [Hz]", "damping", "", rows=rows)
 
 
 def _events(events: "Events") -> str:

@@ -139,7 +139,8 @@ def _moved(
 ) -> tuple[ContactSystem, ContactSystem, float]:
     """The system with the parameter increased and decreased, and the difference of both."""
     if isinstance(parameter, str):
-        name, value = parameter, system.parameters().get(parameter, 0.0)
+        name, value = parameter, system.parameter(parameter)
+        value = 0.0 if value is None else value
         if not isinstance(value, Real) or isinstance(value, bool):
             raise InputError(f"parameter = {name!r} is {value!r}, not one number; give a function "
                              f"and a value.")

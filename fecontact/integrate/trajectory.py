@@ -52,8 +52,9 @@ class Energies:
     Attributes
     ----------
     kinetic, elastic, drive_spring, contact, bristles : (N,) arrays
-        Stored: in motion, in the modes, in the springs at B, in the contact, in the internal
-        variables of friction.
+        Stored: in motion, in the modes (by the symmetric part of their stiffness, for a body that
+        rotates with the potential of centrifugal forces on its displacements), in the springs at
+        B, in the contact, in the internal variables of friction.
     drive_work, belt_normal_work, belt_friction_work, load_work, circulatory_work : (N,) arrays
         Put in: by the driven ends of the springs at B, by the normal forces and by the friction
         of the moving ground, by the loads, by stiffness that is not symmetric. With
@@ -437,7 +438,7 @@ class Trajectory(Summarised):
         put = dict(zip(POWERS, self.work.T, strict=True))
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
-            elastic=0.5 * ((basis.angular_frequencies * q) ** 2).sum(axis=1),
+            elastic=0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1),
             drive_spring=spring,
             contact=contact,
             bristles=bristles,

@@ -4,9 +4,11 @@ from .from_modes import normalisation
 from .modal_basis import ModeShapes, ReductionQuality
 from .report import BasisReport
 from .restriction import rows_from_dofs
+from .rotating import ModalRotation
 
 __all__ = [
     "BasisReport",
+    "ModalRotation",
     "ModeShapes",
     "ReductionQuality",
     "eigenfrequencies_hz",

@@ -28,7 +28,7 @@ _ASYMMETRY = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A square symmetric matrix as given: entries, and names of matrix and rows for messages."""
+    """A square matrix as given: entries, and names of matrix and rows for messages."""
 
     name: str
     matrix: Any
@@ -62,14 +62,18 @@ def basis_from_matrices(
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
-    Rigid modes are displacements without strain energy, of frequency exactly zero. The first of the
-    largest components of each mode is positive.
+    The modes are those of the symmetric part of the stiffness. Rigid modes are displacements
+    without strain energy, of frequency exactly zero. The first of the largest components of each
+    mode is positive. The skew part of the stiffness couples the modes by
+    :attr:`ModalBasis.stiffness`.
 
     Parameters
     ----------
     mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
-        Symmetric; the mass positive definite [kg], the stiffness positive semi-definite
-        [N/m]. Degrees of freedom with a diagonal stiffness of 1e35 or more are fixed.
+        The mass symmetric and positive definite [kg]. The stiffness [N/m] has a positive
+        semi-definite symmetric part; its skew part, such as that of follower forces, friction or
+        damping that rotates, is circulatory (entries that differ by less than 1e-10 of the largest
+        count as equal). Degrees of freedom with a diagonal stiffness of 1e35 or more are fixed.
     rows : mapping
         ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
@@ -78,7 +82,8 @@ def basis_from_matrices(
         rotation. See :func:`fecontact.reduction.rows_from_dofs`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
         Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
-        given degrees of freedom, dense, sparse or AssembledMatrix [N s/m].
+        given degrees of freedom, dense, sparse or AssembledMatrix [N s/m]; a skew part of it is
+        gyroscopic.
     modes : int, optional
         Number m of modes, lowest first, rigid ones included; by default all, up to d = 2000.
     rigid : int, optional
@@ -96,7 +101,8 @@ def basis_from_matrices(
     Raises
     ------
     InputError
-        For matrices that are not square, of equal size, finite, symmetric or definite as required,
+        For matrices that are not square, of equal size and finite, a mass that is not symmetric and
+        positive definite, a symmetric part of the stiffness that is not positive semi-definite,
         and for rows of wrong width.
     AnalysisError
         If the modes cannot be computed accurately.
@@ -116,17 +122,20 @@ def basis_from_matrices(
         C = None if C is None else C[~held][:, ~held]
         inertia = None if inertia is None else inertia[~held]
         d = M.matrix.shape[0]
-    M, K = _symmetric(M), _symmetric(K)
+    M, (K, skew) = _symmetric(M), _parts(K)
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
     return assembled_basis(
         w, shapes, given, contact_x=contact_x, tributary=tributary, thickness=thickness,
-        inertia=inertia, damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
+        inertia=inertia,
+        stiffness=None if skew is None else np.diag(w**2) + shapes.T @ (skew @ shapes),
+        damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
 
 
 def assembled_basis(
     w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
     tributary: ArrayLike | None, thickness: float | None, inertia: Array | None = None,
+    stiffness: Array | None = None,
 ) -> ModalBasis:
     """Modal basis of modes (d, m) without geometry, from rows of the points.
 
@@ -146,6 +155,7 @@ def assembled_basis(
         groups=rows.groups,
         thickness=thickness,
         inertia_rows=None if inertia is None else inertia.T @ shapes,
+        stiffness=stiffness,
     )
 
 
@@ -241,16 +251,24 @@ def _damping_matrix(damping: Any, mass: Given) -> Any:
     return given.matrix
 
 
-def _symmetric(given: Given) -> Given:
-    """The symmetric part of a matrix that is symmetric up to rounding."""
+def _parts(given: Given) -> tuple[Given, Any]:
+    """The symmetric part of a matrix, and its skew part; None where that is rounding."""
     import scipy.sparse as sp
 
-    difference = sp.coo_array(abs(given.matrix - given.matrix.T))
-    largest = float(abs(given.matrix).max())
-    if not difference.nnz or not difference.data.max():
-        return given
-    worst = int(np.argmax(difference.data))
-    if difference.data[worst] > _ASYMMETRY * largest:
+    skew = 0.5 * (given.matrix - given.matrix.T)
+    if not skew.nnz or 2.0 * abs(skew).max() <= _ASYMMETRY * abs(given.matrix).max():
+        skew = None
+    return replace(given, matrix=sp.csc_array(0.5 * (given.matrix + given.matrix.T))), skew
+
+
+def _symmetric(given: Given) -> Given:
+    """The symmetric part of a matrix that must be symmetric up to rounding."""
+    import scipy.sparse as sp
+
+    symmetric, skew = _parts(given)
+    if skew is not None:
+        difference, largest = sp.coo_array(abs(2.0 * skew)), float(abs(given.matrix).max())
+        worst = int(np.argmax(difference.data))
         row, column = sorted((int(difference.row[worst]), int(difference.col[worst])))
         raise InputError(
             f"{given.name} is not symmetric: the entries in row {row}, column {column} "
@@ -258,7 +276,7 @@ def _symmetric(given: Given) -> Given:
             f"({given.matrix[column, row]:.6g}), counted from 0, differ by "
             f"{difference.data[worst] / largest:.1e} of the largest entry."
         )
-    return replace(given, matrix=sp.csc_array(0.5 * (given.matrix + given.matrix.T)))
+    return symmetric
 
 
 def _require_positive_mass(mass: Given) -> None:

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
-from fecontact.core.errors import InputError, choices, nearest, require_positive
+from fecontact.core.errors import InputError, choices, nearest, require_finite, require_positive
 from fecontact.core.types import Array, ArrayLike, Integers
-from fecontact.core.units import Summarised, listed, span
+from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.fem.fields import BodyFields
 from fecontact.fem.interpolation import interpolation
 from fecontact.fem.points import rotating_rows
+from fecontact.reduction.rotating import ModalRotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,16 +93,19 @@ class ReductionQuality:
 class ModalBasis(Summarised):
     """Mass-normalised modes ``q`` of a body and its motion at the points of interest.
 
-    The equations of motion are ``q'' + damping q' + angular_frequencies^2 q = T^T f`` (4.1-1),
-    the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for each, x tangential to
-    the ground, y away from it, phi counter-clockwise.
+    The equations of motion are ``q'' + damping q' + stiffness_matrix q = T^T f + centrifugal_load``
+    (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless ``stiffness`` is
+    given; the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for each, x tangential
+    to the ground, y away from it, phi counter-clockwise.
 
     Attributes
     ----------
     angular_frequencies : (m,) array
-        [rad/s], ascending; exactly zero for rigid modes.
+        Of the symmetric part of the stiffness without rotation [rad/s], ascending; exactly zero
+        for rigid modes.
     damping : (m, m) array
-        Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D.
+        Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D. Its skew part is
+        gyroscopic and does no work.
     T : (P, 3, m) array
         Rows of excitation point B, load point C, the n contact nodes and further named points.
     positions : (P, 2) array
@@ -127,6 +131,11 @@ class ModalBasis(Summarised):
         Named boundaries on which loads can act.
     boundary_rows : (b, 2, m) array
         Modal forces of a pressure of 1 Pa on each of them, and of a shear of 1 Pa.
+    stiffness : (m, m) array or None
+        Full modal stiffness [1/s^2] where it is not ``diag(angular_frequencies^2)``: modes coupled
+        by circulatory forces, its skew part, or by rotation.
+    rotation : ModalRotation or None
+        Rotation of the body, whose Coriolis and stiffening terms damping and stiffness include.
 
     Raises
     ------
@@ -148,13 +157,17 @@ class ModalBasis(Summarised):
     inertia_rows: Array | None = None
     boundaries: tuple[str, ...] = ()
     boundary_rows: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    stiffness: Array | None = None
+    rotation: ModalRotation | None = None
 
     def __post_init__(self) -> None:
         m = len(self.angular_frequencies)
         if not self.boundaries and not np.size(self.boundary_rows):
             object.__setattr__(self, "boundary_rows", np.zeros((0, 2, m)))
-        given = ["angular_frequencies", "damping", "T", "positions", "tributary", "boundary_rows"]
-        for name in [*given, *(() if self.inertia_rows is None else ("inertia_rows",))]:
+        arrays = ["angular_frequencies", "damping", "T", "positions", "tributary", "boundary_rows"]
+        arrays += [name for name in ("inertia_rows", "stiffness")
+                   if getattr(self, name) is not None]
+        for name in arrays:
             array = np.array(getattr(self, name), dtype=float, order="C")
             if not np.isfinite(array).all():
                 raise InputError(f"Modal basis: {name} holds values that are not finite.")
@@ -175,22 +188,29 @@ class ModalBasis(Summarised):
         points = 2 + len(self.tributary) + len(self.extra)
         for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2)),
                             ("inertia_rows", (2, m)),
-                            ("boundary_rows", (len(self.boundaries), 2, m))):
-            if getattr(self, name) is not None and getattr(self, name).shape != shape:
+                            ("boundary_rows", (len(self.boundaries), 2, m)),
+                            ("stiffness", (m, m))):
+            given = getattr(self, name)
+            if given is not None and given.shape != shape:
                 raise InputError(f"Modal basis: {name} must have shape {shape}, not "
-                                 f"{getattr(self, name).shape}.")
+                                 f"{given.shape}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes, frequencies, damping, contact nodes and points."""
         hertz = [f"{value:.5g}" for value in self.frequencies_hz[self.rigid_modes :]]
         middle = hertz if len(hertz) < 6 else [*hertz[:3], "...", hertz[-1]]
         diagonal = (self.damping == np.diag(np.diag(self.damping))).all()
+        full = "full matrix" + _skew(self.damping, ", in part gyroscopic")
         groups = [f"{count} {name}" for name, count in self.groups]
         return [
             ("modes", f"{self.modes}, {self.rigid_modes} rigid"),
             ("frequencies", f"{', '.join(middle)} Hz" if hertz else "none"),
-            ("damping", "none" if not self.damping.any() else "full matrix" if not diagonal
+            ("damping", "none" if not self.damping.any() else full if not diagonal
              else f"ratios {span(self.damping_ratios[self.rigid_modes :])}"),
+            *([] if self.stiffness is None else
+              [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
+            *([] if self.rotation is None else
+              [("rotation", quantity(self.rotation.speed, "rad/s"))]),
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 else "")),
             ("points", listed(["B", "C", *self.extra])),
@@ -212,6 +232,30 @@ class ModalBasis(Summarised):
     def frequencies_hz(self) -> Array:
         """Eigenfrequencies (m,) [Hz]."""
         return self.angular_frequencies / (2.0 * np.pi)
+
+    @property
+    def stiffness_matrix(self) -> Array:
+        """Modal stiffness (m, m) [1/s^2]: ``stiffness``, or ``diag(angular_frequencies^2)``."""
+        return np.diag(self.angular_frequencies**2) if self.stiffness is None else self.stiffness
+
+    @property
+    def centrifugal_load(self) -> Array:
+        """Constant modal forces (m,) of the rotation; zero without one."""
+        if self.rotation is None:
+            return np.zeros(self.modes)
+        return self.rotation.speed**2 * self.rotation.load
+
+    def with_rotation_speed(self, speed: float) -> "ModalBasis":
+        """A copy whose body rotates at another speed [rad/s]; InputError if it does not rotate."""
+        require_finite("with_rotation_speed", speed=speed)
+        given = self.rotation
+        if given is None:
+            raise InputError("The body of this modal basis does not rotate; make the basis by "
+                             "modal_basis(body, ..., rotation=Rotation(speed)).")
+        return replace(
+            self, damping=self.damping + (speed - given.speed) * given.coriolis,
+            stiffness=self.stiffness_matrix + (speed**2 - given.speed**2) * given.stiffening,
+            rotation=replace(given, speed=float(speed)))
 
     @property
     def rigid_modes(self) -> int:
@@ -276,7 +320,10 @@ class ModalBasis(Summarised):
 
     @property
     def elastic_compliance(self) -> Array:
-        """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes."""
+        """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes.
+
+        That of uncoupled modes: of the body without circulatory forces and rotation.
+        """
         elastic = self.angular_frequencies > 0.0
         rows = self.T[:, :2, elastic] / self.angular_frequencies[elastic]
         return np.asarray((rows**2).sum(axis=2))
@@ -362,7 +409,7 @@ class ModalBasis(Summarised):
                 chosen[-1] >= self.modes):
             raise InputError(f"modes {list(modes)} must be different numbers from 0 to "
                              f"{self.modes - 1}, at least one.")
-        given, quality = self.mode_shapes, self.quality
+        given, quality, turning = self.mode_shapes, self.quality, self.rotation
         return replace(
             self,
             angular_frequencies=self.angular_frequencies[chosen],
@@ -370,9 +417,17 @@ class ModalBasis(Summarised):
             T=self.T[:, :, chosen],
             inertia_rows=None if self.inertia_rows is None else self.inertia_rows[:, chosen],
             boundary_rows=self.boundary_rows[..., chosen],
+            stiffness=None if self.stiffness is None else self.stiffness[np.ix_(chosen, chosen)],
+            rotation=None if turning is None else replace(
+                turning, coriolis=turning.coriolis[np.ix_(chosen, chosen)],
+                stiffening=turning.stiffening[np.ix_(chosen, chosen)], load=turning.load[chosen]),
             mode_shapes=None if given is None else replace(
                 given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
             quality=None if quality is None else replace(
                 quality, residuals=quality.residuals[chosen],
                 vibration_modes=int(np.count_nonzero(chosen < quality.vibration_modes))),
         )
+
+
+def _skew(matrix: Array, words: str) -> str:
+    return words if (matrix != matrix.T).any() else ""

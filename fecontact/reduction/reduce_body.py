@@ -1,6 +1,7 @@
 """Modal reduction of a finite-element body."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -13,11 +14,13 @@ from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import body_elements, linear_cells, stress_of
 from fecontact.fem.points import Place, Rows, place_rows
+from fecontact.fem.rotation import Rotation
 from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
 from fecontact.reduction.residual_vectors import Flexibility, residual_modes
+from fecontact.reduction.rotating import modal_rotation
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
@@ -35,6 +38,7 @@ def modal_basis(
     reduction: Reduction = "vibration",
     tolerance: float = 0.1,
     loads: Sequence[Place] = (),
+    rotation: Rotation | None = None,
 ) -> ModalBasis:
     """Mass-normalised modes, and T at B, C and the contact nodes.
 
@@ -68,6 +72,9 @@ def modal_basis(
     loads : sequence of 'gravity' or place
         Further loads whose static response is added, if not for 'vibration': 'gravity' (and base
         acceleration), pressure and shear on a boundary, forces at a further point or place.
+    rotation : Rotation, optional
+        The body rotates, and its displacements are those in the frame that rotates with it. The
+        modes are those at rest, coupled by the terms of the rotation.
 
     Raises
     ------
@@ -80,6 +87,7 @@ def modal_basis(
     require_kind("modal_basis", ElasticBody, body=body)
     points = {} if points is None else points
     require_kind("points", Mapping, points=points)
+    require_kind("modal_basis", (Rotation, type(None)), rotation=rotation)
     require_finite("modal_basis", tolerance=tolerance)
     for name in points:
         require_kind("points", str, name=name)
@@ -116,7 +124,8 @@ def modal_basis(
     forces = np.stack([inertia_forces(body), *(boundary_forces(body, name) for name in names)])
     rows = np.asarray(forces.transpose(0, 2, 1) @ shapes)
     elements = body_elements(body)
-    return ModalBasis(
+    turning = None if rotation is None else modal_rotation(body, system, rotation, shapes)
+    basis = ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),
         T=(restriction @ shapes).reshape(-1, 3, len(w)),
@@ -139,7 +148,9 @@ def modal_basis(
         inertia_rows=rows[0],
         boundaries=names,
         boundary_rows=rows[1:],
+        rotation=None if turning is None else replace(turning, speed=0.0),
     )
+    return basis if turning is None else basis.with_rotation_speed(turning.speed)
 
 
 def _modes(

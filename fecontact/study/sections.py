@@ -17,6 +17,7 @@ from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.points import Patch
+from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import RigidStart
 from fecontact.integrate.solvers import Solver, solver_by_name
 from fecontact.laws.base import FrictionLaw, NormalLaw
@@ -49,6 +50,8 @@ class BodySettings:
     fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
         Supports on boundaries and points of the mesh: the directions that are held, or a hole
         that turns about its centre.
+    rotation : Rotation, optional
+        ``[body.rotation]``: the body rotates at a constant speed about a point of its plane.
     """
 
     material: str | None = None
@@ -59,6 +62,7 @@ class BodySettings:
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
     fixed: Mapping[str, Support] = field(default_factory=dict)
+    rotation: Rotation | None = None
 
     def __post_init__(self) -> None:
         require_positive("BodySettings", thickness=self.thickness)
@@ -161,12 +165,12 @@ class BasisSettings:
                 raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
                                  f"go by number; choose a name with a letter.")
 
-    def modal_basis(self, body: ElasticBody) -> ModalBasis:
+    def modal_basis(self, body: ElasticBody, rotation: Rotation | None = None) -> ModalBasis:
         """The modal basis of a body."""
         basis = modal_basis(
             body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
             C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
-            damping=self.damping, loads=self.loads)
+            damping=self.damping, loads=self.loads, rotation=rotation)
         if self.dashpots:
             basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
                                          for point, values in self.dashpots.items()})

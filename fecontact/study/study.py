@@ -342,7 +342,7 @@ class Study(Summarised):
     def _basis(self) -> ModalBasis:
         body = self.elastic_body()
         with located(f"{_title(self.path)}: [basis]:"):
-            return self.basis.modal_basis(body)
+            return self.basis.modal_basis(body, self.body.rotation)
 
 
 def _number(text: str, items: list[Any], name: str, title: str) -> int:

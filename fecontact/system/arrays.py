@@ -26,7 +26,7 @@ def system_arrays(
     the law; see :meth:`fecontact.ContactSystem.law_groups`.
     """
     B = basis.T[0]
-    stiffness = np.diag(basis.angular_frequencies**2)
+    stiffness = np.array(basis.stiffness_matrix)
     damping = basis.damping.copy()
     springs = np.array([drive.stiffness_x, drive.stiffness_y], dtype=float)
     dashpots = np.array([drive.damping_x, drive.damping_y], dtype=float)
@@ -47,7 +47,7 @@ def system_arrays(
         stiffness=stiffness,
         damping=damping,
         modal_damping=basis.damping.copy(),
-        constant_load=constant_load,
+        constant_load=basis.centrifugal_load + constant_load,
         drive_shapes=np.array(B[:2], dtype=float),
         drive_stiffness=springs,
         drive_damping=dashpots if drive.dashpots == "relative" else np.zeros(2),

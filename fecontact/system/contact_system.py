@@ -18,6 +18,7 @@ from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
+from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
@@ -281,13 +282,19 @@ class ContactSystem(Summarised):
         """A copy with other parameters, by their dotted names.
 
         ``system.with_(**{"friction.static_coefficient": 0.7, "gap": 1e-6})``; a whole part can be
-        replaced too, ``system.with_(ground=Ground(speed=0.1))``.
+        replaced too, ``system.with_(ground=Ground(speed=0.1))``. Numbers of the basis are
+        ``basis.damping_ratios.I``, ``basis.damping.I.J`` and ``basis.stiffness.I.J``, for modes I
+        and J from 0.
 
         Raises
         ------
         InputError
             If a parameter does not exist, or a value is out of range.
         """
+        inside = {name.removeprefix("basis."): changes.pop(name) for name in tuple(changes)
+                  if name.startswith("basis.")}
+        if inside:
+            changes["basis"] = with_basis_parameters(changes.get("basis", self.basis), inside)
         for name in changes:
             if "." in name and _inner_name(name).partition(".")[0] not in PARTS:
                 raise self._unknown(name)
@@ -300,11 +307,21 @@ class ContactSystem(Summarised):
     def parameters(self) -> dict[str, Any]:
         """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
 
+        Without the numbers of the basis, which :meth:`parameter` and :meth:`with_` know too.
         Parameters of the laws of a contact group: ``contact.NAME.normal.stiffness``.
         """
         return {_outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
                 for name, value in parameters_of(getattr(self, part)).items()}
+
+    def parameter(self, name: str) -> Any:
+        """Value of one parameter by its dotted name, as for :meth:`with_`; None where not given.
+
+        InputError for a number that the basis does not have.
+        """
+        if name.startswith("basis."):
+            return basis_parameter(self.basis, name.removeprefix("basis."))
+        return self.gap if name == "gap" else self.parameters().get(name)
 
     def _checked(self, y: Array) -> Array:
         state = np.ascontiguousarray(y, dtype=float)

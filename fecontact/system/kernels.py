@@ -8,9 +8,8 @@ With x = Tx q and y = Ty q at the n contact nodes, per node j
     q'' = -K q - C q' + T^T f,      f_j = [-T_j, F_j]
     T_j = R_j + F_j y_R'(xi)
 
-where K and C hold the modes' own stiffness and damping and the springs and dashpots at B, s is
-the variation of friction along the ground, and T the force against +x: friction, and that part of
-the contact force that leans with the ground (absent where the ground's normal counts as vertical).
+where K and C hold the modes' own stiffness and damping and the springs and dashpots at B, and s is
+the variation of friction along the ground. T has no second part where contact forces stay vertical.
 """
 
 from typing import NamedTuple
@@ -36,9 +35,8 @@ from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_
 class SystemArrays(NamedTuple):
     """A contact system as the kernels see it: arrays, and laws by address.
 
-    ``drive_damping`` (2,) belongs to dashpots between B and the moving ends of its springs;
-    ``bristle_stiffness`` (2, n, s) says with a and b that an internal variable stores
-    ``(a + b |F|) z^2 / 2``; ``leans`` is 0 where contact forces stay vertical on waves, else 1.
+    ``drive_damping`` (2,) is that of relative dashpots; ``bristle_stiffness`` (2, n, s) a and b of
+    the stored ``(a + b |F|) z^2 / 2``; ``leans`` is 0 where contact forces stay vertical, else 1.
     """
 
     stiffness: Array
@@ -341,15 +339,13 @@ def normal_values(addresses, u, v, p, force, slope):
         force[j], slope[j], _ = normal_at(addresses[j])(u[j], v[j], p[j])
 
 
-# Columns of `powers`: put in by the drive, by the normal force and the friction of the belt, by the
-# loads and by stiffness that is not symmetric; lost in the modes, in the dashpots at B, in the
-# contact's damping, by friction; stored in bristles at constant normal force.
+# Columns of `powers`: five that are put in, by stiffness that is not symmetric too, four that are
+# lost, and what is stored in bristles at constant normal force.
 POWERS = ("drive", "belt_normal", "belt_friction", "load", "circulatory", "modal_damping",
           "dashpots", "contact_damping", "friction", "bristles")
 POWER_COUNT = len(POWERS)
 (DRIVE, BELT_NORMAL, BELT_FRICTION, LOAD, CIRCULATORY, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING,
  FRICTION, BRISTLES) = range(POWER_COUNT)
-# Powers of each node: what its friction loses, and the part of it that is lost in stick.
 NODE_POWERS = 2
 
 
@@ -366,7 +362,6 @@ def body_powers(t, y, s, out):
             speed += s.drive_shapes[axis, i] * y[m + i]
         damping = s.drive_damping[axis]
         out[DRIVE] += (s.drive_stiffness[axis] * (value - place) + damping * (rate - speed)) * rate
-        # The absolute dashpot is counted below.
         out[DASHPOTS] += damping * rate * (rate - 2.0 * speed)
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
@@ -433,8 +428,7 @@ def bristle_history(times, states, s, out):
 def powers(t, y, s, stick_speed, out, nodes):
     """Fill out (p,) with the powers and ``nodes`` (2 n,) with those of each node.
 
-    First what the friction of each node loses, then what of it is lost below the node's slip
-    velocity ``stick_speed`` (n,), by creep.
+    Its friction's losses, then those by creep, at slip velocities below ``stick_speed`` (n,).
     """
     y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)

@@ -103,6 +103,9 @@ def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
 
 
 def _inertia(basis: ModalBasis, what: str) -> Array:
+    if basis.rotation is not None:
+        raise InputError(f"Load: {what} cannot act on a body that rotates: its direction would "
+                         f"turn in the frame of the body; give forces at points instead.")
     if basis.inertia_rows is None:
         raise InputError(f"Load: {what} needs the inertia of the body, but the basis has no "
                          f"inertia_rows; make it from a body, or give translations with its "

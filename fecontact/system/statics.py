@@ -33,8 +33,8 @@ def static_equilibrium(
 ) -> Array:
     """Modal coordinates q (m,) of an equilibrium under the constant load.
 
-    Solves ``w^2 q = T^T f`` with drive and loads at their mean values by Newton's method, with
-    continuation in the load if it does not converge.
+    Solves ``K q = T^T f``, with the stiffness matrix of the modes and the mean values of drive and
+    loads, by Newton's method, with continuation in the load if it does not converge.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class _Balance:
             undisplaced[:, kernels.PENETRATION] - far)
         tangential = (arrays.Tx**2).T @ self.face_stiffness
         normal = (arrays.Ty**2).T @ self.face_stiffness
-        diagonal = np.diag(arrays.stiffness)
+        diagonal = np.abs(np.diag(arrays.stiffness))
         self.scale = diagonal + tangential + normal
         self.scale[self.scale == 0.0] = 1.0
 

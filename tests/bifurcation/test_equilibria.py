@@ -21,11 +21,15 @@ from fecontact import (
     Load,
     Material,
     Mesh,
+    basis_from_matrices,
     modal_basis,
+    sensitivity,
     simulate,
 )
 from fecontact.bifurcation import contact_field, find_equilibrium, stability_map, vector_field
-from fecontact.laws import Constant, ConstantFriction, RoughSurface
+from fecontact.laws import Constant, ConstantFriction, LinearContact, RoughSurface
+
+MU = "friction.friction_coefficient"
 
 
 def test_lorenz_equilibria():
@@ -76,9 +80,66 @@ def test_mode_coupling_flutter():
         assert np.sort(2.0 * np.pi * modes.frequencies_hz) == pytest.approx(
             np.sort(np.abs(expected.imag)), rel=1e-7)
         assert bool(modes.damping_ratios.min() < -1e-6) == (mu > 0.75)
-    shape = modes.displacement(field, 0)
+    shape = modes.displacement(field.system().basis, 0)
     assert shape.shape == (3, 3)
-    assert shape[2, 0] == pytest.approx(modes.shapes[:2, 0] @ field.system().basis.T[2, 0])
+    assert shape[2, 0] == pytest.approx(modes.right[:2, 0] @ field.system().basis.T[2, 0])
+
+
+def damped_coupling(mu=0.9, **changes):
+    """The same with springs and dashpots between the mass and the ground in x and y."""
+    row = np.eye(3, 2)
+    mass = basis_from_matrices(np.eye(2), [[2.0, 1.0], [1.0, 2.0 / 3.0]],
+                               {"contact": row[None], "B": row, "C": row})
+    system = ContactSystem(mass, normal=LinearContact(4.0 / 3.0),
+                           friction=ConstantFriction(mu, 1e9), ground=Ground(speed=-100.0),
+                           load=Load(1.0))
+    return system.with_(**changes)
+
+
+def test_flutter_over_both_dashpots():
+    """Equal dashpots d: flutter from mu = 3 (1 + 2 d^2) / 4 on; the map of both is symmetric."""
+    names = ("drive.damping_x", "drive.damping_y")
+    for d, onset in ((0.1, 0.765), (0.05, 0.75375)):
+        field = contact_field(damped_coupling(**dict.fromkeys(names, d)), [MU, names[0]])
+        found = stability_map(field, {MU: [onset - 1e-6, onset + 1e-6], names[0]: [d]})
+        assert found.unstable[:, 0].tolist() == [0, 2]
+        assert found.frequency_hz[:, 0] * 2.0 * np.pi == pytest.approx(np.sqrt(2.0), rel=1e-6)
+    d = np.linspace(0.0, 0.6, 13)
+    system = damped_coupling(0.8)
+    found = stability_map(contact_field(system, names), {names[0]: d, names[1]: d})
+    assert found.growth_rate == pytest.approx(found.growth_rate.T, abs=1e-12)
+    assert 0.1 < (found.unstable > 0).mean() < 0.9
+    # Damping of one direction alone does not move the onset, by Routh's criterion.
+    field = contact_field(damped_coupling(), [MU, names[0]])
+    found = stability_map(field, {MU: [0.75 - 1e-4, 0.75 + 1e-4], names[0]: d[1:]})
+    assert (found.unstable == [[0], [2]]).all()
+
+
+def test_maps_over_numbers_of_the_basis():
+    """The entries of the modal damping matrix and the ratios are parameters as others are."""
+    system = damped_coupling(0.8)
+    K = np.array([[2.0, 1.0 - 4.0 * 0.8 / 3.0], [1.0, 2.0]])
+    T = system.basis.contact_T[0, :2]
+    a, b = np.array([0.0, 0.1, 0.3]), np.array([-0.1, 0.0, 0.2])
+    names = ("basis.damping.0.0", "basis.damping.1.0")
+    found = stability_map(contact_field(system, names), dict(zip(names, (a, b), strict=True)))
+    for i, j in np.ndindex(3, 3):
+        C = T @ np.array([[a[i], 0.0], [b[j], 0.0]]) @ T.T
+        expected = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-K, -C]]))
+        assert found.growth_rate[i, j] == pytest.approx(expected.real.max(), abs=1e-8)
+    w = system.basis.angular_frequencies
+    ratio = system.with_(**{"basis.damping_ratios.1": 0.02})
+    assert np.diag(ratio.basis.damping) == pytest.approx([0.0, 0.04 * w[1]], rel=1e-14)
+    assert ratio.parameter("basis.damping_ratios.1") == pytest.approx(0.02, rel=1e-14)
+    assert system.with_(**{"basis.stiffness.0.1": 0.5}).arrays.stiffness[0, 1] == 0.5
+    assert sensitivity(system, 1.0, initial=np.ones(4), parameter="basis.damping.0.0").forced.any()
+    for name, words in (("basis.damping.0", "numbers of the basis are"),
+                        ("basis.damping.0.2", "the basis has 2 modes"),
+                        ("basis.modes", "numbers of the basis are")):
+        with pytest.raises(InputError, match=words):
+            contact_field(system, [name])
+    with pytest.raises(InputError, match=r"damping_ratios\.0 = -0\.1 must be zero or above"):
+        system.with_(**{"basis.damping_ratios.0": -0.1})
 
 
 def beam(mu=0.55):
@@ -107,7 +168,7 @@ def test_flutter_of_a_beam_on_a_belt():
     k = int(np.argmin(modes.damping_ratios))
     assert modes.growing() == pytest.approx([645.6], abs=0.1)
     growth = modes.eigenvalues[k]
-    shape, m = modes.shapes[:, k], system.basis.modes
+    shape, m = modes.right[:, k], system.basis.modes
     size = 1e-9 / np.abs(system.basis.contact_T[:, 1] @ shape[:m]).max()
     run = simulate(system, 0.02, initial=found.state + size * shape.real, outputs=81, rtol=1e-9)
     moved = (run.modal_coordinates - found.state[:m]) @ system.basis.T_matrix.T

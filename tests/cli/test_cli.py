@@ -423,3 +423,23 @@ def test_script_for_system_libraries_agrees_with_the_doctor():
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
                           check=False, env=os.environ | {"PATH": ""})
     assert done.returncode == (1 if system_libraries.missing() else 0)
+
+
+def test_complex_modes_and_a_movie_of_one(cli, study, monkeypatch):
+    from fecontact.output.render import mode_movie
+
+    drawn = []
+
+    def noted(basis, path, mode, *, modes, progress):
+        drawn.append((path.name, mode, None if modes is None else len(modes.frequencies_hz)))
+        return path
+
+    monkeypatch.setattr(mode_movie, "render_mode", noted)
+    spring = ("--set", "drive.stiffness_x=1e4")
+    code, out, _ = cli("modes", study, "--complex", "--movie", "1", *spring)
+    assert code == 0
+    # On the spring, 1.57 kg/m over 0.1 m: sqrt(1e4 / 0.157) / (2 pi) = 40.17 Hz.
+    assert re.search(r"steady sliding:\s+mode .*\s+\S+\s+0 +40\.1\d+ ", out)
+    assert cli("modes", study, "--movie", "0")[0] == 0
+    assert [name for name, _, _ in drawn] == ["tiny-complex-mode-1.mp4", "tiny-mode-0.mp4"]
+    assert drawn[1][2] is None

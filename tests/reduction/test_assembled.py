@@ -291,8 +291,8 @@ OTHERS = np.array([[8, 1], [8, 2]])
     (np.eye(2), 1j * TWO, {}, "stiffness matrix is complex"),
     (np.eye(2), [[2.0, np.inf], [np.inf, 2.0]], {},
      r"stiffness matrix holds values that are not finite, the first one in row 1, column 0"),
-    (np.eye(2), [[2.0, -1.0], [-1.1, 2.0]], {},
-     r"stiffness matrix is not symmetric: .* row 0, column 1 \(-1\) and in row 1, column 0 "
+    ([[2.0, -1.0], [-1.1, 2.0]], TWO, {},
+     r"mass matrix is not symmetric: .* row 0, column 1 \(-1\) and in row 1, column 0 "
      r"\(-1.1\), counted from 0, differ by 5.0e-02"),
     (np.diag([1.0, 0.0]), TWO, {},
      r"mass matrix is not positive definite: its diagonal entry at degree of freedom 1 \(counted "

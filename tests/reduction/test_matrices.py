@@ -108,8 +108,8 @@ def test_square_files_are_taken_as_they_are(tmp_path):
     text = "1 1 2.\n1 2 -1.\n2 1 -1.5\n2 2 3.\n"
     found = read_matrix(written(tmp_path / "K.mtx", text))
     assert full(found).tolist() == [[2.0, -1.0], [-1.5, 3.0]]
-    with pytest.raises(InputError, match=r"stiffness matrix \(.*K\.mtx\) is not symmetric"):
-        basis_from_matrices(np.eye(2), found, {"contact": np.zeros((1, 3, 2))})
+    with pytest.raises(InputError, match=r"mass matrix \(.*K\.mtx\) is not symmetric"):
+        basis_from_matrices(found, np.eye(2), {"contact": np.zeros((1, 3, 2))})
 
 
 def test_matrix_input_with_internal_nodes(tmp_path):

@@ -1,4 +1,4 @@
-"""Equilibria of vector fields and contact systems, their stability and complex modes."""
+"""Equilibria of vector fields and contact systems, their stability and modes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
+from fecontact.system.complex_modes import ComplexModes
 
 _RESIDUAL = 1e-8
 
@@ -35,6 +36,13 @@ def solution(matrix: Array, rhs: Array) -> Array:
 
 
 _ITERATIONS = 60
+# Differences for the slopes of eigenvalues: step relative to the parameter, weights by place.
+_SLOPE_STEP = 1e-4
+_DIFFERENCES = (
+    {-2: 1.0 / 12.0, -1: -2.0 / 3.0, 1: 2.0 / 3.0, 2: -1.0 / 12.0},
+    {0: -25.0 / 12.0, 1: 4.0, 2: -3.0, 3: 4.0 / 3.0, 4: -0.25},
+    {0: 25.0 / 12.0, -1: -4.0, -2: 3.0, -3: -4.0 / 3.0, -4: 0.25},
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,57 +83,46 @@ class Equilibrium:
         return int(unstable_count(self.eigenvalues))
 
     @cached_property
-    def modes(self) -> "ComplexModes":
-        """Frequencies, damping ratios and shapes of the linear motion."""
+    def modes(self) -> ComplexModes:
+        """Frequencies, damping ratios and eigenvectors of the linear motion."""
         return ComplexModes.of(self.jacobian)
 
+    def eigenvalue_slopes(self, parameter: str) -> ComplexArray:
+        """Derivatives (r,) of the eigenvalues of :attr:`modes` to a parameter.
 
-@dataclass(frozen=True, eq=False)
-class ComplexModes:
-    """Complex modes, as in brake-squeal analysis: one for each pair l = -D w +- i w sqrt(1 - D^2).
+        Those of the equilibrium that moves with the parameter: ``s^T (dA/dp) r`` with the left and
+        right eigenvectors s, r and the change of the Jacobian A along the equilibria, by
+        differences of fourth order.
 
-    Attributes
-    ----------
-    eigenvalues : (r,) complex array
-        Those with imaginary part above zero, the lowest frequency first [1/s].
-    frequencies_hz : (r,) array
-        Im l / (2 pi) [Hz].
-    damping_ratios : (r,) array
-        D = -Re l / |l|; negative for a mode that grows, the flutter mode.
-    shapes : (d, r) complex array
-        Eigenvectors of the state, of length one, with the largest entry real and positive.
-    real_eigenvalues : array
-        Those without a frequency [1/s], the largest first.
-    """
+        Raises
+        ------
+        InputError
+            If the field has no such parameter.
+        AnalysisError
+            If the equilibrium cannot be continued, as at a fold.
+        """
+        field, t = self.field, np.zeros(1)
+        index = field.index(parameter)
+        P = field.derivatives(t, self.state[None], self.values, (index,))[2][0, :, 0]
+        moving = solution(self.jacobian, -P)
+        step = _SLOPE_STEP * (abs(float(self.values[index])) or 1.0)
 
-    eigenvalues: ComplexArray
-    frequencies_hz: Array
-    damping_ratios: Array
-    shapes: ComplexArray
-    real_eigenvalues: Array
+        def jacobian(place: int) -> Array:
+            values = self.values.copy()
+            values[index] += place * step
+            state = self.state + place * step * moving
+            return field.derivatives(t, state[None], values)[1][0]
 
-    @classmethod
-    def of(cls, jacobian: Array) -> "ComplexModes":
-        """The modes of a Jacobian (d, d)."""
-        eigenvalues, vectors = np.linalg.eig(jacobian)
-        chosen = np.flatnonzero(eigenvalues.imag > 0.0)
-        chosen = chosen[np.argsort(eigenvalues[chosen].imag)]
-        found = np.asarray(eigenvalues[chosen], dtype=complex)
-        shapes = vectors[:, chosen].astype(complex)
-        if len(chosen):
-            largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(len(chosen))]
-            shapes = shapes * (np.abs(largest) / largest)
-        real = np.sort(eigenvalues[eigenvalues.imag == 0.0].real)[::-1]
-        return cls(found, found.imag / (2.0 * np.pi), -found.real / np.abs(found), shapes, real)
-
-    def displacement(self, field: ContactField, mode: int) -> ComplexArray:
-        """Complex displacement (points, 3) of one mode at B, C, the contact and further points."""
-        basis = field.system().basis
-        return np.asarray(basis.T @ self.shapes[: basis.modes, mode])
-
-    def growing(self) -> Array:
-        """Frequencies of the modes with negative damping [Hz]."""
-        return self.frequencies_hz[self.damping_ratios < 0.0]
+        # One-sided where the other side is out of the parameter's range.
+        for weights in _DIFFERENCES:
+            try:
+                change = sum(weight * jacobian(place) for place, weight in weights.items())
+            except InputError:
+                if weights is _DIFFERENCES[-1]:
+                    raise
+                continue
+            break
+        return self.modes.sensitivity(np.asarray(change) / step)
 
 
 def sorted_eigenvalues(jacobian: Array) -> ComplexArray:

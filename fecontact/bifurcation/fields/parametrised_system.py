@@ -323,10 +323,10 @@ def _parameter(system: ContactSystem, name: str, given: Any) -> tuple[float, Set
         raise InputError(f"Parameter {name!r} = {given!r} must be a number, None for the value "
                          f"that the system has, or a pair (value, function) of a function "
                          f"(system, value) -> system.")
-    known = system.parameters()
-    if name not in known and name != "gap":
+    known = system.parameter(name)
+    if known is None:
         system.with_(**{name: given})  # raises, with the names that exist
-    value = known.get(name, system.gap) if given is None else given
+    value = known if given is None else given
     if not isinstance(value, Real) or isinstance(value, bool):
         raise InputError(f"Parameter {name!r} has the value {value!r}, which is not one number; "
                          f"give a pair (value, function) instead.")

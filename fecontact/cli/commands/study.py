@@ -60,10 +60,16 @@ def modes(
     converge: Annotated[bool, Parameter(negative=(), help=(
         "Show convergence with mesh refinement and number of modes, as a table and a plot."))]
     = False,
+    complex_: Annotated[bool, Parameter(name="--complex", negative=(), help=(
+        "Show the complex modes of steady sliding, too: those of negative damping squeal."))]
+    = False,
+    movie: Annotated[int | None, Parameter(help=(
+        "Draw the mode of this number as a movie; with --complex, the complex mode."))] = None,
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import convergence_of, read_study
+    from fecontact.cli.tables import complex_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.reduction.report import BasisReport
 
@@ -77,6 +83,19 @@ def modes(
         picture = folder / f"{described.name}-modes.png"
         plot_modes(basis, path=picture)
         echo_written(picture)
+        sliding = None
+        if complex_:
+            from fecontact.analysis.complex_modes import complex_modes
+
+            sliding = complex_modes(described.system(), "sliding")
+            echo("\nsteady sliding:")
+            show(complex_table(sliding))
+        if movie is not None:
+            from fecontact.output.render.mode_movie import render_mode
+
+            kind = "mode" if sliding is None else "complex-mode"
+            echo_written(render_mode(basis, folder / f"{described.name}-{kind}-{movie}.mp4", movie,
+                                     modes=sliding, progress=True))
         if converge:
             result = convergence_of(described)
             echo(f"\n{result}")

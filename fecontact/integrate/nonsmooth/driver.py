@@ -246,9 +246,10 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
     pushes = [(springs, [motion.largest for motion in drive.motions]),
               (arrays.load_shapes, [signal.largest for signal in system.load.signals.values()])]
     push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
-    driven = push / np.maximum(np.sqrt(np.diag(arrays.stiffness)), 1.0 / longest)
+    slowest = np.maximum(np.diag(arrays.stiffness), 1.0 / longest**2)
+    driven = push / np.sqrt(slowest)
     energy = (0.5 * state[m : 2 * m] @ state[m : 2 * m]
-              + 0.5 * state[:m] @ system.arrays.stiffness @ state[:m]
+              + 0.5 * abs(state[:m] @ system.arrays.stiffness @ state[:m])
               + work_of_loads(system.basis, system.load, depth)
               + sum(0.5 * c * motion.largest**2 for c, motion in zip(
                   (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))

@@ -162,7 +162,8 @@ def energy_scale(system: ContactSystem, state: Array) -> float:
     """Energy at the start, of the drive's springs and of the load over the roughness [J]."""
     m, drive = system.basis.modes, system.drive
     q, rate = state[:m], state[m : 2 * m]
-    start = 0.5 * (rate @ rate + q @ system.arrays.stiffness @ q)
+    # Rotation may leave modes with a stiffness below zero.
+    start = 0.5 * (rate @ rate + abs(q @ system.arrays.stiffness @ q))
     springs = 0.5 * sum(
         c * motion.largest**2
         for c, motion in zip((drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))

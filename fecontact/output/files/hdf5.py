@@ -22,7 +22,12 @@ from fecontact.core.files.stored import (
     values,
 )
 from fecontact.core.interrupts import held_back_interrupt
-from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
+from fecontact.reduction.modal_basis import (
+    ModalBasis,
+    ModeShapes,
+    ReductionQuality,
+)
+from fecontact.reduction.rotating import ModalRotation
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
 _MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
@@ -136,6 +141,12 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     """Write a basis into an HDF5 group."""
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
+    if basis.stiffness is not None:
+        group.create_dataset("stiffness", data=basis.stiffness)
+    if basis.rotation is not None:
+        rotation = group.create_group("rotation")
+        for name, value in vars(basis.rotation).items():
+            rotation.create_dataset(name, data=value)
     group.attrs["extra"] = list(basis.extra)
     if basis.inertia_rows is not None:
         group.create_dataset("inertia_rows", data=basis.inertia_rows)
@@ -194,7 +205,9 @@ def stored_basis(group: Any) -> ModalBasis:
                  if "quality" in group else None),
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
         boundaries=boundaries, **loads,
-        thickness=float(group.attrs["thickness"]) if "thickness" in group.attrs else None)
+        thickness=float(group.attrs["thickness"]) if "thickness" in group.attrs else None,
+        stiffness=array(group, "stiffness", (m, m)) if "stiffness" in group else None,
+        rotation=_read_rotation(member(group, "rotation"), m) if "rotation" in group else None)
 
 
 def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
@@ -225,6 +238,12 @@ def _elements(group: Any, nodes: int) -> Any:
     if elements.shape[1] not in (3, 4, 6, 9):
         raise DamagedError(f"elements have {elements.shape[1]} nodes, not 3, 4, 6 or 9")
     return elements
+
+
+def _read_rotation(group: Any, modes: int) -> ModalRotation:
+    return ModalRotation(
+        float(values(member(group, "speed")).item()), array(group, "coriolis", (modes, modes)),
+        array(group, "stiffening", (modes, modes)), array(group, "load", (modes,)))
 
 
 def _read_quality(group: Any, modes: int, points: int, boundaries: int) -> ReductionQuality:

@@ -4,7 +4,7 @@ import glob
 import os
 import re
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
 _SMALLEST = (320, 180)
-_MOVING, _STILL = 2, 4  # pixels rendered for each of a movie and of a still, in both directions
+MOVING, _STILL = 2, 4  # pixels rendered for each of a movie and of a still, in both directions
 # Header text that marks a picture as one of this package.
 _SOFTWARE = ("Software", "fecontact")
 _OURS = "\0".join(_SOFTWARE).encode()
@@ -92,13 +92,7 @@ def render(
     MissingLibraryError
         If this computer cannot render pictures or encode movies; the message says what to install.
     """
-    path = as_path(path, "a movie")
-    movie = path.suffix.lower() == ".mp4"
-    if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
-        raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
-                         f"folder.")
-    require_frame_rate("A movie", fps)
-    _require_size(size)
+    path, movie = target(path, fps, size)
     require_field(trajectory)
     indices = frame_indices(trajectory.time, frames, t_start, t_end)
     if not len(indices):
@@ -106,15 +100,42 @@ def render(
     motion = Motion(trajectory, indices, colour, scale)
     lasting = float(motion.times[-1] - motion.times[0])
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
-    require_rendering(size, _MOVING)
+    require_rendering(size, MOVING)
+    return write_images(_images(motion, size, title, slowness), len(indices), path, fps, size,
+                        progress)
+
+
+def target(path: str | Path, fps: float, size: tuple[int, int]) -> tuple[Path, bool]:
+    """Where to draw to, and whether that is a movie.
+
+    Raises
+    ------
+    InputError
+        For another ending, and for a frame rate or a size out of range.
+    """
+    path = as_path(path, "a movie")
+    if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
+        raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
+                         f"folder.")
+    require_frame_rate("A movie", fps)
+    _require_size(size)
+    return path, path.suffix.lower() == ".mp4"
+
+
+def write_images(
+    images: Iterable[Image], count: int, path: Path, fps: float, size: tuple[int, int],
+    progress: bool | Progress | None,
+) -> Path:
+    """Write pictures as a movie or as numbered files, whole or not at all; the first path."""
+    movie = path.suffix.lower() == ".mp4"
     with (held_back_interrupt() as check,
           shown(progress, lambda: counting_bar("Drawing")) as tell,
           _movie_file(path, size, fps) if movie else _numbered_files(path) as take):
-        for done, image in enumerate(_images(motion, size, title, slowness), start=1):
+        for done, image in enumerate(images, start=1):
             check()
             take(image)
             if tell is not None:
-                tell(done, len(indices))
+                tell(done, count)
     if movie or path.suffix.lower() != ".png" or path.is_dir():
         return path
     return path.with_name(f"{path.stem}_0000.png")
@@ -176,7 +197,7 @@ def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: 
     """Pictures (height, width, 3) of all frames of a motion, or of one."""
     furniture = Overlay(motion, *size, title, slowness)
     scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
-                  fineness=_MOVING if only is None else _STILL)
+                  fineness=MOVING if only is None else _STILL)
     with scene:
         for frame in range(len(motion.indices)) if only is None else (only,):
             yield furniture.around(scene.image(frame), frame)

@@ -24,9 +24,78 @@ _DPI = 100
 _FONT = 10.5  # points at 960 x 540
 
 
+class Strips:
+    """Strips of text above and below a scene.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the whole picture in pixels.
+    """
+
+    width: int
+    height: int
+
+    @property
+    def size(self) -> float:
+        """Size of text and lines, one at 960 x 540."""
+        return min(self.width / 960.0, self.height / 540.0)
+
+    @property
+    def header_height(self) -> int:
+        """Height of the strip above the scene in pixels."""
+        return 2 * round(22 * self.size)
+
+    @property
+    def footer_height(self) -> int:
+        """Height of the strip below the scene in pixels."""
+        return 2 * round(34 * self.size)
+
+    def _strip(self, width: int, height: int) -> tuple[Any, Any]:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
+        return figure, FigureCanvasAgg(figure)
+
+    def _text(self, figure: Any, x: float, y: float, text: str, **options: Any) -> Any:
+        options = {"fontsize": _FONT * self.size, "color": DARK, "va": "center",
+                   "family": "DejaVu Sans"} | options
+        return figure.text(x, y, text, **options)
+
+    def header(self, title: str | None, note: str) -> Image:
+        """The upper strip: a title, shortened to the room that a note leaves beside it."""
+        figure, canvas = self._strip(self.width, self.header_height)
+        beside = self._text(figure, 0.81, 0.46, note, ha="right")
+        if title:
+            drawn = self._text(figure, 0.03, 0.46, title, fontsize=1.25 * _FONT * self.size)
+            room = beside.get_window_extent(canvas.get_renderer()).x0 - 0.05 * self.width
+            text = title
+            while drawn.get_window_extent(canvas.get_renderer()).width > room and len(text) > 1:
+                text = text[:-1]
+                drawn.set_text(text.rstrip() + "…")
+        return pixels(canvas)
+
+    def colour_scale(self, figure: Any, label: str, largest: float, colours: str) -> None:
+        """Draw the colour scale from zero into the lower strip."""
+        from matplotlib import colormaps
+        from matplotlib.ticker import MaxNLocator
+
+        axes = figure.add_axes((0.03, 0.42, 0.42, 0.17))
+        axes.imshow(np.linspace(0.0, 1.0, 256)[None], aspect="auto", cmap=colormaps[colours],
+                    extent=(0.0, largest, 0.0, 1.0))
+        axes.set_yticks([])
+        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+        axes.tick_params(labelsize=0.9 * _FONT * self.size, colors=DARK, length=3 * self.size,
+                         width=0.7 * self.size, pad=2 * self.size)
+        for spine in axes.spines.values():
+            spine.set(linewidth=0.7 * self.size, color=DARK)
+        self._text(figure, 0.03, 0.80, label)
+
+
 @dataclass(frozen=True, eq=False)
-class Overlay:
-    """Strips above and below the scene, as large as the whole picture.
+class Overlay(Strips):
+    """Strips above and below the scene of a run, as large as the whole picture.
 
     Attributes
     ----------
@@ -43,21 +112,6 @@ class Overlay:
     height: int
     title: str | None = None
     slowness: float | None = None
-
-    @property
-    def size(self) -> float:
-        """Size of text and lines, one at 960 x 540."""
-        return min(self.width / 960.0, self.height / 540.0)
-
-    @property
-    def header_height(self) -> int:
-        """Height of the strip above the scene in pixels."""
-        return 2 * round(22 * self.size)
-
-    @property
-    def footer_height(self) -> int:
-        """Height of the strip below the scene in pixels."""
-        return 2 * round(34 * self.size)
 
     @cached_property
     def chart_height(self) -> int:
@@ -86,30 +140,9 @@ class Overlay:
     def _chart(self) -> ForceChart:
         return ForceChart(self.motion, self.width, self.chart_height, _FONT * self.size)
 
-    def _strip(self, width: int, height: int) -> tuple[Any, Any]:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
-        return figure, FigureCanvasAgg(figure)
-
-    def _text(self, figure: Any, x: float, y: float, text: str, **options: Any) -> Any:
-        options = {"fontsize": _FONT * self.size, "color": DARK, "va": "center",
-                   "family": "DejaVu Sans"} | options
-        return figure.text(x, y, text, **options)
-
     @cached_property
     def _header(self) -> Image:
-        figure, canvas = self._strip(self.width, self.header_height)
-        scale = self._text(figure, 0.81, 0.46, self._scales(), ha="right")
-        if self.title:
-            title = self._text(figure, 0.03, 0.46, self.title, fontsize=1.25 * _FONT * self.size)
-            room = scale.get_window_extent(canvas.get_renderer()).x0 - 0.05 * self.width
-            text = self.title
-            while title.get_window_extent(canvas.get_renderer()).width > room and len(text) > 1:
-                text = text[:-1]
-                title.set_text(text.rstrip() + "…")
-        return _pixels(canvas)
+        return self.header(self.title, self._scales())
 
     def _scales(self) -> str:
         scale = self.motion.scale
@@ -134,33 +167,21 @@ class Overlay:
         decimals = int(np.clip(np.ceil(-np.log10(max(step, 1e-9)) + 0.3), 0, 4))
         _, canvas, text = self._clock_parts
         text.set_text(f"t = {times[frame] / factor:.{decimals}f} {symbol}")
-        return _pixels(canvas)
+        return pixels(canvas)
 
     @cached_property
     def _footer(self) -> Image:
         figure, canvas = self._strip(self.width, self.footer_height)
         self._colour_scale(figure)
         self._legend(figure)
-        return _pixels(canvas)
+        return pixels(canvas)
 
     def _colour_scale(self, figure: Any) -> None:
-        from matplotlib import colormaps
-        from matplotlib.ticker import MaxNLocator
-
         name, unit = COLOURS[self.motion.colour]
         largest = self.motion.largest_colour or 1.0
         factor, symbol = suitable_unit(largest, unit)
-        axes = figure.add_axes((0.03, 0.42, 0.42, 0.17))
-        axes.imshow(np.linspace(0.0, 1.0, 256)[None], aspect="auto",
-                    cmap=colormaps[COLOUR_MAPS[self.motion.colour]],
-                    extent=(0.0, largest / factor, 0.0, 1.0))
-        axes.set_yticks([])
-        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
-        axes.tick_params(labelsize=0.9 * _FONT * self.size, colors=DARK, length=3 * self.size,
-                         width=0.7 * self.size, pad=2 * self.size)
-        for spine in axes.spines.values():
-            spine.set(linewidth=0.7 * self.size, color=DARK)
-        self._text(figure, 0.03, 0.80, f"{name} [{symbol}]")
+        self.colour_scale(figure, f"{name} [{symbol}]", largest / factor,
+                          COLOUR_MAPS[self.motion.colour])
 
     def _legend(self, figure: Any) -> None:
         from matplotlib.lines import Line2D
@@ -192,6 +213,7 @@ def _short(value: float) -> str:
     return f"{value:.2g}" if value < 100.0 else f"{float(f'{value:.2g}'):.0f}"
 
 
-def _pixels(canvas: Any) -> Image:
+def pixels(canvas: Any) -> Image:
+    """Picture (height, width, 3) of a canvas of matplotlib."""
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

@@ -1,6 +1,6 @@
 """Scene of a picture, drawn by VTK: body, ground, contact nodes and forces."""
 
-from typing import Any
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from fecontact.core.types import Array
 from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.offscreen import known_window
+from fecontact.reduction.modal_basis import ModeShapes
 
 COLOUR_MAPS = {"displacement": "viridis", "von_mises": "cividis"}
 NODE_COLOURS = {"open": "#ffffff", **STATE_COLOURS}
@@ -28,12 +29,35 @@ _COLUMNS, _MOST_COLUMNS = 2, 8  # of the ground per pixel
 _POINTS = 16  # per wave of the ground, to draw short waves smoothly
 
 
-class Scene:
-    """Renderer of the frames of a motion; a context manager.
+class BodyMotion(Protocol):
+    """A body that moves: what :class:`BodyScene` draws; see :class:`Motion`."""
+
+    @property
+    def mode_shapes(self) -> ModeShapes:
+        """Nodes, cells and outline of the body."""
+
+    @property
+    def colour(self) -> str:
+        """What the body is coloured by, one of :data:`COLOUR_MAPS`."""
+
+    @property
+    def largest_colour(self) -> float:
+        """Upper end of the colour range; the lower end is zero."""
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
+
+    def body(self, frame: int) -> tuple[Array, Array]:
+        """Drawn positions (N, 2) of the nodes [m] and their colour values (N,)."""
+
+
+class BodyScene:
+    """Renderer of the frames of a body alone; a context manager.
 
     Parameters
     ----------
-    motion : Motion
+    motion : BodyMotion
     width, height : int
         Size of the images in pixels.
     line : float
@@ -43,13 +67,13 @@ class Scene:
         sees. VTK's own smoothing of edges is slower in software and looks worse.
     """
 
-    def __init__(self, motion: Motion, width: int, height: int, *, line: float = 1.0,
+    def __init__(self, motion: BodyMotion, width: int, height: int, *, line: float = 1.0,
                  fineness: int = 2) -> None:
         with known_window():
             import pyvista
 
             self._pyvista: Any = pyvista
-            self._motion = motion
+            self._shown = motion
             self._fineness = fineness
             self._plotter: Any = self._pyvista.Plotter(
                 off_screen=True, window_size=[fineness * width, fineness * height])
@@ -57,10 +81,8 @@ class Scene:
             self._plotter.set_background("white")
             self._aim(width / height)
             self._add_body(fineness * line)
-            self._add_ground(width, fineness * line)
-            self._add_contact(fineness * line)
 
-    def __enter__(self) -> "Scene":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -68,30 +90,28 @@ class Scene:
 
     def image(self, frame: int) -> NDArray[np.uint8]:
         """Picture (height, width, 3) of a frame."""
-        places, colours = self._motion.body(frame)
-        self._move(self._body, places)
-        self._body.point_data["colour"][:] = colours
-        self._body.GetPointData().GetScalars().Modified()
-        self._move(self._edges, places)
-        self._draw_ground(frame)
-        self._draw_contact(frame)
+        self._draw(frame)
         self._plotter.render()
         return _reduced(np.asarray(self._plotter.screenshot(None, return_img=True)),
                         self._fineness)
 
+    def _draw(self, frame: int) -> None:
+        places, colours = self._shown.body(frame)
+        self._move(self._body, places)
+        self._body.point_data["colour"][:] = colours
+        self._body.GetPointData().GetScalars().Modified()
+        self._move(self._edges, places)
+
     def _aim(self, aspect: float) -> None:
-        """Place the camera so that body and ground fill the picture in all frames."""
-        left, right, _, _ = self._motion.box
-        level = self._motion.ground_level
-        body, below = _reach(self._motion)
-        height = max((right - left) / (1.0 - 2.0 * _MARGIN) / aspect, _needed(body, below))
-        depth = max(_DEPTH * height, 0.46 * (height - body), below + 2.0 * _MARGIN * height)
-        middle = 0.5 * (left + right)
-        self._height, self._bottom = height, level - depth
-        self._unit = height * min(1.0, 0.5 * aspect)  # sizes of arrows and marks
-        self._x = (middle - 0.5 * aspect * height, middle + 0.5 * aspect * height)
+        """Place the camera so that the body fills the picture in all frames."""
+        left, right, bottom, top = self._shown.box
+        height = max((right - left) / aspect, top - bottom) / (1.0 - 2.0 * _MARGIN)
+        self._point_camera(0.5 * (left + right), 0.5 * (bottom + top - height), height)
+
+    def _point_camera(self, middle: float, bottom: float, height: float) -> None:
+        self._height, self._bottom = height, bottom
         camera = self._plotter.camera
-        centre = (middle, self._bottom + 0.5 * height, 0.0)
+        centre = (middle, bottom + 0.5 * height, 0.0)
         camera.focal_point = centre
         camera.position = (centre[0], centre[1], 10.0 * height)
         camera.up = (0.0, 1.0, 0.0)
@@ -121,7 +141,7 @@ class Scene:
         mesh.GetPoints().Modified()
 
     def _add_body(self, line: float) -> None:
-        motion, field = self._motion, self._motion.mode_shapes
+        motion, field = self._shown, self._shown.mode_shapes
         largest = motion.largest_colour or 1.0
         self._body = self._add(
             "body", field.nodes, faces=field.cells, scalars="colour",
@@ -131,6 +151,37 @@ class Scene:
                                 line_width=line)
         self._add("reference", field.nodes, lines=field.outline, color=_OUTLINE,
                   line_width=line)
+
+
+class Scene(BodyScene):
+    """Renderer of the frames of a run, with ground, contact nodes and forces.
+
+    Parameters as for :class:`BodyScene`, the motion one of a run.
+    """
+
+    def __init__(self, motion: Motion, width: int, height: int, *, line: float = 1.0,
+                 fineness: int = 2) -> None:
+        self._motion = motion
+        super().__init__(motion, width, height, line=line, fineness=fineness)
+        self._add_ground(width, fineness * line)
+        self._add_contact(fineness * line)
+
+    def _draw(self, frame: int) -> None:
+        super()._draw(frame)
+        self._draw_ground(frame)
+        self._draw_contact(frame)
+
+    def _aim(self, aspect: float) -> None:
+        """Place the camera so that body and ground fill the picture in all frames."""
+        left, right, _, _ = self._motion.box
+        level = self._motion.ground_level
+        body, below = _reach(self._motion)
+        height = max((right - left) / (1.0 - 2.0 * _MARGIN) / aspect, _needed(body, below))
+        depth = max(_DEPTH * height, 0.46 * (height - body), below + 2.0 * _MARGIN * height)
+        middle = 0.5 * (left + right)
+        self._unit = height * min(1.0, 0.5 * aspect)  # sizes of arrows and marks
+        self._x = (middle - 0.5 * aspect * height, middle + 0.5 * aspect * height)
+        self._point_camera(middle, level - depth, height)
 
     def _add_ground(self, width: int, line: float) -> None:
         ground, view = self._motion.trajectory.system.ground, self._x[1] - self._x[0]

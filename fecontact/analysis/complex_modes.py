@@ -1,0 +1,55 @@
+"""Complex modes of a body or of a contact system about an equilibrium."""
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
+from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.complex_modes import ComplexModes as ComplexModes
+from fecontact.system.contact_system import ContactSystem
+
+
+def complex_modes(
+    body: ModalBasis | ContactSystem, linearised_at: Initial | None = None, *, time: float = 0.0
+) -> ComplexModes:
+    r"""Complex modes of linearised equations: frequencies, damping, right and left eigenvectors.
+
+    Those of
+
+    .. math:: A = \begin{bmatrix} 0 & I \\ -K & -C \end{bmatrix}
+
+    with the full modal stiffness K and damping C of the body and, for a system, the springs and
+    dashpots of its drive and the Jacobian of the contact. Skew parts, of friction in the
+    contact, of damping that rotates or of Coriolis forces, make the shapes complex: the points of
+    the body do not move in phase, and a movie (:func:`fecontact.plot.render_mode`) shows
+    travelling waves.
+
+    Parameters
+    ----------
+    body : ModalBasis or ContactSystem
+        A basis stands for the body alone, a system includes its drive.
+    linearised_at : 'rest', 'sliding' or (2 m + n s,) array, optional
+        State at which the contact of a system is linearised, usually an equilibrium; see
+        :func:`fecontact.integrate.initial_state`. By default the contact is left out.
+    time : float
+        Time at which the ground is taken [s].
+
+    Raises
+    ------
+    InputError
+        For a linearisation of a basis, or a state of wrong size.
+    AnalysisError
+        If there is no such equilibrium.
+    """
+    require_kind("complex_modes", (ModalBasis, ContactSystem), body=body)
+    if linearised_at is not None:
+        if not isinstance(body, ContactSystem):
+            raise InputError("A modal basis has no contact to be linearised; give a ContactSystem.")
+        return ComplexModes.of(body.jacobian(time, initial_state(body, linearised_at, time)))
+    if isinstance(body, ContactSystem):
+        stiffness, damping = body.arrays.stiffness, body.arrays.damping
+    else:
+        stiffness, damping = body.stiffness_matrix, body.damping
+    zero, one = np.zeros_like(stiffness), np.eye(len(stiffness))
+    return ComplexModes.of(np.block([[zero, one], [-stiffness, -damping]]))

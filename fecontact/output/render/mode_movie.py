@@ -1,0 +1,197 @@
+"""Movies of modes, real and complex: the body over whole periods of free vibration."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.checks import require_kind, require_scale
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, ComplexArray
+from fecontact.output.render.movie import MOVING, Image, Progress, target, write_images
+from fecontact.output.render.offscreen import require_rendering
+from fecontact.output.render.overlay import Strips, pixels
+from fecontact.output.render.scene import COLOUR_MAPS, BodyScene
+from fecontact.reduction.modal_basis import ModalBasis, ModeShapes
+from fecontact.system.complex_modes import ComplexModes
+
+_VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
+
+
+@dataclass(frozen=True, eq=False)
+class ModeMotion:
+    """One mode prepared for drawing: ``Re(shape exp(i phase))`` at some phases.
+
+    Attributes
+    ----------
+    mode_shapes : ModeShapes
+    shape : (N, 2) complex array
+        Displacements of the nodes; its size does not matter.
+    phases : (F,) array
+        [rad].
+    extent : float
+        Largest motion drawn, as a part of the body's extent.
+    """
+
+    mode_shapes: ModeShapes
+    shape: ComplexArray
+    phases: Array
+    extent: float = _VISIBLE
+    colour: str = "displacement"
+    largest_colour: float = 1.0
+
+    @cached_property
+    def _unit_shape(self) -> ComplexArray:
+        """The shape with a largest displacement of one within the period."""
+        # The displacement of a node runs on an ellipse; this is its longer half-axis.
+        x, y = self.shape.T
+        power = np.abs(x) ** 2 + np.abs(y) ** 2
+        longest = np.sqrt(0.5 * (power + np.abs(x**2 + y**2))).max()
+        return np.asarray(self.shape / (longest or 1.0))
+
+    @property
+    def _reach(self) -> float:
+        """Largest motion drawn [m]."""
+        return self.extent * float(np.linalg.norm(np.ptp(self.mode_shapes.nodes, axis=0)))
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
+        moved = self._reach * np.abs(self._unit_shape)
+        low = (self.mode_shapes.nodes - moved).min(axis=0)
+        high = (self.mode_shapes.nodes + moved).max(axis=0)
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+    def body(self, frame: int) -> tuple[Array, Array]:
+        """Drawn positions (N, 2) [m] and displacements (N,) relative to the largest."""
+        moved = (self._unit_shape * np.exp(1j * self.phases[frame])).real
+        return self.mode_shapes.nodes + self._reach * moved, np.linalg.norm(moved, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class _ModeStrips(Strips):
+    """Title above the scene, colours and phase below."""
+
+    width: int
+    height: int
+    title: str
+
+    @cached_property
+    def _above(self) -> Image:
+        return self.header(self.title, "")
+
+    def around(self, scene: Image, phase: float) -> Image:
+        """The whole picture from that of the scene."""
+        figure, canvas = self._strip(self.width, self.footer_height)
+        self.colour_scale(figure, "displacement, relative to the largest", 1.0,
+                          COLOUR_MAPS["displacement"])
+        self._text(figure, 0.97, 0.5, f"phase {np.degrees(phase) % 360.0:3.0f}°", ha="right")
+        return np.concatenate([self._above, scene, pixels(canvas)])
+
+
+def render_mode(
+    basis: ModalBasis,
+    path: str | Path,
+    mode: int = 0,
+    *,
+    modes: ComplexModes | None = None,
+    frames: int = 50,
+    periods: int = 2,
+    fps: float = 25,
+    size: tuple[int, int] = (960, 540),
+    scale: float = 1.0,
+    title: str | None = None,
+    progress: bool | Progress | None = None,
+) -> Path:
+    """Draw a mode as a movie or as numbered pictures, whole or not at all.
+
+    It shows ``Re(shape exp(i phase))`` over whole periods without growth or decay. Modes of the
+    basis are real and stand; complex modes have points that do not move in phase, so that waves
+    travel along the body.
+
+    Parameters
+    ----------
+    basis : ModalBasis
+        With shapes over the body.
+    path : str or Path
+        As for :func:`fecontact.render`.
+    mode : int
+        Number of the mode, from 0.
+    modes : ComplexModes, optional
+        The mode is one of these, such as :func:`fecontact.analysis.complex_modes` finds them or
+        the ``modes`` of an equilibrium; by default one of the basis.
+    frames : int
+        Frames in each period, at least 2.
+    periods : int
+        Number of periods, at least 1.
+    fps : float
+        Frames per second of the movie.
+    size : (int, int)
+        Width and height in pixels, even, at least 320 x 180.
+    scale : float
+        Factor of the drawn motion; one makes the largest 8 % of the body's extent.
+    title : str, optional
+        By default number, frequency and damping ratio of the mode.
+    progress : bool or callable, optional
+        As for :func:`fecontact.render`.
+
+    Returns the movie, the folder, or the first picture.
+
+    Raises
+    ------
+    InputError, MissingLibraryError
+        For a number out of range, a basis without shapes, and as :func:`fecontact.render`.
+    """
+    require_kind("render_mode", ModalBasis, basis=basis)
+    require_kind("render_mode", (ComplexModes, type(None)), modes=modes)
+    path, movie = target(path, fps, size)
+    for name, value, least in (("frames", frames, 2), ("periods", periods, 1)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            raise InputError(f"{name} = {value!r} must be a whole number of at least {least}.")
+    require_scale("The mode", scale)
+    field, (q, words) = _field(basis), _chosen(basis, modes, mode)
+    # Numbered pictures of one period suffice for any number of them.
+    count = frames * (periods if movie else 1)
+    phases = 2.0 * np.pi * np.arange(count) / frames
+    motion = ModeMotion(field, field.shapes @ q, phases, _VISIBLE * scale)
+    require_rendering(size, MOVING)
+    return write_images(_images(motion, size, words if title is None else title), count, path, fps,
+                        size, progress)
+
+
+def _images(motion: ModeMotion, size: tuple[int, int], title: str) -> Iterator[Image]:
+    strips = _ModeStrips(*size, title)
+    height = size[1] - strips.header_height - strips.footer_height
+    with BodyScene(motion, size[0], height, line=1.2 * strips.size, fineness=MOVING) as scene:
+        for frame, phase in enumerate(motion.phases.tolist()):
+            yield strips.around(scene.image(frame), phase)
+
+
+def _field(basis: ModalBasis) -> ModeShapes:
+    if basis.mode_shapes is None:
+        raise InputError("These modes cannot be drawn: the modal basis holds no shapes over the "
+                         "body; make the basis with modal_basis(body, ...).")
+    return basis.mode_shapes
+
+
+def _chosen(
+    basis: ModalBasis, modes: ComplexModes | None, mode: int
+) -> tuple[NDArray[np.complex128], str]:
+    """Modal coordinates (m,) of a mode, and its description."""
+    count = basis.modes if modes is None else len(modes.eigenvalues)
+    if isinstance(mode, bool) or not isinstance(mode, int | np.integer) or not 0 <= mode < count:
+        raise InputError(f"mode = {mode!r} must be the number of one of {count} modes, from 0.")
+    if modes is None:
+        hertz = basis.frequencies_hz[mode]
+        words = "rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"
+        return np.eye(basis.modes, dtype=complex)[mode], f"mode {mode}: {words}"
+    if len(modes.right) < 2 * basis.modes:
+        raise InputError(f"The complex modes have {len(modes.right)} states, but the basis has "
+                         f"{basis.modes} modes; take the basis that they belong to.")
+    ratio = modes.damping_ratios[mode]
+    return (np.asarray(modes.right[: basis.modes, mode]),
+            f"mode {mode}: {modes.frequencies_hz[mode]:.5g} Hz, damping ratio {ratio:.2%}"
+            f"{', grows' if ratio < 0.0 else ''}")

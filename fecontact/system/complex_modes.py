@@ -1,0 +1,138 @@
+"""Complex modes of linearised equations: eigenvalues, right and left eigenvectors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, ArrayLike, ComplexArray
+from fecontact.core.units import Summarised, span
+from fecontact.reduction.modal_basis import ModalBasis
+
+# Eigenvalues nearer than this, relative to the largest, share a space of eigenvectors.
+_REPEATED = 1e-9
+# Overlap of left and right eigenvectors below which there is no full set of them.
+_DEFECTIVE = 1e-14
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComplexModes(Summarised):
+    """Complex modes of x' = A x, one for each pair l = -D w +- i w sqrt(1 - D^2).
+
+    As in brake-squeal analysis. Right eigenvectors r, ``A r = l r``, are the shapes; left ones s,
+    ``s^T A = l s^T`` without conjugation, say how strongly forces excite a mode and how it changes
+    with the parameters. They are biorthonormal, ``left.T @ right = 1``.
+
+    Attributes
+    ----------
+    eigenvalues : (r,) complex array
+        Those with imaginary part above zero, the lowest frequency first [1/s].
+    frequencies_hz : (r,) array
+        Im l / (2 pi) [Hz].
+    damping_ratios : (r,) array
+        D = -Re l / |l|; negative for a mode that grows, the flutter mode.
+    right : (d, r) complex array
+        Right eigenvectors of the state [q, q', z], of length one, the largest entry real and
+        positive.
+    left : (d, r) complex array
+        Left eigenvectors, scaled to ``left.T @ right = 1``; NaN where modes coincide so that there
+        is no full set, exactly at the onset of undamped flutter.
+    real_eigenvalues : array
+        Those without a frequency [1/s], the largest first.
+    """
+
+    eigenvalues: ComplexArray
+    frequencies_hz: Array
+    damping_ratios: Array
+    right: ComplexArray
+    left: ComplexArray
+    real_eigenvalues: Array
+
+    @classmethod
+    def of(cls, matrix: ArrayLike) -> "ComplexModes":
+        """The modes of a real square matrix A (d, d).
+
+        Raises
+        ------
+        InputError
+            If it is not square, or holds values that are not finite.
+        """
+        from scipy.linalg import eig
+
+        A = np.asarray(matrix, dtype=float)
+        if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.isfinite(A).all():
+            raise InputError(f"Complex modes need a square matrix of finite numbers, not an array "
+                             f"of shape {A.shape}{'' if np.isfinite(A).all() else ' with others'}.")
+        eigenvalues, left, right = eig(A, left=True)
+        size = np.abs(eigenvalues).max(initial=0.0)
+        chosen = np.flatnonzero(eigenvalues.imag > 0.0)
+        # Frequencies that coincide in flutter differ by rounding; the growing one comes first.
+        frequencies = np.round(eigenvalues[chosen].imag / (_REPEATED * size or 1.0))
+        chosen = chosen[np.lexsort((-eigenvalues[chosen].real, frequencies))]
+        found = np.asarray(eigenvalues[chosen], dtype=complex)
+        shapes = right[:, chosen].astype(complex)
+        if len(chosen):
+            largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(len(chosen))]
+            shapes = shapes * (np.abs(largest) / largest)
+        duals = _biorthonormal(left[:, chosen].conj().astype(complex), shapes, found,
+                               _REPEATED * size)
+        real = np.sort(eigenvalues[eigenvalues.imag == 0.0].real)[::-1]
+        return cls(found, found.imag / (2.0 * np.pi), -found.real / np.abs(found), shapes, duals,
+                   real)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Numbers of modes, their frequencies and damping, and those that grow."""
+        return [
+            ("modes", f"{len(self.eigenvalues)}, {len(self.real_eigenvalues)} real eigenvalues"),
+            ("frequencies", span(self.frequencies_hz, "Hz")),
+            ("damping ratios", span(self.damping_ratios)),
+            ("growing", ", ".join(f"{value:.5g} Hz" for value in self.growing()) or "none"),
+        ]
+
+    @property
+    def condition(self) -> Array:
+        """Condition numbers |left| |right| (r,) of the eigenvalues: one for normal matrices.
+
+        A change of A moves an eigenvalue by at most this times its norm; infinite at the onset of
+        undamped flutter, where two modes coincide.
+        """
+        size = np.linalg.norm(self.left, axis=0) * np.linalg.norm(self.right, axis=0)
+        return np.asarray(np.where(np.isnan(size), np.inf, size))
+
+    def sensitivity(self, derivative: ArrayLike) -> ComplexArray:
+        """Derivatives (r,) of the eigenvalues, s^T (dA/dp) r, from dA/dp (d, d).
+
+        Raises
+        ------
+        InputError
+            If it does not have the shape of A.
+        """
+        change = np.asarray(derivative, dtype=float)
+        d = len(self.right)
+        if change.shape != (d, d):
+            raise InputError(f"The derivative of the matrix must have shape ({d}, {d}), not "
+                             f"{change.shape}.")
+        return np.asarray(np.einsum("ik,ij,jk->k", self.left, change, self.right))
+
+    def displacement(self, basis: ModalBasis, mode: int) -> ComplexArray:
+        """Complex displacement (points, 3) of one mode at B, C, the contact and further points."""
+        return np.asarray(basis.T @ self.right[: basis.modes, mode])
+
+    def growing(self) -> Array:
+        """Frequencies of the modes with negative damping [Hz]."""
+        return self.frequencies_hz[self.damping_ratios < 0.0]
+
+
+def _biorthonormal(
+    left: ComplexArray, right: ComplexArray, eigenvalues: ComplexArray, near: float
+) -> ComplexArray:
+    """Left eigenvectors (d, r) combined within repeated eigenvalues so that left^T right = 1."""
+    found = np.full(left.shape, np.nan + 0j)
+    rest = list(range(len(eigenvalues)))
+    while rest:
+        group = [k for k in rest if abs(eigenvalues[k] - eigenvalues[rest[0]]) <= near]
+        rest = [k for k in rest if k not in group]
+        overlap = left[:, group].T @ right[:, group]
+        if np.linalg.svd(overlap, compute_uv=False)[-1] > _DEFECTIVE:
+            found[:, group] = left[:, group] @ np.linalg.inv(overlap).T
+    return found
