@@ -8,6 +8,7 @@ from fecontact.laws import (
     BoucWenFriction,
     DahlFriction,
     ExponentialFriction,
+    FourParameterIwanFriction,
     IwanFriction,
     JenkinsFriction,
     LuGreFriction,
@@ -18,6 +19,7 @@ from fecontact.laws import (
 LAWS = {
     "jenkins": JenkinsFriction(2e5, 0.4),
     "iwan": IwanFriction(2e5, 0.4, elements=5),
+    "four-parameter-iwan": FourParameterIwanFriction(2e5, 0.4, chi=-0.3, elements=4),
     "dahl": DahlFriction(0.4, 2e4),
     "lugre": LuGreFriction(0.5, 0.4, 1e-3, bristle_stiffness=2e4, bristle_damping=0.5),
     "bouc-wen": BoucWenFriction(0.4, 2e-5),
