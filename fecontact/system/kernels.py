@@ -209,9 +209,8 @@ def normal_gradients(j, contact, s, out):
 def node_gradients(j, motion, moved, z, s, force, rates, out):
     """F of node j, its force T in -x, and its :class:`NodeContact`, with derivatives.
 
-    Fills out (3, 4) with those of F, T and the force that friction sees to x, y, x', y'.
-    ``force`` and ``rates`` as above, but ``force`` begins with R and its derivatives to slip
-    velocity and pressing force for all laws.
+    Fills out (3, 4) with those of F, T and the force that friction sees to x, y, x', y'; ``force``
+    begins with R and its derivatives to slip velocity and pressing force for all laws.
     """
     contact = node_contact(j, motion, moved, s)
     F, pressing = normal_gradients(j, contact, s, out)
