@@ -99,9 +99,9 @@ def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
               f"{error(residual, complete)[0]:.2%} ({residual.system.basis.modes})")
 
     energies = complete.energies
-    print(f"\nIn {END_TIME:g} s the belt puts in {energies.belt_work[-1]:.3f} J, the drive "
-          f"{energies.drive_work[-1]:.3f} J, the waves {energies.ground_work[-1]:.4f} J; friction "
-          f"takes {energies.friction[-1]:.3f} J. The balance is off by {energies.imbalance:.0e}.")
+    print(f"\nIn {END_TIME:g} s the belt's friction puts in "
+          f"{energies.belt_friction_work[-1]:.3f} J, its waves {energies.belt_normal_work[-1]:.4f} "
+          f"J, the drive {energies.drive_work[-1]:.3f} J; friction takes {energies.friction[-1]:.3f} J. The balance is off by {energies.imbalance:.0e}.")
     density = wear(complete)
     x = complete.system.basis.contact_x
     print(f"Friction works {density.min():.1f} to {density.max():.1f} J/m, most at x = "
