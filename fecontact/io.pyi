@@ -3,6 +3,7 @@ from .output.files.dataset import to_xarray
 from .output.files.export import export_csv, export_mat, export_netcdf
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
+from .output.files.wear import read_wear, write_wear
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import read_uff
 from .sweeps.table import read_table
@@ -19,8 +20,10 @@ __all__ = [
     "read_matrix",
     "read_table",
     "read_uff",
+    "read_wear",
     "to_xarray",
     "write_basis",
     "write_branch",
     "write_branches",
+    "write_wear",
 ]

@@ -13,6 +13,7 @@ from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
+from .output.plots.wear import plot_wear
 from .output.render.movie import picture
 from .output.render.offscreen import rendering_problem
 from .sweeps.plots import plot_sobol, plot_strobed, plot_sweep
@@ -42,5 +43,6 @@ __all__ = [
     "plot_stability_map",
     "plot_strobed",
     "plot_sweep",
+    "plot_wear",
     "rendering_problem",
 ]

@@ -287,7 +287,7 @@ class _Balance:
         return self.force(q, 1.0), curvatures, shapes / root[:, None]
 
     def _pressed(self, q: Array) -> Array:
-        """q after some steps along the stiff directions alone, as waves curve below the nodes."""
+        """Q after some steps along the stiff directions alone, as waves curve below the nodes."""
         for _ in range(3):
             force, curvatures, shapes = self._curved(q)
             stiff = curvatures > 1e-3
