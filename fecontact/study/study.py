@@ -59,8 +59,8 @@ Gap = float | tuple[float, ...] | Crown
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
-    "simulation": SimulationSettings, "wear": WearSettings, "branch": BranchSettings, "output": OutputSettings,
-    "render": RenderSettings,
+    "simulation": SimulationSettings, "wear": WearSettings, "branch": BranchSettings,
+    "output": OutputSettings, "render": RenderSettings,
 }
 # Cached objects of a study, and the sections on which each depends.
 _MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body"),

@@ -59,8 +59,7 @@ def thrown(system, x, velocity):
     basis, m = system.basis, system.basis.modes
     first = simulate(system, 1e-9, outputs=2).states[0]
     rigid = np.linalg.lstsq(basis.T[2:, 0, :m], np.full(basis.contact_nodes, 1.0), rcond=None)[0]
-    moved = np.concatenate([first[:m] + x * rigid, velocity * rigid])
-    return moved
+    return np.concatenate([first[:m] + x * rigid, velocity * rigid])
 
 
 def total_energy(run):

@@ -1,4 +1,4 @@
-"""Commands that work on a study: ``init``, ``mesh``, ``modes`` and ``run``."""
+"""Commands that work on a study: ``init``, ``mesh``, ``modes``, ``run``, ``wear``."""
 
 from pathlib import Path
 from typing import Annotated, Literal
