@@ -92,5 +92,5 @@ def run(body=None, times=101, size=2e-5, waviness=0.0, speed=0.02):
     middle = slice(times // 3, times // 2)
     rate[middle] = 0.0
     rate[middle, 0] = speed
-    return Trajectory(system, t, q, rate, np.zeros((times, 8)), statistics={"steps": 17,
+    return Trajectory(system, t, q, rate, np.zeros((times, 10)), statistics={"steps": 17,
                                                                             "seconds": 0.25})

@@ -46,7 +46,7 @@ def plot_wear(history: WearHistory, *, path: str | Path | None = None) -> "Figur
         profile, load, growth = figure.subplots(3, 1)
         for k in shown:
             colour = colormaps["viridis"](0.9 * (1.0 - k / blocks))
-            label = f"{history.cycles[k]:.3g} cycles"
+            label = f"{history.cycles[k]:.6g} cycles"
             profile.stairs(-history.depth[k][order] / depth_unit, edges / unit, baseline=None,
                            color=colour, label=label, linewidth=1.5)
             load.stairs(history.line_load[k - 1][order] / load_unit, edges / unit, baseline=None,
