@@ -73,11 +73,12 @@ def verdict(vertical: Trajectory, leaning: Trajectory) -> str:
     carried = leaning.energies.belt_normal_work[-1] / (
         leaning.energies.belt_normal_work[-1] + leaning.energies.belt_friction_work[-1])
     open_part = float((leaning.normal_force == 0.0).mean())
-    return fill(f"With the leaning force the slopes carry the mass up to {swings[0] / swings[1]:.1f} "
-            f"times as far, {carried:.0%} of the belt's work are its normal force's, and after "
-            f"long slips across a wave the mass is thrown off ({open_part:.0%} of "
-            f"the time) and lands with {leaning.normal_force.max() / 14.0:.0f} times its load. "
-            f"The several loops of the source are those of the vertical force.", 100)
+    return fill(
+        f"With the leaning force the slopes carry the mass up to {swings[0] / swings[1]:.1f} times "
+        f"as far, {carried:.0%} of the belt's work are its normal force's, and after long slips "
+        f"across a wave the mass is thrown off ({open_part:.0%} of the time) and lands with "
+        f"{leaning.normal_force.max() / friction.NORMAL_FORCE:.0f} times its load. The several "
+        f"loops of the source are those of the vertical force.", 100)
 
 
 def vibration(runs: dict[str, Trajectory]) -> list[Comparison]:

@@ -146,7 +146,8 @@ def _warn_of_active_friction(run: Trajectory, rtol: float) -> None:
     if given[j] == 0.0:
         return
     exchanged = np.trapezoid(np.abs(run.friction_force * run.slip_velocity), run.time, axis=0)
-    if given[j] > max(_GIVEN, 1e3 * rtol) * exchanged.max():
+    if (given[j] > max(_GIVEN, 1e3 * rtol) * exchanged.max()
+            and given[j] > rtol * run.energies.stored.max()):
         law = next(law for nodes, _, law in run.system.law_groups("friction")
                    if nodes.start <= j < nodes.stop)
         warnings.warn(f"{type(law).__name__} gave {given[j]:.3g} J to the motion at contact node "

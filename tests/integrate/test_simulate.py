@@ -392,7 +392,7 @@ def test_states_of_nodes():
     y = root * np.array([-1e-6, -1e-6, -1e-6, -1e-6, -1e-6, -1e-6, 1e-6])
     n = len(y)
     run = Trajectory(system, np.arange(float(n)), np.column_stack([np.zeros(n), y]),
-                     np.column_stack([root * (1e-3 + slip), np.zeros(n)]), np.zeros((n, 8)))
+                     np.column_stack([root * (1e-3 + slip), np.zeros(n)]), np.zeros((n, 10)))
     S, G, O = ContactState.STICK, ContactState.SLIP, ContactState.OPEN
     assert run.contact_state[:, 0].tolist() == [S, S, S, G, G, G, O]
 
