@@ -2,7 +2,8 @@
 
 With two modes (rigid along and across the belt) the motion is one loop of stick and slip in the
 phase plane. A third, elastic mode vibrates at the drive after each slip; waves of the belt make
-slips of many lengths. So do a wave spectrum and a coefficient of friction that varies along the
+slips of many lengths, whether the contact force is vertical, as in the source, or leans with the
+slopes. So do a wave spectrum and a coefficient of friction that varies along the
 belt. At last the block is a soft finite-element body, whose face sticks and slips in parts.
 
 The source prints neither the third mode nor where B is: here it has 30 Hz, and amplitudes of 0.5
@@ -13,6 +14,7 @@ Usage: python examples/friction_oscillator.py [FOLDER] [--quick]   (half a minut
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,7 +45,9 @@ LAWS: dict[str, Any] = {
     "load": fc.Load(normal=NORMAL_FORCE),
 }
 EVEN = fc.Ground(speed=BELT_SPEED)
-WAVY = fc.Ground(speed=BELT_SPEED, amplitude=200e-6, wavelength=2.5e-3)
+# The source keeps the contact force vertical; that of the surface leans with the slope.
+WAVY = fc.Ground(speed=BELT_SPEED, amplitude=200e-6, wavelength=2.5e-3, normal="vertical")
+LEANING = replace(WAVY, normal="surface")
 
 
 def basis(modes: int) -> fc.ModalBasis:
@@ -74,14 +78,14 @@ def prescribed(modes: int = 1) -> fc.ContactSystem:
 
 def spectrum_of_waves(seed: int = 2) -> fc.Ground:
     """Belt with a wave spectrum down to waves of 1 mm, half as steep as the single wave."""
-    return fc.Ground(speed=BELT_SPEED, profile=RandomRoughness(
+    return fc.Ground(speed=BELT_SPEED, normal="vertical", profile=RandomRoughness(
         rms_height=60e-6, hurst_exponent=1.0, roll_off_wavelength=5e-3,
         cut_off_wavelength=1e-3, length=50e-3, seed=seed))
 
 
 def fourier_waves() -> fc.Ground:
     """Belt with four waves of a Fourier series."""
-    return fc.Ground(speed=BELT_SPEED, profile=FourierSeries(
+    return fc.Ground(speed=BELT_SPEED, normal="vertical", profile=FourierSeries(
         wavelength=5e-3, amplitudes=(100e-6, 150e-6, 40e-6, 20e-6), phases=(0.3, 0.0, 2.0, 4.0)))
 
 
@@ -96,6 +100,7 @@ CASES = {
     "b: two modes": lambda: oscillator(2),
     "c: three modes": lambda: oscillator(3),
     "d: three modes, waves": lambda: oscillator(3, WAVY),
+    "three modes, leaning force": lambda: oscillator(3, LEANING),
     "three modes, four waves": lambda: oscillator(3, fourier_waves()),
     "three modes, wave spectrum": lambda: oscillator(3, spectrum_of_waves()),
     "three modes, random friction": lambda: oscillator(3, random_friction()),
@@ -195,6 +200,29 @@ def figure(runs: dict[str, fc.Trajectory], path: Path | None = None) -> Any:
     return drawn
 
 
+def side_by_side(runs: dict[str, fc.Trajectory], path: Path | None = None) -> Any:
+    """Phase planes and normal forces of several runs, one column a run."""
+    from fecontact.plot import COLOURS, new_figure
+
+    with new_figure(4.6 * len(runs), 7.6, path) as drawn:
+        axes = drawn.subplots(3, len(runs), sharey="row", squeeze=False)
+        for (first, second, third), (name, run) in zip(axes.T, runs.items(), strict=True):
+            for axis, point, where in ((first, "B", "drive B"), (second, 0, "contact")):
+                x, v = run.displacement(point)[:, 0], run.velocity(point)[:, 0]
+                axis.plot(1e3 * x, 1e3 * v, color=COLOURS[0], linewidth=0.5)
+                axis.axhline(1e3 * BELT_SPEED, color="#303030", linewidth=0.7,
+                             linestyle=(0, (4, 3)))
+                axis.set_title(f"{name}, {where}", fontsize=9.5)
+                axis.set_xlabel("displacement [mm]")
+            third.plot(run.time - run.time[0], run.normal_force[:, 0], color=COLOURS[1],
+                       linewidth=0.5)
+            third.set_xlabel("time [s]")
+        for axis, label in zip(axes[:, 0], ("velocity [mm/s]", "velocity [mm/s]",
+                                            "normal force [N]"), strict=True):
+            axis.set_ylabel(label)
+    return drawn
+
+
 def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> None:
     """Run all cases; print slips, periods and vibrations, and draw them."""
     skip, periods, end = (12, 24, 0.1) if quick else (40, 100, 1.4)
@@ -214,7 +242,8 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     names = list(runs)
     shown = {name: run.between(run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
     figure({n: shown[n] for n in names[:3]}, folder / "phase.png")
-    figure({n: shown[n] for n in names[3:]}, folder / "irregular.png")
+    figure({n: shown[n] for n in names[4:]}, folder / "irregular.png")
+    side_by_side({"vertical": shown[names[2]], "leaning": shown[names[3]]}, folder / "leaning.png")
     plot_spectrogram(shown[names[1]], piece=0.25, highest_hz=60.0,
                         path=folder / "spectrogram.png")
 

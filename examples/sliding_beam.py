@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecontact as fc
-from fecontact.laws import ExponentialFriction, RoughSurface
+from fecontact.laws import ArchardWear, ExponentialFriction, RoughSurface
 from fecontact.plot import (
     plot_contact_map,
     plot_energies,
@@ -99,15 +99,16 @@ def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
               f"{error(residual, complete)[0]:.2%} ({residual.system.basis.modes})")
 
     energies = complete.energies
-    print(f"\nIn {END_TIME:g} s the belt puts in {energies.belt_work[-1]:.3f} J, the drive "
-          f"{energies.drive_work[-1]:.3f} J, the waves {energies.ground_work[-1]:.4f} J; friction "
-          f"takes {energies.friction[-1]:.3f} J. The balance is off by {energies.imbalance:.0e}.")
+    print(f"\nIn {END_TIME:g} s the belt's friction puts in "
+          f"{energies.belt_friction_work[-1]:.3f} J, its waves {energies.belt_normal_work[-1]:.4f} "
+          f"J, the drive {energies.drive_work[-1]:.3f} J; friction takes "
+          f"{energies.friction[-1]:.3f} J. The balance is off by {energies.imbalance:.0e}.")
     density = wear(complete)
     x = complete.system.basis.contact_x
     print(f"Friction works {density.min():.1f} to {density.max():.1f} J/m, most at x = "
           f"{1e3 * x[np.argmax(density)]:.0f} mm.")
-    # Archard's k of 1e-14 m^2/N, of steel on steel in mild wear, over the coefficient of friction.
-    depth = complete.wear_depth(1e-14 / 0.35, THICKNESS)[-1]
+    # Steel on steel in mild wear.
+    depth = complete.wear_depth(ArchardWear(1e-14), THICKNESS)[-1]
     print(f"In mild wear this takes off {1e9 * depth.min():.3f} to {1e9 * depth.max():.3f} nm.")
     plot_energies(complete, path=folder / "energies.png")
     plot_contact_map(complete, path=folder / "contact.png")

@@ -4,6 +4,7 @@ from .output.files.export import export_csv, export_mat, export_netcdf
 from .output.files.fields import export_fields
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
+from .output.files.wear import read_wear, write_wear
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import read_uff
 from .sweeps.table import read_table
@@ -21,8 +22,10 @@ __all__ = [
     "read_matrix",
     "read_table",
     "read_uff",
+    "read_wear",
     "to_xarray",
     "write_basis",
     "write_branch",
     "write_branches",
+    "write_wear",
 ]

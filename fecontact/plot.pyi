@@ -14,6 +14,7 @@ from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
+from .output.plots.wear import plot_wear
 from .output.render.mode_movie import render_mode
 from .output.render.movie import picture
 from .output.render.offscreen import rendering_problem
@@ -45,6 +46,7 @@ __all__ = [
     "plot_stress",
     "plot_strobed",
     "plot_sweep",
+    "plot_wear",
     "render_mode",
     "rendering_problem",
 ]

@@ -1,6 +1,7 @@
 """Section 4.3 of the source: the friction oscillator."""
 
 from pathlib import Path
+from textwrap import fill
 
 import friction_oscillator as friction
 import numpy as np
@@ -11,6 +12,7 @@ from fecontact import Trajectory, simulate
 from fecontact.analysis import periodicity
 from fecontact.integrate import Scipy
 
+LEANING = "three modes, leaning force"
 FIGURES = {
     "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop with one slip, which "
                      "closes after four periods of the drive"),
@@ -28,7 +30,17 @@ def section(images: Path) -> str:
     runs = {name: friction.settled(friction.CASES[name](), rtol=1e-7) for name in FIGURES}
     shown = {name: run.between(run.time[-1] - 16 * friction.PERIOD) for name, run in runs.items()}
     save(friction.figure(shown), images / "friction-phase.png")
+    vertical, leaning = runs["d: three modes, waves"], friction.settled(
+        friction.CASES[LEANING](), rtol=1e-7)
+    pair = {"vertical": vertical, "leaning": leaning}
+    save(friction.side_by_side({name: run.between(run.time[-1] - 16 * friction.PERIOD)
+                                for name, run in pair.items()}), images / "friction-leaning.png")
     return TEXT.format(
+        verdict=verdict(vertical, leaning),
+        leaning=table(("contact force", "slips in 100 periods", "lengths [mm]", "x of B [mm]",
+                       "normal force [N]", "belt: friction [J]", "belt: normal force [J]",
+                       "lost by friction [J]"),
+                      [compared(name, run) for name, run in pair.items()]),
         figures=table(("figure", "the source shows", "shown here"), list(FIGURES.values())),
         slips=slips_table(runs), numbers=comparisons(vibration(runs) + solvers()))
 
@@ -43,6 +55,30 @@ def slips_table(runs: dict[str, Trajectory]) -> str:
                      friction.different(lengths), f"{lengths.min():.3f} to {lengths.max():.3f}"))
     return table(("case", "repeats after periods", "misfit", "slips in 100 periods",
                   "different lengths", "lengths [mm]"), rows)
+
+
+def compared(name: str, run: Trajectory) -> tuple[str, ...]:
+    """Row of numbers of a run on waves."""
+    lengths = 1e3 * np.array([slip.distance for slip in friction.slips(run)])
+    x, force, energies = 1e3 * run.displacement("B")[:, 0], run.normal_force[:, 0], run.energies
+    return (name, f"{len(lengths)}", f"{lengths.min():.3f} to {lengths.max():.3f}",
+            f"{x.min():.2f} to {x.max():.2f}", f"{force.min():.1f} to {force.max():.1f}",
+            f"{energies.belt_friction_work[-1]:.4f}", f"{energies.belt_normal_work[-1]:.4f}",
+            f"{energies.friction[-1]:.4f}")
+
+
+def verdict(vertical: Trajectory, leaning: Trajectory) -> str:
+    """The differences in a sentence."""
+    swings = [float(np.ptp(run.displacement("B")[:, 0])) for run in (leaning, vertical)]
+    carried = leaning.energies.belt_normal_work[-1] / (
+        leaning.energies.belt_normal_work[-1] + leaning.energies.belt_friction_work[-1])
+    open_part = float((leaning.normal_force == 0.0).mean())
+    return fill(
+        f"With the leaning force the slopes carry the mass up to {swings[0] / swings[1]:.1f} times "
+        f"as far, {carried:.0%} of the belt's work are its normal force's, and after long slips "
+        f"across a wave the mass is thrown off ({open_part:.0%} of the time) and lands with "
+        f"{leaning.normal_force.max() / friction.NORMAL_FORCE:.0f} times its load. The several "
+        f"loops of the source are those of the vertical force.", 100)
 
 
 def vibration(runs: dict[str, Trajectory]) -> list[Comparison]:
@@ -85,6 +121,17 @@ during stick, so that the vibration shows at B alone.
 ![Phase diagrams of the friction oscillator](images/validation/friction-phase.png)
 
 {slips}
+
+These waves have slopes of up to 0.50, and the source keeps the contact force on them vertical
+(`ground.normal = "vertical"`). By default the contact force leans with the slope, which an elastic
+contact needs to conserve energy. It then pushes the mass along the belt with up to half of the
+normal force, beside a friction of at most 0.8 of it:
+
+{leaning}
+
+![Vertical and leaning contact force on the same waves](images/validation/friction-leaning.png)
+
+{verdict}
 
 {numbers}
 """

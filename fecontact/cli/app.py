@@ -31,6 +31,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.mesh,
     study.modes,
     study.run,
+    study.wear,
     sweep.sweep,
     branch.branch,
     run.render,

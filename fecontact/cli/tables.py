@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from fecontact.integrate.trajectory import Trajectory
     from fecontact.system.complex_modes import ComplexModes
 
-ROUGH_SLOPE = 0.3  # of the ground, above which a vertical normal force is a rough assumption
+ROUGH_SLOPE = 0.3  # of the ground, above which friction along x is a rough assumption
 
 
 def table(*headings: str, rows: Iterable[Iterable[str]], left: int = 1) -> Any:
@@ -101,10 +101,13 @@ def notes(trajectory: "Trajectory") -> list[str]:
     if trajectory.status is not Status.FINISHED:
         message = trajectory.statistics.get("message")
         found.append(trajectory.status.value + (f" {message}" if message else ""))
-    slope = trajectory.system.ground.steepest_slope
+    ground = trajectory.system.ground
+    slope = ground.steepest_slope
     if slope > ROUGH_SLOPE:
+        what = ("friction acts along x" if ground.normal == "surface" else
+                "the contact force is vertical and friction acts along x")
         found.append(f"The ground's slope reaches {slope:.2f}; above {ROUGH_SLOPE} it is a rough "
-                     f"assumption that the normal force is vertical.")
+                     f"assumption that {what}.")
     return found
 
 

@@ -5,6 +5,7 @@ from .sensitivity import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
 from .solvers import CVODE, Rodas5P, Scipy, SetValued
 from .trajectory import Energies
+from .wear import WearHistory, wear_history
 
 __all__ = [
     "CVODE",
@@ -18,7 +19,9 @@ __all__ = [
     "Sensitivity",
     "SetValued",
     "SmoothingCost",
+    "WearHistory",
     "initial_state",
     "smoothing_cost",
     "strobe",
+    "wear_history",
 ]

@@ -57,9 +57,11 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     system : ContactSystem
         The system.
     initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
-        Static equilibrium without friction; steady sliding; a rigid-body displacement and velocity;
-        the end of another run; or a state. Internal variables of friction with memory are zero, in
-        steady sliding their steady values.
+        Normal equilibrium where the body stands, all forces of the ground along x left to
+        friction; steady sliding; a rigid-body displacement and velocity; the end of another run;
+        or a state. Internal variables of friction with memory are zero, in steady sliding their
+        steady values. What friction does not hold on waves begins to slide down their slopes:
+        :func:`fecontact.static_equilibrium` finds where it rests.
     time : float
         Start of the run [s].
 
@@ -77,7 +79,7 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
             names = ("rest", "sliding")
             raise InputError(f"initial = '{initial}' must be one of {choices(names)}"
                              f"{nearest(initial, names)}, or a rigid displacement and velocity.")
-        q = equilibrium(system, initial == "sliding", time)
+        q = equilibrium(system, initial == "sliding", time, standing=initial == "rest")
         state = np.concatenate([q, np.zeros(system.size - m)])
         return settled(time, state, system.arrays) if initial == "sliding" else state
     if isinstance(initial, RigidStart):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.memory import require_memory
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike
@@ -27,6 +27,8 @@ _DEEP = 100.0
 _GROWTH, _LOOKS = 1e-2, 200
 # Shortest run [s], and in spacings of floating-point numbers at its times.
 _SHORTEST, _SPACINGS = 1e-100, 1e5
+# Energy that friction may give within the error of a run, relative to what it exchanges.
+_GIVEN = 1e-3
 
 
 def simulate(
@@ -70,7 +72,8 @@ def simulate(
     -------
     Trajectory
         Also if the run ended early, by Ctrl-C or because the solver failed; see its ``status``.
-        Each of its ``limits_exceeded`` is a ModelWarning.
+        Each of its ``limits_exceeded`` is a ModelWarning, and so is friction that gave energy to
+        the motion, as LuGre friction with large bristle damping can.
 
     Raises
     ------
@@ -110,6 +113,7 @@ def simulate(
         held_friction_force=found.friction_force, events=found.events if watched else None)
     if found.status in (Status.FINISHED, Status.EVENT):
         trajectory = replace(trajectory, status=_checked(trajectory, solver, rtol))
+    _warn_of_active_friction(trajectory, rtol)
     warn_of_limits(trajectory.limits_exceeded, "In this run")
     return trajectory
 
@@ -130,6 +134,26 @@ def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
             return Status.ENERGY_NOT_FINITE
         grown = solver.smooth and energies.growth > max(_GROWTH, 1e3 * rtol)
     return Status.ENERGY_GREW if grown and run.status is Status.FINISHED else run.status
+
+
+def _warn_of_active_friction(run: Trajectory, rtol: float) -> None:
+    """Warn where the energy lost by friction fell: friction gave energy."""
+    lost = run.friction_work
+    if not np.isfinite(lost).all():
+        return
+    given = (np.maximum.accumulate(lost, axis=0) - lost).max(axis=0)
+    j = int(given.argmax())
+    if given[j] == 0.0:
+        return
+    exchanged = np.trapezoid(np.abs(run.friction_force * run.slip_velocity), run.time, axis=0)
+    if (given[j] > max(_GIVEN, 1e3 * rtol) * exchanged.max()
+            and given[j] > rtol * run.energies.stored.max()):
+        law = next(law for nodes, _, law in run.system.law_groups("friction")
+                   if nodes.start <= j < nodes.stop)
+        warnings.warn(f"{type(law).__name__} gave {given[j]:.3g} J to the motion at contact node "
+                      f"{j}, {given[j] / exchanged.max():.1e} of all that it exchanged: its "
+                      f"parameters do not describe dissipative friction at these slip velocities; "
+                      f"fecontact.laws.check_law tells more.", ModelWarning, stacklevel=3)
 
 
 def _row_size(system: ContactSystem) -> float:

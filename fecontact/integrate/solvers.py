@@ -140,7 +140,7 @@ class SetValued(Solver):
     ----------
     restitution : float, optional
         Rigid stops in place of the normal law, with Newton's coefficient of restitution, from 0
-        to below 1.
+        to 1.
     static_coefficient : float or (n,) sequence, optional
         Limit of \|R\|/F in stick [-], for all contact nodes or each; default that of the law.
     scheme : 'auto', 'events' or 'stepping'
@@ -161,9 +161,9 @@ class SetValued(Solver):
 
     def __post_init__(self) -> None:
         if self.restitution is not None and not (
-                isinstance(self.restitution, Real) and 0.0 <= self.restitution < 1.0):
+                isinstance(self.restitution, Real) and 0.0 <= self.restitution <= 1.0):
             raise InputError(f"SetValued: restitution = {self.restitution!r} must be a number from "
-                             f"0 to below 1.")
+                             f"0 to 1.")
         if self.scheme not in self.schemes:
             raise InputError(f"SetValued: scheme = {self.scheme!r} must be one of "
                              f"{choices(self.schemes)}{nearest(str(self.scheme), self.schemes)}.")

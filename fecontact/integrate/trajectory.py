@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.errors import InputError
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.events import Events
+from fecontact.laws.wear import WearLaw
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import POWERS
@@ -362,30 +364,25 @@ class Trajectory(Summarised):
         """Energy (N, n) that the internal variables store [J], and the power into it [W]."""
         return self.system.bristle_energy(self.time, self.states)
 
-    def wear_depth(self, coefficient: float, width: float) -> Array:
-        """Depth (N, n) worn off the body at each node since the first time [m].
+    @property
+    def slip_work(self) -> Array:
+        """Energy (N, n) lost by friction in slip since the first time [J]; it never falls."""
+        return np.asarray(np.maximum.accumulate(self.friction_work - self.creep_work, axis=0))
 
-        Archard's law in terms of friction work: volume = coefficient times work, distributed over
-        the area of the node.
+    def wear_depth(self, law: WearLaw, thickness: float) -> Array:
+        """Depth (N, n) worn off the body in slip at each node since the first time [m].
 
-        Parameters
-        ----------
-        coefficient : float
-            Wear volume per friction work [m3/J]: Archard's k [m2/N] divided by the coefficient of
-            friction.
-        width : float
-            Out-of-plane width of the contact face [m].
-
-        Raises
-        ------
-        InputError
-            For a width that is not above zero, or a coefficient below zero.
+        ``law`` is an EnergyWear or ArchardWear, ``thickness`` that of the face out of the plane
+        [m]. Raises InputError for anything else, or a thickness that is not above zero.
         """
-        if not (width > 0.0 and np.isfinite(width)):
-            raise InputError(f"width = {width!r} must be above zero [m].")
-        if not (coefficient >= 0.0 and np.isfinite(coefficient)):
-            raise InputError(f"coefficient = {coefficient!r} must be zero or above [m3/J].")
-        return coefficient * self.friction_work / (self.system.basis.tributary * width)
+        require_kind("wear_depth", WearLaw, law=law)
+        require_positive("wear_depth", thickness=thickness)
+        slips = self.contact_state == ContactState.SLIP
+        power = self.friction_force * self.slip_velocity - self._bristles[1]
+        pressed = np.abs(self.normal_force * self.slip_velocity)
+        volume = law.volume(self.slip_work, np.where(slips, power, 0.0),
+                            np.where(slips, pressed, 0.0))
+        return volume / (self.system.basis.tributary * thickness)
 
     @property
     def line_load(self) -> Array:

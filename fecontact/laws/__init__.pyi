@@ -26,8 +26,10 @@ from .signals.base import Signal
 from .signals.harmonic import Constant, Harmonic, Harmonics, SweptSine
 from .signals.transient import Pulse, Step, Tabulated
 from .signatures import friction_law, ground_profile, memory_friction_law, normal_law, signal
+from .wear import ArchardWear, EnergyWear, WearLaw
 
 __all__ = [
+    "ArchardWear",
     "BackBurdekinContact",
     "BoucWenFriction",
     "Bound",
@@ -36,6 +38,7 @@ __all__ = [
     "CosineSurface",
     "CubicFriction",
     "DahlFriction",
+    "EnergyWear",
     "ExponentialContact",
     "ExponentialFriction",
     "Flat",
@@ -76,6 +79,7 @@ __all__ = [
     "SweptSine",
     "Tabulated",
     "TwoSidedStop",
+    "WearLaw",
     "check_law",
     "friction_law",
     "ground_profile",

@@ -62,18 +62,15 @@ def basis_from_matrices(
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
-    The modes are those of the symmetric part of the stiffness. Rigid modes are displacements
-    without strain energy, of frequency exactly zero. The first of the largest components of each
-    mode is positive. The skew part of the stiffness couples the modes by
-    :attr:`ModalBasis.stiffness`.
+    The modes are those of the symmetric part of the stiffness, rigid ones of frequency exactly
+    zero; the skew part couples them by :attr:`ModalBasis.stiffness`.
 
     Parameters
     ----------
     mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
-        The mass symmetric and positive definite [kg]. The stiffness [N/m] has a positive
-        semi-definite symmetric part; its skew part, such as that of follower forces, friction or
-        damping that rotates, is circulatory (entries that differ by less than 1e-10 of the largest
-        count as equal). Degrees of freedom with a diagonal stiffness of 1e35 or more are fixed.
+        The mass symmetric and positive definite [kg]. The symmetric part of the stiffness [N/m] is
+        positive semi-definite; its skew part, as of follower forces, is circulatory (differences
+        below 1e-10 of the largest entry count as zero). A diagonal of 1e35 or more fixes.
     rows : mapping
         ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
@@ -81,9 +78,8 @@ def basis_from_matrices(
         or sparse (3, d); B and C default to zero. Two rows, x and y, instead of three mean no
         rotation. See :func:`fecontact.reduction.rows_from_dofs`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
-        Ratios of the modes, Rayleigh factors, a loss factor, or the damping matrix in the
-        given degrees of freedom, dense, sparse or AssembledMatrix [N s/m]; a skew part of it is
-        gyroscopic.
+        Ratios of the modes, factors, or the damping matrix in the given degrees of freedom [N s/m],
+        whose skew part is gyroscopic.
     modes : int, optional
         Number m of modes, lowest first, rigid ones included; by default all, up to d = 2000.
     rigid : int, optional

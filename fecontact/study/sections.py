@@ -10,6 +10,7 @@ from fecontact.core.errors import (
     InputError,
     choices,
     require_finite,
+    require_not_negative,
     require_positive,
 )
 from fecontact.core.tables import located
@@ -21,6 +22,7 @@ from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import RigidStart
 from fecontact.integrate.solvers import Solver, solver_by_name
 from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
@@ -248,6 +250,59 @@ class SimulationSettings:
         return solver_by_name(self.solver, {
             "restitution": self.restitution, "static_coefficient": self.static_coefficient,
             "scheme": self.scheme})
+
+
+@dataclass(frozen=True)
+class WearSettings:
+    """``[wear]``: wear of the contact face; see
+    :func:`fecontact.integrate.wear_history`.
+
+    Parameters
+    ----------
+    law : 'energy' or 'archard'
+        Volume proportional to the energy lost in slip, or to normal force times slip distance.
+    coefficient : float, optional
+        For 'energy' volume per energy [m^3/J], for 'archard' volume per force and distance
+        [m^2/N]; required to compute wear.
+    acceleration : float
+        Cycles that each computed period stands for.
+    blocks : int
+        Number of blocks; after each the worn depth is added to the gap.
+    periods : int
+        Computed periods in each block.
+    settling : int
+        Computed periods before the first block, which wear nothing.
+    period : float, optional
+        Duration of a cycle [s]; by default the common period of drive, loads and ground.
+    outputs : int
+        Output times of each block.
+    """
+
+    law: Literal["energy", "archard"] = "energy"
+    coefficient: float | None = None
+    acceleration: float = 1.0
+    blocks: int = 10
+    periods: int = 1
+    settling: int = 0
+    period: Annotated[float | None, Unit("s")] = None
+    outputs: int = 401
+
+    def __post_init__(self) -> None:
+        require_positive("WearSettings", acceleration=self.acceleration)
+        for name, least in (("blocks", 1), ("periods", 1), ("settling", 0), ("outputs", 2)):
+            if (count := getattr(self, name)) < least:
+                raise InputError(f"WearSettings: {name} = {count} must be at least {least}.")
+        if self.period is not None:
+            require_positive("WearSettings", period=self.period)
+        if self.coefficient is not None:
+            require_not_negative("WearSettings", coefficient=self.coefficient)
+
+    @property
+    def law_if_any(self) -> WearLaw | None:
+        """The wear law; None without a coefficient."""
+        if self.coefficient is None:
+            return None
+        return {"energy": EnergyWear, "archard": ArchardWear}[self.law](self.coefficient)
 
 
 @dataclass(frozen=True)

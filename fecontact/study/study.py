@@ -28,6 +28,7 @@ from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import Rodas5P
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.integrate.wear import WearHistory, wear_history
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
@@ -43,6 +44,7 @@ from fecontact.study.sections import (
     OutputSettings,
     RenderSettings,
     SimulationSettings,
+    WearSettings,
 )
 from fecontact.study.sweep_section import SweepSettings, flat_axes
 from fecontact.system.contact_system import (
@@ -57,8 +59,8 @@ Gap = float | tuple[float, ...] | Crown
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
-    "simulation": SimulationSettings, "branch": BranchSettings, "output": OutputSettings,
-    "render": RenderSettings,
+    "simulation": SimulationSettings, "wear": WearSettings, "branch": BranchSettings,
+    "output": OutputSettings, "render": RenderSettings,
 }
 # Cached objects of a study, and the sections on which each depends.
 _MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body"),
@@ -92,6 +94,8 @@ class Study(Summarised):
         face in the shape of an arc; written above all sections.
     simulation : SimulationSettings
         ``[simulation]``
+    wear : WearSettings
+        ``[wear]``
     branch : BranchSettings
         ``[branch]``
     output : OutputSettings
@@ -115,6 +119,7 @@ class Study(Summarised):
     load: Load = field(default_factory=Load)
     gap: Gap = 0.0
     simulation: SimulationSettings = field(default_factory=SimulationSettings)
+    wear: WearSettings = field(default_factory=WearSettings)
     branch: BranchSettings = field(default_factory=BranchSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     render: RenderSettings = field(default_factory=RenderSettings)
@@ -322,6 +327,23 @@ class Study(Summarised):
                             progress=progress,
                             events=(ContactEvents(settings.stop)
                                     if settings.events or settings.stop else None))
+
+    def wear_history(self, progress: bool = False) -> WearHistory:
+        """Wear of the contact face over the blocks of ``[wear]``, with ``[simulation]``'s solver.
+
+        See :func:`fecontact.integrate.wear_history`.
+        """
+        wanted, settings, title = self.wear, self.simulation, _title(self.path)
+        if (law := wanted.law_if_any) is None:
+            raise InputError(f"{title}: [wear] lacks the key 'coefficient', in m^3/J for law = "
+                             f"'energy' and in m^2/N for 'archard'.")
+        system = self.system()
+        with located(f"{title}: [wear]:", "wear_history:"):
+            return wear_history(
+                system, law, self.body.thickness, acceleration=wanted.acceleration,
+                blocks=wanted.blocks, periods=wanted.periods, settling=wanted.settling,
+                period=wanted.period, initial=settings.initial, outputs=wanted.outputs,
+                solver=settings.chosen_solver(), rtol=settings.rtol, progress=progress)
 
     @cached_property
     def _mesh(self) -> Mesh:

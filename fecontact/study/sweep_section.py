@@ -187,8 +187,6 @@ class SweepSettings:
         'FILE.py:FUNCTION' for a function of your own.
     t_start : float, optional
         Start of the interval that summaries evaluate [s]; the whole run by default.
-    wear_coefficient : float, optional
-        Volume worn away per friction work [m^3/J], for the wear summaries.
     keep : 'none', 'histories' or 'fields'
         Whether to write a file for each case, with its motion alone or with fields for ParaView.
     batch : int, optional
@@ -205,7 +203,6 @@ class SweepSettings:
     seed: int = 0
     summaries: tuple[str, ...] = _SUMMARIES
     t_start: Annotated[float | None, Unit("s")] = None
-    wear_coefficient: Annotated[float | None, Unit("m^3/J")] = None
     keep: Literal["none", "histories", "fields"] = "none"
     batch: int | None = None
     strobe: Strobing | None = None
@@ -219,8 +216,6 @@ class SweepSettings:
             raise InputError(f"SweepSettings: seed = {self.seed} must be zero or above.")
         if not self.summaries:
             raise InputError("SweepSettings: summaries is empty; name at least one.")
-        if self.wear_coefficient is not None:
-            require_positive("SweepSettings", wear_coefficient=self.wear_coefficient)
         if self.strobe is not None and (self.keep != "none" or self.t_start is not None
                                         or self.summaries not in (_SUMMARIES, ("periods",))):
             raise InputError("SweepSettings: strobe keeps no histories, so that keep, t_start and "

@@ -45,7 +45,7 @@ class Batch:
         Modal bases from :func:`packed`, paths of their files, or the reason why a basis cannot be
         computed; the worker computes missing ones.
     summaries : tuple of str
-    t_start, wear_coefficient : float or None
+    t_start : float or None
         See :class:`fecontact.study.SweepSettings`.
     files : str or None
         Folder for the files of the cases; None to write none.
@@ -60,7 +60,6 @@ class Batch:
     cases: tuple[SweepCase, ...]
     summaries: tuple[str, ...]
     t_start: float | None = None
-    wear_coefficient: float | None = None
     bases: Mapping[str, bytes | Path | str] = field(default_factory=dict)
     files: str | None = None
     frames: int = 0
@@ -87,7 +86,7 @@ def run_batch(batch: Batch) -> list[Row]:
     study = Study.from_tables(batch.study, path)
     if batch.strobe is not None:
         return strobed_rows(batch.cases, batch.strobe, lambda case: prepared(batch, study, case))
-    summaries: dict[float, Functions] = {}
+    summaries: dict[Any, Functions] = {}
     return [_row(batch, study, case, summaries) for case in batch.cases]
 
 
@@ -106,15 +105,14 @@ def packed(basis: ModalBasis, *, shapes: bool) -> bytes:
     return pickle.dumps(basis if shapes else replace(basis, mode_shapes=None, quality=None))
 
 
-def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[float, Functions]) -> Row:
+def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functions]) -> Row:
     try:
         trajectory, study = _run(batch, base, case)
-        thickness = study.body.thickness
-        if thickness not in summaries:
-            summaries[thickness] = functions_for(
-                batch.summaries, study.folder, wear_coefficient=batch.wear_coefficient,
-                thickness=thickness)
-        values = summarise(trajectory, summaries[thickness], batch.t_start)
+        known = study.wear.law_if_any, study.body.thickness
+        if known not in summaries:
+            summaries[known] = functions_for(
+                batch.summaries, study.folder, wear=known[0], thickness=known[1])
+        values = summarise(trajectory, summaries[known], batch.t_start)
     except UnwritableError:
         raise
     except FecontactError as error:

@@ -20,9 +20,13 @@ from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.user_code import user_function
 from fecontact.integrate.trajectory import ContactState, Trajectory
+from fecontact.laws.wear import WearLaw
 from fecontact.system.kernels import POWERS
 
 Point = str | int
+# Where a study gives what some summaries need.
+_GIVEN = {"wear": "a wear law; give its coefficient in [wear]",
+          "thickness": "the thickness of the body; give it in [body]"}
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ def functions_for(
     folder : Path, optional
         Folder to which files of user functions are relative.
     **known
-        Further inputs of some summaries: ``wear_coefficient`` [m^3/J], ``thickness`` [m].
+        Further inputs of some summaries: ``wear``, a wear law, ``thickness`` [m].
 
     Raises
     ------
@@ -105,7 +109,7 @@ def _function(name: str, folder: Path, known: Mapping[str, Any]) -> Callable[[Tr
         if known.get(key) is not None:
             options[key] = known[key]
         elif parameter.default is inspect.Parameter.empty:
-            raise InputError(f"The summary '{bare}' needs {key}; give it in [sweep].")
+            raise InputError(f"The summary '{bare}' needs {_GIVEN.get(key, key)}.")
     if at:
         if "point" not in inspect.signature(function).parameters:
             raise InputError(f"The summary '{bare}' is not one of a point; leave out "
@@ -220,14 +224,14 @@ def _power(trajectory: Trajectory, name: str) -> float:
     return float(work[-1] - work[0]) / _duration(trajectory)
 
 
-def wear_depth(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:
-    """Largest wear depth along the face: coefficient x friction work per area."""
-    return float(trajectory.wear_depth(wear_coefficient, thickness)[-1].max())
+def wear_depth(trajectory: Trajectory, wear: WearLaw, thickness: float) -> float:
+    """Largest wear depth along the face, by the law of ``[wear]``."""
+    return float(trajectory.wear_depth(wear, thickness)[-1].max())
 
 
-def wear_rate(trajectory: Trajectory, wear_coefficient: float, thickness: float) -> float:
-    """Largest wear rate along the face: coefficient x friction power per area."""
-    return wear_depth(trajectory, wear_coefficient, thickness) / _duration(trajectory)
+def wear_rate(trajectory: Trajectory, wear: WearLaw, thickness: float) -> float:
+    """Largest wear depth along the face over the time of the run, by the law of ``[wear]``."""
+    return wear_depth(trajectory, wear, thickness) / _duration(trajectory)
 
 
 def dominant_frequency(trajectory: Trajectory, point: Point | None = None) -> float:

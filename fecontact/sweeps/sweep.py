@@ -99,7 +99,7 @@ def sweep(
     if wanted.t_start is not None and wanted.t_start >= base.t_end:
         raise InputError(f"[sweep]: t_start = {wanted.t_start:g} must lie before the end of the "
                          f"run, t_end = {base.t_end:g}.")
-    functions_for(wanted.summaries, base.folder, wear_coefficient=wanted.wear_coefficient,
+    functions_for(wanted.summaries, base.folder, wear=base.wear.law_if_any,
                   thickness=base.body.thickness)
     work = _Work.of(base, wanted, plan(wanted))
     place = Path(folder) if folder is not None else base.results / f"{base.name}-sweep"
@@ -147,7 +147,7 @@ class _Work:
     @classmethod
     def of(cls, study: Study, settings: SweepSettings, cases: Plan) -> "_Work":
         request = {"summaries": list(settings.summaries), "t_start": settings.t_start,
-                   "wear_coefficient": settings.wear_coefficient, "keep": settings.keep,
+                   "keep": settings.keep,
                    "frames": study.output.frames if settings.keep == "fields" else 0,
                    "strobe": None if settings.strobe is None else to_table(settings.strobe)}
         keys, bases = case_keys(study, cases.names, cases.rows, request)
@@ -166,7 +166,7 @@ class _Work:
         path = self.study.path
         common = Batch(
             self.study.tables(defaults=False), None if path is None else str(path.absolute()), (),
-            self.settings.summaries, self.settings.t_start, self.settings.wear_coefficient,
+            self.settings.summaries, self.settings.t_start,
             files=str(store.cases.absolute()) if store.files else None,
             frames=self.study.output.frames if self.settings.keep == "fields" else 0,
             strobe=self.settings.strobe)

@@ -1,5 +1,7 @@
 """Static equilibria at rest and in steady sliding."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fecontact.core.checks import require_kind
@@ -16,6 +18,8 @@ from fecontact.system.steady_memory import settled
 
 # Largest out-of-balance fraction of the load, regardless of the rounding of other forces.
 _UNBALANCED = 1e-6
+# Steps down the slopes of waves: their number, and the longest as a fraction of a wavelength.
+_SLIDES, _LONGEST_SLIDE = 3000, 0.125
 
 
 @friction_law
@@ -35,6 +39,12 @@ def static_equilibrium(
 
     Solves ``K q = T^T f``, with the stiffness matrix of the modes and the mean values of drive and
     loads, by Newton's method, with continuation in the load if it does not converge.
+
+    Without friction, waves push a body down their slopes (:class:`fecontact.Ground`): it rests
+    where the springs along the ground carry this, ``c_x x = -sum F y_R'``, and without springs in
+    a trough. Of several places of rest the result is the stable one downhill from where the body
+    stands. Runs with ``initial="rest"`` start from where it stands: they leave the forces along
+    the ground to friction. With ``ground.normal = "vertical"`` both are the same.
 
     Parameters
     ----------
@@ -66,8 +76,14 @@ def static_equilibrium(
     return q
 
 
-def equilibrium(system: ContactSystem, friction: bool, time: float) -> Array:
-    """As :func:`static_equilibrium`, without checking the limits of the model."""
+def equilibrium(
+    system: ContactSystem, friction: bool, time: float, *, standing: bool = False
+) -> Array:
+    """As :func:`static_equilibrium`, without checking the limits of the model.
+
+    ``standing`` leaves forces along the ground out: the normal equilibrium of a body that stays
+    where it is.
+    """
     ground = system.ground
     if friction and ground.wavy:
         raise AnalysisError("There is no steady sliding on wavy ground; start from rest or "
@@ -83,18 +99,30 @@ def equilibrium(system: ContactSystem, friction: bool, time: float) -> Array:
             ground_motion=_still.address,
             ground_motion_parameters=np.array([ground.travel(time)], dtype=float),
         )
-    problem = _Balance(arrays, time, system.penetration_scale)
+    # On level ground, and with its normal vertical, contact forces do not lean.
+    slides = bool(arrays.leans and ground.wavy and arrays.Tx.any() and not standing)
+    problem = _Balance(arrays._replace(leans=0), time, system.penetration_scale)
     origin = np.zeros(len(arrays.constant_load))
     if not problem.force(origin, 1.0).any():
-        return origin
-    solution = problem.solve(problem.guess(1.0), 1.0)
-    if solution is None:
-        solution = problem.solve(problem.descend(problem.guess(1.0), 1.0), 1.0)
-    if solution is None:
-        solution = _continued(problem)
+        solution: Array | None = origin
+    else:
+        solution = problem.solve(problem.guess(1.0), 1.0)
+        if solution is None:
+            solution = problem.solve(problem.descend(problem.guess(1.0), 1.0), 1.0)
+        if solution is None:
+            solution = _continued(problem)
     if solution is None:
         raise AnalysisError(_reason(system, problem, friction))
-    return solution
+    if not slides:
+        return solution
+    leaning = _Balance(arrays, time, system.penetration_scale)
+    longest = _LONGEST_SLIDE * (ground.shortest_wavelength or np.inf)
+    found = leaning.slide(solution, longest, system.stored_energy)
+    if found is None:
+        raise AnalysisError("There is no static equilibrium: without friction the waves of the "
+                            "ground carry the body away; give it a spring at B along the ground "
+                            "(drive.stiffness_x) or a support.")
+    return found
 
 
 class _Balance:
@@ -223,6 +251,61 @@ class _Balance:
                 high = low
             q = q + high * step
         return q
+
+    def slide(self, q: Array, longest: float, stored: Callable[[Array], Array]) -> Array | None:
+        """Go down the slopes of waves from q to a stable place of rest; None if there is none.
+
+        Newton steps with the magnitudes of the curvatures of the energy, which always lead
+        downhill, no contact node farther than ``longest`` at once. ``stored`` gives the energy of
+        the contact at penetrations (n,).
+        """
+        reach, energy = longest, self._energy(q, stored)
+        for _ in range(_SLIDES):
+            force, curvatures, shapes = self._curved(q)
+            if self._size(force) <= self._noise(q, 1.0):
+                if curvatures[0] >= -1e-9:
+                    return q
+                # Balanced on a crest: off it.
+                q = q + self._limited(shapes[:, 0], 0.01 * longest, exactly=True)
+                energy = self._energy(q, stored)
+                continue
+            step = shapes @ ((shapes.T @ force) / np.maximum(np.abs(curvatures), 1e-10))
+            trial = self._pressed(q + self._limited(step, reach))
+            found = self._energy(trial, stored)
+            closer = self._size(self.force(trial, 1.0)) < self._size(force)
+            if found < energy or (closer and found <= energy + 1e-13 * abs(energy)):
+                q, energy, reach = trial, found, min(longest, 2.0 * reach)
+            elif (reach := 0.5 * reach) < 1e-9 * longest:
+                break
+        rest = self.solve(q, 1.0)
+        return rest if rest is not None and self._curved(rest)[1][0] >= -1e-9 else None
+
+    def _curved(self, q: Array) -> tuple[Array, Array, Array]:
+        """Out-of-balance force (m,), curvatures of the energy and their directions, all scaled."""
+        root = np.sqrt(self.scale)
+        gradient = self.gradient(q)
+        curvatures, shapes = np.linalg.eigh(-0.5 * (gradient + gradient.T) / np.outer(root, root))
+        return self.force(q, 1.0), curvatures, shapes / root[:, None]
+
+    def _pressed(self, q: Array) -> Array:
+        """Q after some steps along the stiff directions alone, as waves curve below the nodes."""
+        for _ in range(3):
+            force, curvatures, shapes = self._curved(q)
+            stiff = curvatures > 1e-3
+            q = q + shapes[:, stiff] @ ((shapes[:, stiff].T @ force) / curvatures[stiff])
+        return q
+
+    def _limited(self, step: Array, longest: float, exactly: bool = False) -> Array:
+        """A step in which no contact node moves farther than ``longest``."""
+        moved = max(float(np.abs(self.arrays.Tx @ step).max()),
+                    float(np.abs(self.arrays.Ty @ step).max()), 1e-300)
+        return step * (longest / moved if exactly else min(1.0, longest / moved))
+
+    def _energy(self, q: Array, stored: Callable[[Array], Array]) -> float:
+        state = np.empty((len(self.arrays.gap), kernels.STATE_COLUMNS))
+        kernels.contact_state(self._time, self._settled(q), self.arrays, state)
+        elastic = 0.5 * q @ self.arrays.stiffness @ q - self.load @ q
+        return float(elastic + stored(state[:, kernels.PENETRATION]))
 
     def _upright(self, q: Array) -> Array:
         """Symmetric stiffness (m, m) at q, for ground that is level under each node."""

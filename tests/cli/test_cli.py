@@ -15,6 +15,8 @@ from fecontact import Status, Study, read_case, read_mesh
 from fecontact.cli import doctor as examination
 from fecontact.cli import execute
 from fecontact.core import system_libraries
+from fecontact.io import read_wear
+from fecontact.laws import ArchardWear, EnergyWear
 
 
 @pytest.fixture
@@ -134,9 +136,35 @@ def test_a_run_that_is_up_to_date_is_drawn_without_a_note(cli, study, tmp_path):
 
 
 def test_steep_ground_is_noted(cli, study):
-    _, out, _ = cli("run", study, "--set", "ground.amplitude=1e-4", "--set",
-                    "ground.wavelength=1e-3")
-    assert "slope reaches 0.63; above 0.3" in out
+    steep = "--set", "ground.amplitude=1e-4", "--set", "ground.wavelength=1e-3"
+    _, out, _ = cli("run", study, *steep)
+    said = " ".join(out.split())
+    assert "slope reaches 0.63; above 0.3 it is a rough assumption that friction acts" in said
+    _, out, _ = cli("run", study, *steep, "--set", "ground.normal=vertical")
+    said = " ".join(out.split())
+    assert "assumption that the contact force is vertical and friction acts" in said
+
+
+def test_wear_of_a_study(cli, study, tmp_path):
+    """The section [wear], in blocks: stored, drawn, and as the same from Python."""
+    options = ["--set", "wear.coefficient=1e-12", "--set", "wear.acceleration=100.0", "--set",
+               "wear.blocks=3", "--set", "wear.period=0.002", "--set", "ground.speed=0.05"]
+    code, out, err = cli("wear", study, *options, "-o", tmp_path / "worn")
+    assert (code, err) == (0, "")
+    assert "300, 100 per computed period" in out
+    assert {"tiny-wear.h5", "tiny-wear.png"} <= files_below(tmp_path / "worn")
+    stored = read_wear(tmp_path / "worn" / "tiny-wear.h5")
+    again = Study.read(study).with_(**{
+        "wear.coefficient": 1e-12, "wear.acceleration": 100.0, "wear.blocks": 3,
+        "wear.period": 0.002, "ground.speed": 0.05}).wear_history()
+    assert (stored.depth == again.depth).all()
+    assert stored.law == EnergyWear(1e-12)
+    assert stored.depth[-1].max() > 0.0
+    code, _, err = cli("wear", study)
+    assert code == 1
+    assert "[wear] lacks the key 'coefficient'" in " ".join(err.split())
+    archard = Study.read(study).with_(**{"wear.law": "archard", "wear.coefficient": 1e-15})
+    assert archard.wear.law_if_any == ArchardWear(1e-15)
 
 
 @pytest.mark.parametrize("shape", ["beam", "pendulum", "block"])

@@ -7,7 +7,6 @@ from test_events import START, drop
 
 from fecontact import (
     ContactSystem,
-    InputError,
     Load,
     ModelWarning,
     RigidStart,
@@ -173,18 +172,3 @@ def test_sliding_far_along_the_ground_is_within_the_limits():
     # v^2 / (2 mu N / m)
     assert run.displacement(0)[-1, 0] == pytest.approx(2.0, rel=1e-3)
     assert run.limits_exceeded == ()
-
-
-def test_wear_follows_from_friction_work():
-    """Steady sliding: depth = k mu F V t / area."""
-    system = friction_oscillator(2, **{
-        "drive.amplitude_x": 0.0, "drive.damping_x": 500.0, "ground.speed": 0.05})
-    run = simulate(system, 2.0, initial="sliding")
-    mu = float(run.friction_force[-1, 0] / run.normal_force[-1, 0])
-    wanted = 1e-13 * abs(mu) * 14.0 * 0.05 * 2.0 / (1.0 * 0.02)
-    # Depths are so small that approx's own absolute tolerance would let anything pass.
-    assert run.wear_depth(1e-13, 0.02)[-1, 0] == pytest.approx(wanted, rel=1e-6, abs=0.0)
-    with pytest.raises(InputError, match=r"width = 0"):
-        run.wear_depth(1e-13, 0)
-    with pytest.raises(InputError, match=r"coefficient = -1"):
-        run.wear_depth(-1.0, 1.0)

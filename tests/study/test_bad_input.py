@@ -321,7 +321,13 @@ sweep.summaries []
 sweep.t_start nan
 sweep.strobe {keep=0} keep
 sweep.strobe {transient_periods=1,keep=1000000000000} keep
-sweep.wear_coefficient -1
+wear.coefficient -1
+wear.law "fouvry"
+wear.acceleration 0
+wear.blocks 0
+wear.periods 0
+wear.settling -1
+wear.outputs 1
 sweep.axes 3
 foo 3
 foo.bar 3 foo

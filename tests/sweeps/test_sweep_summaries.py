@@ -10,7 +10,7 @@ import synthetic
 from systems import impact_oscillator
 
 from fecontact import ContactSystem, Ground, InputError, RigidStart, Trajectory, simulate
-from fecontact.laws import ConstantFriction, RoughSurface
+from fecontact.laws import ConstantFriction, EnergyWear, RoughSurface
 from fecontact.sweeps.summaries import SUMMARIES, functions_for, summarise, unit_of
 from fecontact.system.kernels import FRICTION, POWERS
 
@@ -74,7 +74,7 @@ def test_contact(run):
 
 def test_power_and_wear(run):
     names = ("friction_power", "wear_depth", "wear_rate")
-    known = {"wear_coefficient": 1e-13, "thickness": 0.03}
+    known = {"wear": EnergyWear(1e-13), "thickness": 0.03}
     found = values(run, *names, **known)
     assert found["friction_power"] == pytest.approx(5.0)
     depth = 1e-13 * 4.0 * 0.02 / (0.05 * 0.03)  # the third node has worked most
@@ -99,7 +99,7 @@ def test_the_late_part_counts_from_its_first_time(run):
 def test_every_summary_has_a_sentence_a_unit_and_a_finite_value(run):
     names = tuple(name for name in SUMMARIES if name not in ("periods", "lyapunov_exponent"))
     with np.errstate(all="raise"):
-        found = values(run, *names, wear_coefficient=1e-13, thickness=0.1)
+        found = values(run, *names, wear=EnergyWear(1e-13), thickness=0.1)
     assert all(np.isfinite(value) for value in found.values())
     for name, summary in SUMMARIES.items():
         assert summary.text.endswith((".", ").")), name

@@ -20,6 +20,7 @@ from fecontact import (
     modal_basis,
     static_equilibrium,
 )
+from fecontact.integrate import initial_state
 from fecontact.laws import ExponentialFriction, RoughSurface
 
 STIFFNESS, R = 10e6, 10e-6
@@ -241,29 +242,107 @@ def test_sliding_beam_leans_on_its_leading_edge():
 
 # Wavy ground -------------------------------------------------------------------------------------
 
-@pytest.mark.parametrize("time", [0.0, 0.7])
-def test_mass_on_a_wave(time):
-    """The mass slides down (there is no slope in the force): it rests on the height below it."""
-    ground = Ground(speed=1e-3, amplitude=200e-6, wavelength=2.5e-3)
+WAVE = Ground(speed=1e-3, amplitude=200e-6, wavelength=2.5e-3)
+K = 2.0 * np.pi / WAVE.wavelength
+
+
+def slope(ground, xi):
+    k = 2.0 * np.pi / ground.wavelength
+    return ground.amplitude * k * np.cos(k * xi)
+
+
+@pytest.mark.parametrize("stiffness", [2e3, 5610.0, 1e5])
+@pytest.mark.parametrize("time", [0.0, 0.7, 1.4])
+def test_mass_on_a_wave(time, stiffness):
+    """It leans on the slope: c_x x = -F y_R', on the side of the trough."""
+    system = mass_point(ground=WAVE, drive=Drive(stiffness_x=stiffness))
+    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=time)
+
+    def pull(x):
+        return stiffness * x + 14.0 * slope(WAVE, x - 1e-3 * time)
+
+    # Downhill until the spring holds it: the first root on that side.
+    side = -np.sign(pull(0.0)) * np.linspace(0.0, 2.5e-3, 20001)
+    first = np.flatnonzero(np.sign(pull(side)) != np.sign(pull(0.0)))[0]
+    expected = brentq(pull, *sorted(side[[first - 1, first]]), xtol=1e-15)
+    assert x == pytest.approx(expected, rel=1e-9)
+    height = 200e-6 * np.sin(K * (x - 1e-3 * time))
+    assert y == pytest.approx(height - penetration_of(14.0), rel=1e-9)
+
+
+def test_mass_with_a_vertical_contact_force_stays_where_it_is():
+    ground = Ground(speed=1e-3, amplitude=200e-6, wavelength=2.5e-3, normal="vertical")
     system = mass_point(ground=ground, drive=Drive(stiffness_x=5610.0))
-    q = static_equilibrium(system, time=time)
-    x, y = system.basis.T[2, :2] @ q
+    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=0.7)
     assert x == pytest.approx(0.0, abs=1e-12)
-    height = 200e-6 * np.sin(2.0 * np.pi * (0.0 - 1e-3 * time) / 2.5e-3)
-    assert y == pytest.approx(height - penetration_of(14.0), rel=1e-8)
+    assert y == pytest.approx(200e-6 * np.sin(-K * 0.7e-3) - penetration_of(14.0), rel=1e-8)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.3, 0.625])
+def test_free_mass_rests_in_the_next_trough(time):
+    """At 0.625 s it stands in a trough, at 1.875 s balanced on a crest."""
+    system = mass_point(ground=WAVE)
+    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=time)
+    assert x == pytest.approx(1e-3 * time - 0.625e-3, abs=1e-12)
+    assert y == pytest.approx(-200e-6 - penetration_of(14.0), rel=1e-9)
+    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=1.875)
+    assert abs(x) == pytest.approx(1.25e-3, rel=1e-9)
+    assert y == pytest.approx(-200e-6 - penetration_of(14.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.7, 1.875])
+def test_runs_from_rest_start_where_the_body_stands(time):
+    """Friction holds it on the slope; its normal force carries the load."""
+    system = mass_point(ground=WAVE)
+    state = initial_state(system, "rest", time)
+    x, y = system.basis.T[2, :2] @ state[:2]
+    assert x == pytest.approx(0.0, abs=1e-18)
+    assert y == pytest.approx(200e-6 * np.sin(-K * 1e-3 * time) - penetration_of(14.0), rel=1e-9)
+    vertical = system.with_(**{"ground.normal": "vertical"})
+    assert state[:2] == pytest.approx(static_equilibrium(vertical, time=time), rel=1e-12)
 
 
 def test_beam_on_waves_is_in_balance():
+    """Forces and moments of slopes, spring (0.01 m above the face) and load."""
     ground = Ground(speed=0.01, amplitude=20e-6, wavelength=0.08)
     system = beam(16, ground=ground, drive=Drive(stiffness_x=1e5), load=Load(40.0),
                   normal=RoughSurface(STIFFNESS, R, 0.0))
-    for time in (0.0, 1.0, 3.0):
+    for time in (0.7, 1.6, 3.0):
         q = static_equilibrium(system, time=time)
         F, _, u = contact(system, q, time)
+        spring = 1e5 * system.basis.T[0, 0] @ q
+        x = system.basis.contact_T[:, 0] @ q
+        leaning = F @ slope(ground, system.basis.contact_x + x - 0.01 * time)
         assert F.sum() == pytest.approx(40.0, rel=1e-8)
-        assert F @ (system.basis.contact_x - 0.1) == pytest.approx(0.0, abs=1e-7)
+        assert spring == pytest.approx(-leaning, abs=1e-8)
+        moment = F @ (system.basis.contact_x - 0.1) + 0.01 * spring
+        assert moment == pytest.approx(0.0, abs=1e-8)
         assert ((F > 0.0) == (u > 0.0)).all()
         assert np.count_nonzero(F) < 16
+        assert abs(spring) > 1e-4
+
+
+def test_light_body_slides_off_a_crest_until_its_nodes_carry_it():
+    """Free along the ground: no force along it remains, and the energy has fallen."""
+    basis = modal_basis(ElasticBody(rectangle(LENGTH, HEIGHT, 16, 2), Material(), THICKNESS), 6,
+                        contact="bottom", contact_nodes=6, C=(0.1, HEIGHT))
+    ground = Ground(amplitude=2e-4, wavelength=0.15)
+    system = ContactSystem(basis, normal=RoughSurface(1e7, 1e-6, 0.0), load=Load(2.0),
+                           ground=ground, friction=ExponentialFriction())
+    q = static_equilibrium(system)
+    F = contact(system, q)[0]
+    x = basis.contact_T[:, 0] @ q
+    assert F.sum() == pytest.approx(2.0, rel=1e-8)
+    assert F @ (basis.contact_x - 0.1) == pytest.approx(0.0, abs=1e-9)
+    assert F @ slope(ground, basis.contact_x + x) == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(x).max() > 1e-3
+    standing = initial_state(system, "rest", 0.0)[: basis.modes]
+
+    def energy(q):
+        stored = system.stored_energy(contact(system, q)[2])
+        return 0.5 * ((basis.angular_frequencies * q) ** 2).sum() + 2.0 * basis.T[1, 1] @ q + stored
+
+    assert energy(q) < energy(standing) - 1e-5
 
 
 # No equilibrium ----------------------------------------------------------------------------------
@@ -338,8 +417,8 @@ def test_point_pushed_across_names_both():
 
 @pytest.mark.parametrize("height", [-3e-3, -1e-4, 1e-4, 3e-3])
 def test_ground_far_from_the_reference_place(height):
-    """The start of the search does not matter: a deep trough, a high crest."""
-    ground = Ground(amplitude=abs(height), wavelength=0.08)
+    """The start of the search does not matter: a deep trough, a high crest it stands on."""
+    ground = Ground(amplitude=abs(height), wavelength=0.08, normal="vertical")
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)),
@@ -362,7 +441,8 @@ def test_light_bodies_on_waves_and_gaps(seed):
         load = 10.0 ** rng.uniform(-3.0, 1.0)
         system = ContactSystem(
             basis, normal=RoughSurface(10.0 ** rng.uniform(6.0, 9.0), 1e-7, 0.0), load=Load(load),
-            ground=Ground(amplitude=2e-4, wavelength=10.0 ** rng.uniform(-1.5, 0.0)),
+            ground=Ground(amplitude=2e-4, wavelength=10.0 ** rng.uniform(-1.5, 0.0),
+                          normal="vertical"),
             gap=tuple(rng.uniform(0.0, 1e-5, n)), friction=ExponentialFriction())
         F, _, u = contact(system, static_equilibrium(system))
         assert F.sum() == pytest.approx(load, rel=1e-6)

@@ -1,4 +1,4 @@
-"""Commands that work on a study: ``init``, ``mesh``, ``modes`` and ``run``."""
+"""Commands that work on a study: ``init``, ``mesh``, ``modes``, ``run``, ``wear``."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -153,3 +153,32 @@ def run(
     if ended not in ("FINISHED", "EVENT", "INTERRUPTED"):
         return fail("the run did not reach its end; what was computed is written.", 1)
     return INTERRUPTED if ended == "INTERRUPTED" else 0
+
+
+def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> int:
+    """Wear the contact face of a study over many cycles; the loads redistribute.
+
+    The section [wear] of the study gives the law, its coefficient, the blocks and the acceleration
+    of cycles. Writes the history (NAME-wear.h5) and a plot of the worn profile. Ctrl-C stops it;
+    the finished blocks are written.
+    """
+    from fecontact.cli.console import waiting
+    from fecontact.cli.run_files import read_study
+    from fecontact.cli.tables import table
+    from fecontact.core.files.atomic_write import output_folder
+
+    described = read_study(study, set_)
+    with output_folder(output or described.results) as folder:
+        with waiting("Computing modes"):
+            described.system()
+        history = described.wear_history(progress=True)
+        from fecontact.output.files.wear import write_wear
+        from fecontact.output.plots.wear import plot_wear
+
+        with waiting("Writing"):
+            stored = write_wear(folder / f"{described.name}-wear.h5", history)
+            picture = folder / f"{described.name}-wear.png"
+            plot_wear(history, path=picture)
+        show(table("", "", rows=history.summary()))
+        echo_written(stored, picture)
+    return INTERRUPTED if history.status.name == "INTERRUPTED" else 0

@@ -62,7 +62,7 @@ def integrate_set_valued(
         counted once, are independent. Or by implicit steps of order 3, for any number of nodes.
     restitution : float, optional
         Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and Newton's
-        coefficient e, from 0 to below 1, gives their rebound ``u'+ = -e u'-``. Nodes that move
+        coefficient e, from 0 to 1, gives their rebound ``u'+ = -e u'-``. Nodes that move
         along the ground have to be free of friction. Penetration at the start is taken away.
     static_coefficient : float or (n,) sequence, optional
         Limit of \|R\|/F in stick, at least the law's mu(0+) [-]; default is that.
