@@ -34,6 +34,9 @@ from .sweeps.sweep import sweep
 from .system.contact_system import ContactSystem
 from .system.forcing_period import forcing_period
 from .system.gap import Crown
+from .system.quasistatic.loading import load_history
+from .system.quasistatic.path import LoadPath
+from .system.quasistatic.prestressed_modes import prestressed_modes
 from .system.static_solution import static_solution
 from .system.statics import static_equilibrium
 
@@ -55,6 +58,7 @@ __all__ = [
     "Ground",
     "InputError",
     "Load",
+    "LoadPath",
     "LossFactor",
     "Material",
     "Mesh",
@@ -82,8 +86,10 @@ __all__ = [
     "integrate",
     "io",
     "laws",
+    "load_history",
     "modal_basis",
     "plot",
+    "prestressed_modes",
     "read_case",
     "read_mesh",
     "reduction",

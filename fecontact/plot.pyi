@@ -11,6 +11,7 @@ from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
 from .output.plots.figure import new_figure
 from .output.plots.modes import plot_convergence, plot_modes
+from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
@@ -35,10 +36,12 @@ __all__ = [
     "plot_energies",
     "plot_friction_work",
     "plot_history",
+    "plot_loop",
     "plot_modes",
     "plot_phase",
     "plot_poincare",
     "plot_receptance",
+    "plot_shear",
     "plot_sobol",
     "plot_spectrogram",
     "plot_spectrum",

@@ -188,12 +188,21 @@ def check_loads(names, printed, folder):
     assert np.abs(names["resting"].displacement).max() < np.abs(names["same"].displacement).max()
     assert (folder / "stress.png").stat().st_size > 10_000
     assert (folder / "stress.vtu").exists()
+def check_preload(names, printed, folder):
+    # 4 mu F (X - mu F / k), where the spring of the body takes what friction does not.
+    amplitude = (30.0 - 20.0) / 1e5
+    assert names["history"].loop(1, 3).loss == pytest.approx(
+        4.0 * 20.0 * (amplitude - 20.0 / 6e6), rel=1e-6)
+    assert abs(names["run"].modal_velocities).max() < 1e-8
+    assert names["stuck"].frequencies_hz[0] == pytest.approx(np.sqrt(6.1e6 / 2.0) / (2 * np.pi))
+    assert all((folder / name).stat().st_size > 5000 for name in ("shear.png", "loop.png"))
 
 
 CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
-          "set-valued.md": check_set_valued, "loads.md": check_loads}
+          "set-valued.md": check_set_valued, "loads.md": check_loads,
+          "preload.md": check_preload}
 
 
 def test_every_page_with_code_is_known():

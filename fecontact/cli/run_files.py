@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fecontact.reduction.convergence import ModeConvergence
     from fecontact.study.sections import RenderSettings
     from fecontact.study.study import Study
+    from fecontact.system.quasistatic.history import LoadHistory
 
 
 def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
@@ -62,6 +63,32 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
     plots.plot_phase(trajectory, point, usual_component(system), path=phase)
     plots.plot_contact_map(trajectory, path=contact_map)
     plots.plot_energies(trajectory, path=energies)
+    return files
+
+
+def write_preload(study: "Study", history: "LoadHistory", folder: Path) -> list[Path]:
+    """Write table and plots of quasi-static loading into a folder; returns the files."""
+    from io import StringIO
+
+    import numpy as np
+
+    from fecontact.core.files.atomic_write import write_text
+    from fecontact.output.plots.preload import plot_loop, plot_shear
+
+    kinds = {"normal_force_N": history.normal_force, "friction_force_N": history.friction_force,
+             "slip_m": history.slip, "state": history.contact_state}
+    columns = ["point", "travel_m", "work_J", "loss_J",
+               *(f"{kind}_{j}" for kind in kinds for j in range(history.slip.shape[1]))]
+    text = StringIO()
+    np.savetxt(text, np.column_stack([np.arange(len(history)), history.travel, history.work,
+                                      history.loss, *kinds.values()]),
+               delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+    files = [folder / f"{study.name}-preload.csv", folder / f"{study.name}-shear.png"]
+    write_text(files[0], text.getvalue())
+    plot_shear(history, path=files[1])
+    if history.status == "finished":
+        files.append(folder / f"{study.name}-loop.png")
+        plot_loop(history, path=files[-1])
     return files
 
 

@@ -12,6 +12,8 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.statics import equilibrium
 from fecontact.system.steady_memory import settled
 
@@ -46,7 +48,8 @@ class RigidStart:
             object.__setattr__(self, name, tuple(values.tolist()))
 
 
-Initial = TypeAliasType("Initial", Literal["rest", "sliding"] | RigidStart | Trajectory | Array)
+Initial = TypeAliasType("Initial", Literal["rest", "sliding"] | RigidStart | Trajectory
+                        | LoadHistory | RestState | Array)
 
 
 def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array:
@@ -56,12 +59,17 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     ----------
     system : ContactSystem
         The system.
-    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
+    initial : 'rest', 'sliding', RigidStart, Trajectory, LoadHistory, RestState or array
         Normal equilibrium where the body stands, all forces of the ground along x left to
         friction; steady sliding; a rigid-body displacement and velocity; the end of another run;
-        or a state. Internal variables of friction with memory are zero, in steady sliding their
-        steady values. What friction does not hold on waves begins to slide down their slopes:
+        rest under friction after quasi-static loading; or a state (2 m + n s,). Internal variables
+        of friction with memory are zero, in steady sliding their steady values. What friction does
+        not hold on waves begins to slide down their slopes:
         :func:`fecontact.static_equilibrium` finds where it rests.
+
+        After loading, Jenkins and Iwan elements keep their deflections, and with ``SetValued``
+        friction is again what equilibrium needs. Smoothed friction without memory has no force at
+        rest: its contacts keep their places, but creep from there at velocities of order 1/k_s.
     time : float
         Start of the run [s].
 
@@ -86,6 +94,8 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
         return np.concatenate([_rigid(system.basis, initial.displacement, "displacement"),
                                _rigid(system.basis, initial.velocity, "velocity"),
                                np.zeros(system.size - 2 * m)])
+    if isinstance(initial, LoadHistory | RestState):
+        return _rest_under_friction(system, initial, time)
     given = initial.states[-1] if isinstance(initial, Trajectory) else initial
     if not is_numeric(given):
         raise InputError(f"initial = {shown(given)} must be 'rest', 'sliding', a RigidStart, a "
@@ -97,6 +107,23 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     if not np.isfinite(state).all():
         raise InputError("The initial state holds values that are not finite.")
     return state
+
+
+def _rest_under_friction(
+    system: ContactSystem, initial: LoadHistory | RestState, time: float
+) -> Array:
+    """State at rest with what its friction remembers."""
+    rest = initial.state() if isinstance(initial, LoadHistory) else initial
+    memory = rest.memory(system)
+    ground = system.ground
+    moved = ground.travel(time) - rest.travel
+    if moved and (ground.wavy or ground.friction_scale_kernel is not None):
+        raise InputError(f"The ground has travelled {rest.travel:g} m in the state at rest, but "
+                         f"{ground.travel(time):g} m at the start of the run, where it has other "
+                         f"heights or friction; end the path of loads at travel = "
+                         f"{ground.travel(time):g}, or start the run at another time.")
+    q = rest.modal_coordinates
+    return np.concatenate([q, np.zeros(len(q)), memory.reshape(-1)])
 
 
 def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> Array:

@@ -19,6 +19,8 @@ from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION, POWERS
 from fecontact.system.model_limits import warn_of_limits
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import RestState
 
 # Initial penetration, in penetration scales, beyond which to warn.
 _DEEP = 100.0
@@ -53,7 +55,7 @@ def simulate(
     t_end, t_start : float
         End and start of the run [s]; by default it starts where the run that it continues ends, or
         at zero.
-    initial : 'rest', 'sliding', RigidStart, Trajectory or (2 m + n s,) array
+    initial : 'rest', 'sliding', RigidStart, Trajectory, LoadHistory, RestState or array
         Initial state; see :func:`fecontact.integrate.initial_state`.
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or ascending times [s].
@@ -98,7 +100,7 @@ def simulate(
                          f"out, or evaluate the outputs of the run.")
     watched = as_events(events)
     state = initial_state(system, initial, t_start)
-    if not isinstance(initial, str | Trajectory):
+    if not isinstance(initial, str | Trajectory | LoadHistory | RestState):
         _warn_of_depth(system, state, t_start)
     m = system.basis.modes
     with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:

@@ -36,6 +36,9 @@ class Curve(Protocol):
         """Parameters (n, k) of n nodes."""
 
 
+# Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
+# curve of the coefficient has not begun to change.
+_STEEP, _CREEP = 1e36, 1e-18
 # Speeds searched for extremes, in units of the law's velocity scale.
 _SEARCHED = np.geomspace(1e-6, 1e12, 4001)
 
@@ -84,6 +87,25 @@ def largest_coefficient(law: Curve, normal_force: float = 1.0) -> tuple[Array, A
         One value per contact node if a parameter is given per node, else one.
     """
     return _largest(law, _nodes(law), normal_force)
+
+
+def static_coefficient(law: Curve, nodes: int) -> Array:
+    """Coefficient (n,) that limits friction at rest: mu(0+) of the law without its smoothing.
+
+    For laws without a ``smoothing_slope`` it is the largest maximum of R/F. InputError if R/F grows
+    without bound.
+    """
+    names = [entry.name for entry in fields(cast(Any, law))]
+    if "smoothing_slope" in names:
+        steep = replace(cast(Any, law), smoothing_slope=_STEEP)
+        return _per_node(steep, nodes, lambda single, row: [
+            _sampled(single, np.array([_CREEP]), 1.0, row)[0, 0]])[:, 0]
+    found = _largest(law, nodes, 1.0)[0]
+    if not np.isfinite(found).all():
+        raise InputError(f"{type(law).__name__} has no largest coefficient: its friction force "
+                         f"grows with slip velocity without bound; use a law with a "
+                         f"smoothing_slope, or one without the viscous term.")
+    return found
 
 
 def velocity_of_minimum(law: Curve, normal_force: float = 1.0) -> Array:

@@ -1,9 +1,11 @@
+from .preload_section import PreloadSettings
 from .sections import BasisSettings
 from .sweep_section import Distribution, Span, Strobing, SweepSettings
 
 __all__ = [
     "BasisSettings",
     "Distribution",
+    "PreloadSettings",
     "Span",
     "Strobing",
     "SweepSettings",

@@ -210,9 +210,9 @@ class SimulationSettings:
         them with the run.
     stop : list of str
         Events that end the run when they first occur: 'touch-down', 'lift-off', 'stick', 'slip'.
-    initial : 'rest', 'sliding' or RigidStart
-        Initial state; ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid-body
-        motion.
+    initial : 'rest', 'sliding', 'preload' or RigidStart
+        Initial state; 'preload' for the end of the path of loads of ``[preload]``;
+        ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid-body motion.
     """
 
     t_end: Annotated[float | None, Unit("s")] = None
@@ -226,7 +226,7 @@ class SimulationSettings:
     scheme: str | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
-    initial: Literal["rest", "sliding"] | RigidStart = "rest"
+    initial: Literal["rest", "sliding", "preload"] | RigidStart = "rest"
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.t_start):

@@ -37,6 +37,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES, with_folder
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.geometry_section import Geometry, MeshFile, geometry_from_table, geometry_table
+from fecontact.study.preload_section import PreloadSettings
 from fecontact.study.sections import (
     BasisSettings,
     BodySettings,
@@ -54,6 +55,7 @@ from fecontact.system.contact_system import (
     needs_friction,
 )
 from fecontact.system.gap import Crown, gap_values
+from fecontact.system.quasistatic.history import LoadHistory
 
 Gap = float | tuple[float, ...] | Crown
 
@@ -92,6 +94,8 @@ class Study(Summarised):
     gap : float, (n,) tuple or Crown
         Initial distance of the contact nodes from flat ground [m], or ``{radius, centre}`` for a
         face in the shape of an arc; written above all sections.
+    preload : PreloadSettings or None
+        ``[preload]``: quasi-static loading; see :func:`fecontact.load_history`.
     simulation : SimulationSettings
         ``[simulation]``
     wear : WearSettings
@@ -123,6 +127,7 @@ class Study(Summarised):
     branch: BranchSettings = field(default_factory=BranchSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     render: RenderSettings = field(default_factory=RenderSettings)
+    preload: PreloadSettings | None = None
     sweep: SweepSettings | None = None
     path: Path | None = field(default=None, compare=False)
 
@@ -183,7 +188,8 @@ class Study(Summarised):
         tables = {name: table if name == "geometry" else with_folder(table, folder)
                   for name, table in tables.items()}
         for name in tables:
-            if name not in (valid := ("gap", "geometry", "contact", "sweep", *_SECTIONS)):
+            if name not in (valid := ("gap", "geometry", "contact", "preload", "sweep",
+                                           *_SECTIONS)):
                 raise InputError(f"{title} has an unknown section or key '{name}'"
                                  f"{nearest(name, valid)}; there are: {choices(valid)}.")
         if "geometry" not in tables:
@@ -196,6 +202,8 @@ class Study(Summarised):
                             "contact"),
             sweep=from_table(SweepSettings, flat_axes(tables["sweep"]), f"{title}: [sweep]")
             if "sweep" in tables else None,
+            preload=from_table(PreloadSettings, tables["preload"], f"{title}: [preload]")
+            if "preload" in tables else None,
             path=path,
             **{name: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items() if name in tables or name != "normal"},
@@ -230,8 +238,9 @@ class Study(Summarised):
                     for name in _SECTIONS
                     if getattr(self, name) is not None}
         contact = {"contact": plain(self.contact)} if self.contact else {}
-        if self.sweep is not None:
-            sections["sweep"] = to_table(self.sweep, defaults=defaults)
+        for name in ("preload", "sweep"):
+            if getattr(self, name) is not None:
+                sections[name] = to_table(getattr(self, name), defaults=defaults)
         return {"gap": plain(self.gap),
                 "geometry": geometry_table(self.geometry, defaults=defaults),
                 **contact,
@@ -303,6 +312,16 @@ class Study(Summarised):
         """
         return contact_system(self, self.modal_basis(), _title(self.path))
 
+    def load_history(self) -> LoadHistory:
+        """Load the system along the path of ``[preload]``; see :func:`fecontact.load_history`."""
+        title = _title(self.path)
+        if self.preload is None:
+            raise InputError(f"{title} lacks the section [preload], the path of loads; give values "
+                             f"for the vertices of at least one of its keys.")
+        system = self.system()
+        with located(f"{title}: [preload]:", "LoadPath"):
+            return self.preload.load(system)
+
     def run(
         self, progress: bool | Callable[[float], None] | None = None,
         checkpoint: Path | None = None,
@@ -320,9 +339,12 @@ class Study(Summarised):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
+        initial: Any = settings.initial
+        if initial == "preload":
+            initial = self.load_history()
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,
-                            initial=settings.initial, outputs=settings.outputs,
+                            initial=initial, outputs=settings.outputs,
                             solver=solver, rtol=settings.rtol, max_step=settings.max_step,
                             progress=progress,
                             events=(ContactEvents(settings.stop)

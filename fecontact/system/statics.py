@@ -93,29 +93,16 @@ def equilibrium(
                             "(ground.friction_variation); start from rest.")
     arrays = _at_mean(system)
     if not friction:
-        arrays = arrays._replace(
-            friction=np.full_like(arrays.friction, _frictionless.address),
-            memory=np.zeros_like(arrays.memory),
-            ground_motion=_still.address,
-            ground_motion_parameters=np.array([ground.travel(time)], dtype=float),
-        )
+        arrays = at_rest(arrays, ground.travel(time))
     # On level ground, and with its normal vertical, contact forces do not lean.
     slides = bool(arrays.leans and ground.wavy and arrays.Tx.any() and not standing)
-    problem = _Balance(arrays._replace(leans=0), time, system.penetration_scale)
-    origin = np.zeros(len(arrays.constant_load))
-    if not problem.force(origin, 1.0).any():
-        solution: Array | None = origin
-    else:
-        solution = problem.solve(problem.guess(1.0), 1.0)
-        if solution is None:
-            solution = problem.solve(problem.descend(problem.guess(1.0), 1.0), 1.0)
-        if solution is None:
-            solution = _continued(problem)
+    problem = Balance(arrays._replace(leans=0), time, system.penetration_scale)
+    solution = problem.equilibrium()
     if solution is None:
         raise AnalysisError(_reason(system, problem, friction))
     if not slides:
         return solution
-    leaning = _Balance(arrays, time, system.penetration_scale)
+    leaning = Balance(arrays, time, system.penetration_scale)
     longest = _LONGEST_SLIDE * (ground.shortest_wavelength or np.inf)
     found = leaning.slide(solution, longest, system.stored_energy)
     if found is None:
@@ -125,7 +112,36 @@ def equilibrium(
     return found
 
 
-class _Balance:
+def at_rest(arrays: kernels.SystemArrays, travel: float) -> kernels.SystemArrays:
+    """Arrays of a system without friction, on ground at rest that has travelled [m]."""
+    return arrays._replace(
+        friction=np.full_like(arrays.friction, _frictionless.address),
+        memory=np.zeros_like(arrays.memory),
+        bristle_stiffness=np.zeros((2, len(arrays.gap), 0)), ground_motion=_still.address,
+        ground_motion_parameters=np.array([travel], dtype=float))
+
+
+def resting(
+    system: ContactSystem, load: Array, motion: Array, travel: float
+) -> tuple["Balance", Array]:
+    """Problem and equilibrium (m,) without friction under modal loads (m,) and drive motions (2,).
+
+    All forces of the ground along x are left to friction.
+    AnalysisError if there is none.
+    """
+    arrays = system.arrays
+    pulls = (arrays.drive_stiffness * motion) @ arrays.drive_shapes
+    arrays = at_rest(arrays, travel)._replace(
+        constant_load=load + pulls, drive_shapes=np.zeros_like(arrays.drive_shapes),
+        load_shapes=np.zeros_like(arrays.load_shapes))
+    problem = Balance(arrays._replace(leans=0), 0.0, system.penetration_scale)
+    solution = problem.equilibrium()
+    if solution is None:
+        raise AnalysisError(_reason(system, problem, False))
+    return problem, solution
+
+
+class Balance:
     """Out-of-balance modal forces of a resting or steadily sliding body."""
 
     def __init__(self, arrays: kernels.SystemArrays, time: float, scale: float) -> None:
@@ -223,6 +239,16 @@ class _Balance:
                 if settled == 3:
                     return q
         return None
+
+    def equilibrium(self) -> Array | None:
+        """Equilibrium (m,) under the whole load, or None."""
+        origin = np.zeros(len(self.load))
+        if not self.force(origin, 1.0).any():
+            return origin
+        solution = self.solve(self.guess(1.0), 1.0)
+        if solution is None:
+            solution = self.solve(self.descend(self.guess(1.0), 1.0), 1.0)
+        return _continued(self) if solution is None else solution
 
     def descend(self, q: Array, load: float) -> Array:
         """Newton steps with line search, each as long as the force acts along the step.
@@ -366,7 +392,7 @@ def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
         load_shapes=np.zeros_like(arrays.load_shapes))
 
 
-def _continued(problem: _Balance) -> Array | None:
+def _continued(problem: Balance) -> Array | None:
     """Follow the equilibrium from a small load, halving the load step on failure."""
     load, step = 1e-3, 0.1
     q = problem.solve(problem.guess(load), load)
@@ -384,7 +410,7 @@ def _continued(problem: _Balance) -> Array | None:
     return q
 
 
-def _reason(system: ContactSystem, problem: _Balance, friction: bool) -> str:
+def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
     kind = "steady sliding" if friction else "static equilibrium"
     direction = problem.loose(problem.guess(1.0))
     if direction is not None:

@@ -1,0 +1,143 @@
+"""Plots of quasi-static loading: shear and slip along the face, force loops."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array
+from fecontact.core.units import quantity, suitable_unit
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import STATES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_STATE_COLOURS = {"open": "#c8c4bc", **STATE_COLOURS}
+# Labels of the displacement and the force of an action.
+_LABELS = {
+    "load": ("work of the load per scale", "N m", "scale of the load", ""),
+    "motion_x": ("displacement of the drive x", "m", "force of the drive", "N"),
+    "motion_y": ("displacement of the drive y", "m", "force of the drive", "N"),
+    "travel": ("travel of the ground", "m", "force of the ground on the body", "N"),
+}
+
+
+def plot_shear(
+    history: LoadHistory, vertex: int = -1, *, path: str | Path | None = None
+) -> "Figure":
+    """Plot shear and its limit, and the state of the nodes, along the face at a vertex of a path.
+
+    The forces of each node are divided by its tributary length [N/m]; shear acts on the body in -x
+    and lies within plus and minus mu times the normal force. Slip is the displacement relative to
+    the ground.
+
+    Parameters
+    ----------
+    history : LoadHistory
+        The loading.
+    vertex : int
+        The vertex of the path, by default the last; the last point of a path that ended early.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For a vertex that does not exist or was not reached, another suffix, or a file that cannot
+        be written.
+    """
+    require_kind("plot_shear", LoadHistory, history=history)
+    early = vertex == -1 and history.status != "finished"
+    row = len(history) - 1 if early else history.row(vertex)
+    basis = history.system.basis
+    x, length = basis.contact_x, basis.tributary
+    order = np.argsort(x, kind="stable")
+    shear = history.friction_force[row] / length
+    limit = history.friction_limit[row] / length
+    slip, states = history.slip[row], history.state(row).contact_state
+    with new_figure(8.0, 6.4, path) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        place, symbol = suitable_unit(float(np.abs(x).max()), "m")
+        _line(upper, x[order] / place, np.stack([limit, -limit, shear])[:, order], "N/m",
+              "friction force per length")
+        for code, name in enumerate(STATES):
+            at = order[states[order] == code]
+            factor = suitable_unit(float(max(np.abs(limit).max(), np.abs(shear).max())), "N/m")[0]
+            if len(at):
+                upper.plot(x[at] / place, shear[at] / factor, "o", color=_STATE_COLOURS[name],
+                           markersize=4.5, label=name)
+        factor, unit = suitable_unit(float(np.abs(slip).max()), "m")
+        lower.plot(x[order] / place, slip[order] / factor, color=COLOURS[0], marker="o",
+                   markersize=3.0)
+        lower.set_ylabel(f"displacement relative\nto the ground [{unit}]")
+        lower.set_xlabel(f"place along the face [{symbol}]")
+        figure.legend(*upper.get_legend_handles_labels(), loc="outside upper center", ncols=5)
+        figure.align_ylabels([upper, lower])
+    return figure
+
+
+def _line(axis: "Axes", x: Array, curves: Array, unit: str, label: str) -> None:
+    """Limit on both sides, and the shear between."""
+    factor, symbol = suitable_unit(float(np.abs(curves).max()), unit)
+    axis.plot(x, curves[0] / factor, color="#6a6a6a", linestyle=DASHES, label="limit")
+    axis.plot(x, curves[1] / factor, color="#6a6a6a", linestyle=DASHES)
+    axis.plot(x, curves[2] / factor, color="#303030", linewidth=1.0)
+    axis.set_ylabel(f"{label} [{symbol}]")
+
+
+def plot_loop(
+    history: LoadHistory, first: int = 0, last: int = -1, action: str | None = None, *,
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot force over displacement along a path of loads, with the loss between two vertices.
+
+    Parameters
+    ----------
+    history : LoadHistory
+        The loading.
+    first, last, action
+        As for :meth:`LoadHistory.loop`: vertices, and what acts.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For vertices that do not exist or were not reached, an unknown action, another suffix, or
+        a file that cannot be written.
+    """
+    require_kind("plot_loop", LoadHistory, history=history)
+    if len(history) < 2:
+        raise InputError("plot_loop: the loading has one point only, so there is no curve; lower "
+                         "its loads.")
+    part = history.loop(first, last, action)
+    wide, wide_unit, high, high_unit = _LABELS.get(
+        part.action, ("displacement of the force", "m", "force", "N"))
+    vertices = [row for row in history.path.rows_of_vertices
+                if history.row(first) <= row <= history.row(last)]
+    marks = np.array(vertices) - vertices[0]
+    with new_figure(6.4, 5.2, path) as figure:
+        plane = figure.subplots()
+        across, across_symbol = _unit(part.displacement, wide_unit)
+        up, up_symbol = _unit(part.force, high_unit)
+        plane.plot(part.displacement / across, part.force / up, color=COLOURS[0])
+        plane.plot(part.displacement[marks] / across, part.force[marks] / up, "o",
+                   color=COLOURS[1], label="vertices of the path")
+        plane.set_xlabel(f"{wide} [{across_symbol}]")
+        plane.set_ylabel(f"{high} [{up_symbol}]")
+        plane.set_title(f"friction loses {quantity(part.loss, 'J', 4)}")
+        plane.legend(loc="best")
+    return figure
+
+
+def _unit(values: Array, unit: str) -> tuple[float, str]:
+    """Factor and symbol of a suitable unit; those of other units as they are."""
+    if unit == "N m":
+        return 1.0, unit
+    return suitable_unit(float(np.abs(values).max()), unit) if unit else (1.0, "-")

@@ -1,0 +1,250 @@
+"""Result of quasi-static loading: equilibria along a path, work and loss, force loops."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Array, Integers
+from fecontact.core.units import Summarised, quantity
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.quasistatic.increment import (
+    AGAINST,
+    FORCE,
+    PENETRATION,
+    PLACE,
+    PRESSING,
+    Sliders,
+)
+from fecontact.system.quasistatic.path import LoadPath
+from fecontact.system.quasistatic.rest_state import STATES, RestState
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Summarised):
+    """Force and displacement of one action between two vertices of a path.
+
+    Attributes
+    ----------
+    action : str
+        'load', 'motion_x', 'motion_y', 'travel', or 'forces.K' for the force number K.
+    displacement : (N,) array
+        Displacement on which the force does its work [m]; of the load, per unit of its scale
+        [N m].
+    force : (N,) array
+        Force that the action exerts on the body [N]; for the load, its scale [-].
+    loss : float
+        What friction loses from the first of these points to the last [J].
+    """
+
+    action: str
+    displacement: Array
+    force: Array
+    loss: float
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Action, points and loss."""
+        return [("action", self.action), ("points", f"{len(self.force)}"),
+                ("loss", quantity(self.loss, "J", 5))]
+
+    @property
+    def area(self) -> float:
+        """Area within the loop [J], by the trapezoidal rule between the points.
+
+        It is the loss of a closed loop along which nothing else does work, as far as the points
+        resolve it.
+        """
+        return float(np.trapezoid(self.force, self.displacement))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadHistory(Summarised):
+    """Equilibria along a path of quasi-static loading.
+
+    Attributes
+    ----------
+    system : ContactSystem
+        The system.
+    path : LoadPath
+        The path; N points on it.
+    given : (N, m + 3) array
+        Modal forces of the loads, displacements of the driven ends in x and y [m], travel [m].
+    modal_coordinates : (N, m) array
+        q.
+    node : (N, n, 6) array
+        As :attr:`RestState.node`.
+    slider_force, slider_place : (N, n, e) arrays
+        As in :class:`RestState`.
+    works : (N, 4) array
+        Work done so far by loads, drive, travel of the ground, and stiffness that is not symmetric
+        [J].
+    node_loss : (N, n) array
+        What friction has lost so far at each node, the sum of R dz [J].
+    sliders : Sliders
+        Springs and limits of the nodes.
+    status : 'finished' or 'no-equilibrium'
+        Whether the end of the path was reached. If not, there are only the points up to the last
+        equilibrium that was found.
+    statistics : dict
+        Numbers of increments ``solved``, ``cut``, and of ``jumps``, which no increment however
+        short could follow.
+    """
+
+    system: ContactSystem
+    path: LoadPath
+    given: Array
+    modal_coordinates: Array
+    node: Array
+    slider_force: Array
+    slider_place: Array
+    works: Array
+    node_loss: Array
+    sliders: Sliders
+    status: Literal["finished", "no-equilibrium"]
+    statistics: dict[str, int]
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Points, status, nodes by their state at the end, work and loss."""
+        states = self.contact_state[-1]
+        return [
+            ("points", f"{len(self)} of {sum(self.path.section_steps) + 1}, {self.status}"),
+            ("at the end", ", ".join(f"{np.count_nonzero(states == code)} {name}"
+                                     for code, name in enumerate(STATES))),
+            ("normal force", quantity(float(self.normal_force[-1].sum()), "N", 4)),
+            ("friction force", quantity(float(self.friction_force[-1].sum()), "N", 4)),
+            ("work", quantity(float(self.work[-1]), "J", 4)),
+            ("loss", quantity(float(self.loss[-1]), "J", 4)),
+        ]
+
+    def __len__(self) -> int:
+        return len(self.modal_coordinates)
+
+    @property
+    def normal_force(self) -> Array:
+        """F (N, n) [N]."""
+        return self.node[..., FORCE]
+
+    @property
+    def friction_force(self) -> Array:
+        """R (N, n), on the body in -x [N]."""
+        return self.slider_force.sum(axis=-1)
+
+    @property
+    def friction_limit(self) -> Array:
+        """Largest friction force (N, n) under the normal forces [N]."""
+        return self.sliders.limit.sum(axis=-1) * self.node[..., PRESSING]
+
+    @property
+    def slip(self) -> Array:
+        """Tangential displacement (N, n) of each node relative to the ground [m]."""
+        return self.node[..., PLACE]
+
+    @property
+    def force_against_x(self) -> Array:
+        """Force (N, n) of each node on the body in -x, with what leans on waves [N]."""
+        return self.node[..., AGAINST]
+
+    @property
+    def contact_state(self) -> Integers:
+        """State (N, n) of each node: 0 open, 1 stick, 2 slip."""
+        return np.array([self.state(k).contact_state for k in range(len(self))])
+
+    @property
+    def travel(self) -> Array:
+        """Travel (N,) of the ground [m]."""
+        return self.given[:, -1]
+
+    @property
+    def work(self) -> Array:
+        """Work (N,) done on body and contact so far [J]."""
+        return self.works.sum(axis=1)
+
+    @property
+    def loss(self) -> Array:
+        """What friction has lost so far (N,) [J]."""
+        return self.node_loss.sum(axis=1)
+
+    @property
+    def stored(self) -> Array:
+        """Energy (N,) of the body, the drive's springs, the normal contact and friction springs."""
+        arrays, q = self.system.arrays, self.modal_coordinates
+        m = q.shape[1]
+        ends = self.given[:, m : m + 2]
+        springs = arrays.drive_stiffness
+        body = 0.5 * np.einsum("ni,ij,nj->n", q, arrays.stiffness, q)
+        pulled = ((0.5 * ends - q @ arrays.drive_shapes.T) * springs * ends).sum(axis=1)
+        compliance = np.where(self.sliders.rigid > 0.0, 0.0, 1.0 / np.where(
+            self.sliders.stiffness > 0.0, self.sliders.stiffness, np.inf))
+        friction = 0.5 * (self.slider_force**2 * compliance).sum(axis=(1, 2))
+        return np.asarray(body + pulled + friction
+                          + self.system.stored_energy(self.node[..., PENETRATION]))
+
+    @property
+    def imbalance(self) -> Array:
+        """Work minus loss minus change of the stored energy (N,) [J], zero but for errors."""
+        return self.work - self.loss - (self.stored - self.stored[0])
+
+    def row(self, vertex: int) -> int:
+        """Number of a vertex among the points; negative ones count from the end.
+
+        InputError if there is no such vertex, or the loading did not reach it.
+        """
+        rows = self.path.rows_of_vertices
+        if not isinstance(vertex, int | np.integer) or not -len(rows) <= vertex < len(rows):
+            raise InputError(f"vertex = {vertex!r} must be a whole number from 0 to "
+                             f"{len(rows) - 1}.")
+        if rows[vertex] >= len(self):
+            raise InputError(f"vertex = {vertex!r} was not reached: the loading ended at point "
+                             f"{len(self) - 1} of {rows[-1]} without an equilibrium.")
+        return rows[vertex]
+
+    def state(self, point: int = -1) -> RestState:
+        """The state at a point, by default the last, from which runs and modes can start."""
+        return RestState(self.modal_coordinates[point], self.given[point], self.node[point],
+                         self.slider_force[point], self.slider_place[point], self.sliders)
+
+    def loop(self, first: int = 0, last: int = -1, action: str | None = None) -> Loop:
+        """Force over displacement of an action along a part of the path, and its loss.
+
+        Parameters
+        ----------
+        first, last : int
+            Vertices of the path at which the part begins and ends.
+        action : str, optional
+            As :attr:`Loop.action`; by default the one that does most work, either way.
+
+        Raises
+        ------
+        InputError
+            For vertices that do not exist or were not reached, or an unknown action.
+        """
+        part = slice(self.row(first), self.row(last) + 1)
+        if part.stop - part.start < 2:
+            raise InputError(f"loop: first = {first!r} must be a vertex before last = {last!r}.")
+        found = {name: (place[part], force[part]) for name, place, force in self._actions()}
+        if action is None:
+            action = max(found, key=lambda name: _turnover(*found[name]))
+        elif action not in found:
+            raise InputError(f"loop: action = {action!r} must be one of {choices(found)}"
+                             f"{nearest(str(action), found)}.")
+        loss = self.loss[part]
+        return Loop(action, *found[action], float(loss[-1] - loss[0]))
+
+    def _actions(self) -> Iterator[tuple[str, Array, Array]]:
+        """Name, displacement and force of all that may do work."""
+        q, given, path = self.modal_coordinates, self.given, self.path
+        arrays, m = self.system.arrays, q.shape[1]
+        yield "load", q @ arrays.constant_load, path.at_points(path.load_scale)[: len(self)]
+        for axis, name in enumerate(("motion_x", "motion_y")):
+            end = given[:, m + axis]
+            yield name, end, arrays.drive_stiffness[axis] * (end - q @ arrays.drive_shapes[axis])
+        yield "travel", self.travel, -self.force_against_x.sum(axis=1)
+        for k, values in enumerate(path.forces or ()):
+            yield f"forces.{k}", q @ arrays.load_shapes[k], path.at_points(values)[: len(self)]
+
+
+def _turnover(displacement: Array, force: Array) -> float:
+    """Work by and against a force."""
+    return float(np.abs(0.5 * (force[1:] + force[:-1]) * np.diff(displacement)).sum())

@@ -1,0 +1,238 @@
+"""Quasi-static loading along a path."""
+
+import warnings
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, InputError, ModelWarning
+from fecontact.core.types import Array
+from fecontact.core.units import count
+from fecontact.laws.signals.harmonic import Constant
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.model_limits import limits_exceeded, warn_of_limits
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.increment import (
+    PENETRATION,
+    Pose,
+    Sliders,
+    pose_for,
+    room_for,
+)
+from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, kept_for, march
+from fecontact.system.quasistatic.path import LoadPath
+from fecontact.system.quasistatic.rest_state import RestState
+from fecontact.system.quasistatic.sliders import require_sliders, sliders_of
+from fecontact.system.statics import Balance, resting
+
+
+def load_history(
+    system: ContactSystem,
+    path: LoadPath,
+    *,
+    start: LoadHistory | RestState | None = None,
+    tangential_ratio: float = 0.82,
+    tangential_stiffness: float | Sequence[float] | None = None,
+    rtol: float = 1e-6,
+) -> LoadHistory:
+    r"""Load a system quasi-statically along a path, with friction that keeps its history.
+
+    At each point the equilibrium of the elastic body with the springs of its drive, the normal law
+    at rest and friction is solved. The friction of a node is that of springs c with sliders,
+
+    .. math::
+
+        R^* = c\,(x_j - s - z), \qquad R = R^* \min(1,\ \mu F / |R^*|), \qquad
+        z \leftarrow x_j - s - R / c
+
+    Jenkins' and Iwan's laws have springs and limits of their own. For laws without memory the
+    limit is the coefficient at rest, mu(0+), and the spring is the tangential stiffness of stuck
+    contacts, c_T = tangential_ratio c_N: c_N = dF/du at the first point of the path at which
+    ``load_scale`` is largest, held from then on; a node that is open there has the mean of the
+    others. Where the contact force leans with waves, so it does here; travel of the ground does
+    the work ``-(R + F y_R') ds``. Increments are cut where nodes begin to slip, touch or lift,
+    until work, stored energy and loss agree.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Ground motion and histories of drive and loads in time do not matter: they come from the
+        path.
+    path : LoadPath
+        Loads and motions.
+    start : LoadHistory or RestState, optional
+        Go on from there, with its friction springs. By default the path begins at the equilibrium
+        without friction at its first vertex, so that bodies are pressed together without friction
+        first; a path that begins at a small load presses them with friction.
+    tangential_ratio : float
+        c_T / c_N, above zero; infinite for rigid sticking. 0.82 is 2 (1 - nu) / (2 - nu) of Mindlin
+        for nu = 0.3; measured values reach down to half of it.
+    tangential_stiffness : float or (n,) sequence, optional
+        c_T of the whole face, or of each node [N/m], instead of the ratio.
+    rtol : float
+        Error of work and loss of an increment, relative to the work that friction, and normal
+        forces, do.
+
+    Returns
+    -------
+    LoadHistory
+        Also if the path goes to where there is no equilibrium; see its ``status``.
+
+    Raises
+    ------
+    InputError
+        For friction that is not made of springs and sliders (bristle laws), and values out of
+        range.
+    AnalysisError
+        If the first vertex has no equilibrium without friction.
+
+    Warns
+    -----
+    ModelWarning
+        If the path ends early, if a node jumps, and as for :func:`fecontact.static_equilibrium`.
+
+    References
+    ----------
+    R. D. Mindlin, Compliance of elastic bodies in contact, Journal of Applied Mechanics 16 (1949).
+    """
+    require_kind("load_history", ContactSystem, system=system)
+    require_kind("load_history", LoadPath, path=path)
+    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
+        raise InputError(f"load_history: rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    require_sliders(system)
+    given = _given(system, path)
+    if start is None:
+        m = system.basis.modes
+        balance, q = resting(system, given[0, :m], given[0, m : m + 2], given[0, -1])
+        slope = _slope_under_preload(system, path, given, balance, q, rtol)
+        sliders = sliders_of(system, tangential_ratio, tangential_stiffness, slope)
+        # Sliders begin where the nodes are.
+        place = system.arrays.Tx @ q - given[0, -1]
+        pose = _pose(q, sliders, np.repeat(place[:, None], sliders.limit.shape[1], axis=1))
+        return _loaded(system, path, given, pose, sliders, balance, rtol, 0)
+    require_kind("load_history", (LoadHistory, RestState), start=start)
+    state = start.state() if isinstance(start, LoadHistory) else start
+    state.check(system)
+    pose = _pose(state.modal_coordinates, state.sliders, state.slider_place, state.slider_force)
+    balance = _balance(system, given[0])
+    return _loaded(system, path, np.vstack([state.given, given]), pose, state.sliders, balance,
+                   rtol, 1)
+
+
+def _loaded(
+    system: ContactSystem, path: LoadPath, given: Array, pose: Pose, sliders: Sliders,
+    balance: Balance, rtol: float, skipped: int,
+) -> LoadHistory:
+    """Result of a march, without its first ``skipped`` rows; issues the warnings."""
+    reached, found = _marched(system, given, pose, sliders, balance.scale, rtol)
+    counts = found.counts
+    if reached <= skipped:
+        raise AnalysisError("There is no equilibrium with friction at the first vertex of the "
+                            "path; begin at loads that the state before can carry.")
+    kept = slice(skipped, reached)
+    complete = reached == len(given)
+    history = LoadHistory(
+        system, path, given[kept], found.q[kept], found.node[kept], found.force[kept],
+        found.left[kept], found.work[kept, : len(WORKS)], found.work[kept, len(WORKS) :], sliders,
+        "finished" if complete else "no-equilibrium",
+        {"solved": int(counts[SOLVED]), "cut": int(counts[CUT]), "jumps": int(counts[JUMPS])})
+    if not complete:
+        warnings.warn(
+            f"The path of loads ends at point {len(history) - 1} of {len(given) - 1 - skipped}: "
+            f"there is no equilibrium beyond, as friction or supports do not hold the body; lower "
+            f"the loads, or add a support.", ModelWarning, stacklevel=3)
+    if counts[JUMPS]:
+        warnings.warn(
+            f"Along the path of loads the body jumps {count(int(counts[JUMPS]), 'time')} to "
+            f"another equilibrium; the energy that this sets free is in imbalance, and what really "
+            f"happens then needs a run in time.", ModelWarning, stacklevel=3)
+    states = np.zeros((len(history), system.size))
+    states[:, : system.basis.modes] = history.modal_coordinates
+    warn_of_limits(limits_exceeded(system, np.zeros(len(history)), states),
+                   "Along the path of loads")
+    return history
+
+
+def _marched(
+    system: ContactSystem, given: Array, pose: Pose, sliders: Sliders, scale: Array, rtol: float
+) -> tuple[int, Kept]:
+    """Number of rows reached, and results."""
+    n, m = system.arrays.Tx.shape
+    e = sliders.limit.shape[1]
+    kept = kept_for(len(given), m, n, e)
+    reached = march(system.arrays, sliders, np.ascontiguousarray(given), rtol, pose,
+                    pose_for(m, n, e), room_for(m, n, e, scale), kept)
+    return int(reached), kept
+
+
+def _pose(q: Array, sliders: Sliders, left: Array, force: Array | None = None) -> Pose:
+    pose = pose_for(len(q), *sliders.limit.shape)
+    pose.q[:], pose.left[:] = q, left
+    if force is not None:
+        pose.force[:] = force
+    return pose
+
+
+def _balance(system: ContactSystem, given: Array) -> Balance:
+    arrays = system.arrays
+    return Balance(arrays._replace(
+        constant_load=given[: system.basis.modes].copy(),
+        drive_shapes=np.zeros_like(arrays.drive_shapes),
+        load_shapes=np.zeros_like(arrays.load_shapes)), 0.0, system.penetration_scale)
+
+
+def _given(system: ContactSystem, path: LoadPath) -> Array:
+    """Rows (N, m + 3) of the path: modal forces of the loads, driven ends, travel."""
+    arrays, forces = system.arrays, system.load.forces
+    scale = path.at_points(path.load_scale)
+    loads = np.outer(scale, arrays.constant_load)
+    if path.forces is not None and len(path.forces) != len(forces):
+        raise InputError(f"LoadPath: forces has {len(path.forces)} entries, but the system has "
+                         f"{len(forces)} in load.forces; give one for each.")
+    for k, signal in enumerate(system.load.signals.values()):
+        value = (scale * _constant(signal) if path.forces is None or k >= len(forces)
+                 else path.at_points(path.forces[k]))
+        loads += np.outer(value, arrays.load_shapes[k])
+    ends = [scale * _constant(motion) if own is None else path.at_points(own)
+            for own, motion in zip((path.motion_x, path.motion_y), system.drive.motions,
+                                   strict=True)]
+    return np.ascontiguousarray(np.column_stack([loads, *ends, path.at_points(path.travel)]))
+
+
+def _constant(source: Any) -> float:
+    """Constant part of a signal."""
+    return float(source.value) if isinstance(source, Constant) else 0.0
+
+
+def _slope_under_preload(
+    system: ContactSystem, path: LoadPath, given: Array, balance: Balance, q: Array, rtol: float
+) -> Array:
+    """DF/du (n,) under the largest load of the path, with nodes that stick without limit."""
+    arrays = system.arrays
+    scale = np.abs(path.at_points(path.load_scale))
+    preload = int(np.argmax(scale >= scale.max() * (1.0 - 1e-12)))
+    slope = balance.normal(_penetration(system, given[0], q))[1]
+    if preload == 0:
+        return slope
+    stuck = np.full((len(arrays.gap), 1), max(float(np.max(slope)), float(np.mean(
+        balance.face_stiffness)), 1.0))
+    sliders = Sliders(stuck, np.full_like(stuck, 1e30), np.zeros_like(stuck))
+    place = (arrays.Tx @ q - given[0, -1])[:, None]
+    reached, found = _marched(system, given[[0, preload]], _pose(q, sliders, place), sliders,
+                              balance.scale, max(rtol, 1e-4))
+    if reached < 2:
+        raise AnalysisError("There is no equilibrium under the largest load of the path, even if "
+                            "all nodes stuck; check the sign and place of the loads.")
+    return balance.normal(found.node[1, :, PENETRATION].copy())[1]
+
+
+def _penetration(system: ContactSystem, given: Array, q: Array) -> Array:
+    arrays = system.arrays
+    heights = system.ground.height(arrays.abscissa + arrays.Tx @ q - given[-1])
+    motionless = system.ground.travel(0.0)
+    if motionless != 0.0:
+        heights = system.ground.height(arrays.abscissa + arrays.Tx @ q - given[-1] + motionless)
+    return np.asarray(heights - arrays.Ty @ q - arrays.gap)

@@ -1,0 +1,268 @@
+"""Compiled quasi-static motion along a path of loads, in increments that are cut where needed.
+
+Work is taken by the trapezoidal rule, which is exact for the elastic body. What friction loses is
+exact where displacement and normal force of a node change in proportion within an increment. The
+two disagree where sliders begin to slide or nodes close and open within it; an increment is cut
+until they agree.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import block, borrowed, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.types import Array, Integers
+from fecontact.laws.signatures import normal_at
+from fecontact.system.kernels import SYSTEM
+from fecontact.system.quasistatic.increment import (
+    AGAINST,
+    FORCE,
+    LEANING,
+    NODE_COLUMNS,
+    PENETRATION,
+    PLACE,
+    POSE,
+    PRESSING,
+    ROOM,
+    SLIDERS,
+    find_equilibrium,
+)
+
+# Works that a path does, and the columns of `march` in which they stand before the losses.
+WORKS = ("load", "drive", "travel", "circulatory")
+_LOAD, _DRIVE, _TRAVEL, _CIRCULATORY = range(len(WORKS))
+# Entries of `counts`: increments solved, increments cut, increments with a jump.
+COUNTS = 3
+SOLVED, CUT, JUMPS = range(COUNTS)
+# Shortest increments, as parts of the one asked for: at a jump, and where none is in equilibrium.
+_SHORTEST, _LEAST = 2.0**-40, 2.0**-20
+# Entries of the turnover of an increment.
+ERROR, TURNED, GAP, PRESSED = range(4)
+# Abscissae and weights of Gauss on [0, 1].
+_PLACES = (0.046910077030668, 0.230765344947158, 0.5, 0.769234655052842, 0.953089922969332)
+_WEIGHTS = (0.118463442528095, 0.239314335249683, 0.284444444444444, 0.239314335249683,
+            0.118463442528095)
+
+
+class Kept(NamedTuple):
+    """Results of a march.
+
+    q (N, m), nodes (N, n, 6), forces and places of the sliders (N, n, e), work (N, 4 + n): that of
+    :data:`WORKS` and the loss of each node so far; and numbers of increments.
+    """
+
+    q: Array
+    node: Array
+    force: Array
+    left: Array
+    work: Array
+    counts: Integers
+
+
+KEPT = types.NamedTuple([matrix, block, block, block, matrix, integers], Kept)
+
+
+def kept_for(rows: int, m: int, n: int, sliders: int) -> Kept:
+    """Room for the results."""
+    return Kept(np.zeros((rows, m)), np.zeros((rows, n, NODE_COLUMNS)),
+                np.zeros((rows, n, sliders)), np.zeros((rows, n, sliders)),
+                np.zeros((rows, len(WORKS) + n)), np.zeros(COUNTS, dtype=np.int64))
+
+
+@helper
+def _apply(given, s, load):
+    """Fill load (m,) from a row of given loads and motions; returns the travel."""
+    m = len(load)
+    for i in range(m):
+        load[i] = given[i]
+        for axis in range(2):
+            load[i] += given[m + axis] * s.drive_stiffness[axis] * s.drive_shapes[axis, i]
+    return given[m + 2]
+
+
+@helper
+def _pressed_energy(j, before, after, s):
+    """Energy that the normal law of node j stores between two penetrations."""
+    total = 0.0
+    for k in range(len(_PLACES)):
+        u = before + _PLACES[k] * (after - before)
+        total += _WEIGHTS[k] * normal_at(s.normal[j])(u, 0.0, s.normal_parameters[j])[0]
+    return total * (after - before)
+
+
+@helper
+def _slid(j, e, old, new, sliders):
+    """What slider e of node j loses between two poses, in proportional motion."""
+    way = new.left[j, e] - old.left[j, e]
+    if way == 0.0:
+        return 0.0
+    limit = sliders.limit[j, e] if way > 0.0 else -sliders.limit[j, e]
+    P0, P1 = old.node[j, PRESSING], new.node[j, PRESSING]
+    begin = 0.0
+    if sliders.rigid[j, e] == 0.0:
+        # Sliding begins where the spring reaches its limit.
+        rise = sliders.stiffness[j, e] * (new.node[j, PLACE] - old.node[j, PLACE])
+        nearing = rise - limit * (P1 - P0)
+        if nearing * way > 0.0:
+            begin = min(max((limit * P0 - old.force[j, e]) / nearing, 0.0), 1.0)
+    return 0.5 * limit * (P0 + begin * (P1 - P0) + P1) * way
+
+
+@helper
+def _works(old, new, given, s, out):
+    """Fill out (4,) with the works of an increment between the rows of ``given`` (2, m + 3)."""
+    m = len(old.q)
+    for i in range(len(WORKS)):
+        out[i] = 0.0
+    for i in range(m):
+        moved = new.q[i] - old.q[i]
+        out[_LOAD] += 0.5 * (given[0, i] + given[1, i]) * moved
+        for k in range(m):
+            out[_CIRCULATORY] -= 0.25 * (s.stiffness[i, k] - s.stiffness[k, i]) * (
+                old.q[k] + new.q[k]) * moved
+    for axis in range(2):
+        stretch = given[0, m + axis] + given[1, m + axis]
+        for i in range(m):
+            stretch -= s.drive_shapes[axis, i] * (old.q[i] + new.q[i])
+        out[_DRIVE] += 0.5 * s.drive_stiffness[axis] * stretch * (
+            given[1, m + axis] - given[0, m + axis])
+    travelled = given[1, m + 2] - given[0, m + 2]
+    for j in range(len(old.node)):
+        out[_TRAVEL] -= 0.5 * (old.node[j, AGAINST] + new.node[j, AGAINST]) * travelled
+        if not s.leans:
+            # Ground that pushes vertically lifts the node wherever it moves along.
+            out[_TRAVEL] += 0.5 * (old.node[j, LEANING] + new.node[j, LEANING]) * (
+                new.node[j, PLACE] - old.node[j, PLACE])
+
+
+@kernel(types.void(SYSTEM, SLIDERS, POSE, POSE, matrix, vector, vector))
+def _measure(held_s, held_sliders, held_old, held_new, given, part, turnover):
+    """Fill part (4 + n,) with the works and losses of an increment, and ``turnover`` (4,).
+
+    The latter are the error and the work of friction, and those of the normal forces.
+    """
+    s, sliders = borrowed(held_s), borrowed(held_sliders)
+    old, new = borrowed(held_old), borrowed(held_new)
+    _works(old, new, given, s, part)
+    error, turned, gap, pressed = 0.0, 0.0, 0.0, 0.0
+    for j in range(len(old.node)):
+        lost = 0.0
+        along = new.node[j, PLACE] - old.node[j, PLACE]
+        for e in range(sliders.stiffness.shape[1]):
+            loss = _slid(j, e, old, new, sliders)
+            mean = 0.5 * (old.force[j, e] + new.force[j, e])
+            lost += loss
+            error += abs(mean * (new.left[j, e] - old.left[j, e]) - loss)
+            turned += abs(mean * along)
+        part[len(WORKS) + j] = lost
+        # By the trapezoidal rule F du is F y_R' dg - F dy.
+        F = 0.5 * (old.node[j, FORCE] + new.node[j, FORCE])
+        lean = 0.5 * (old.node[j, LEANING] + new.node[j, LEANING])
+        lifted = 0.0
+        for i in range(len(old.q)):
+            lifted += s.Ty[j, i] * (new.q[i] - old.q[i])
+        before, after = old.node[j, PENETRATION], new.node[j, PENETRATION]
+        gap += _pressed_energy(j, before, after, s) - lean * along + F * lifted
+        pressed += abs(F * (after - before)) + abs(lean * along)
+    turnover[ERROR], turnover[TURNED] = error, turned
+    turnover[GAP], turnover[PRESSED] = abs(gap), pressed
+
+
+@helper
+def _copy(source, target):
+    """Copy a pose."""
+    for i in range(len(source.q)):
+        target.q[i] = source.q[i]
+    for j in range(len(source.node)):
+        for k in range(source.node.shape[1]):
+            target.node[j, k] = source.node[j, k]
+        for k in range(source.force.shape[1]):
+            target.force[j, k] = source.force[j, k]
+            target.left[j, k] = source.left[j, k]
+
+
+@helper
+def _keep(row, pose, total, kept):
+    """Write a pose, and works and losses so far, as a row of the results."""
+    for i in range(len(pose.q)):
+        kept.q[row, i] = pose.q[i]
+    for j in range(len(pose.node)):
+        for k in range(pose.node.shape[1]):
+            kept.node[row, j, k] = pose.node[j, k]
+        for k in range(pose.force.shape[1]):
+            kept.force[row, j, k] = pose.force[j, k]
+            kept.left[row, j, k] = pose.left[j, k]
+    for i in range(len(total)):
+        kept.work[row, i] = total[i]
+
+
+@kernel(types.i8(SYSTEM, SLIDERS, matrix, f8, POSE, POSE, ROOM, KEPT))
+def march(held_s, held_sliders, given, rtol, held_old, held_new, held_room, held_kept):
+    """Go along rows of given loads and motions (N, m + 3): modal loads, drive in x and y, travel.
+
+    ``old`` holds the pose at the first row, whose F and places are found here; ``new`` is room.
+    Fills ``kept`` and returns the number of rows that were reached.
+    """
+    s, sliders, room = borrowed(held_s), borrowed(held_sliders), borrowed(held_room)
+    old, new, kept = borrowed(held_old), borrowed(held_new), borrowed(held_kept)
+    rows, m = len(given), len(old.q)
+    size = kept.work.shape[1]
+    load, ends = np.empty(m), np.zeros((2, m + 3))
+    part, total, turnover = np.zeros(size), np.zeros(size), np.zeros(4)
+    rubbed, pressed, rubbing, pressing = 0.0, 0.0, 0.0, 0.0
+    row, done, proposed, failed, steepness = 0, 0.0, 1.0, 2.0, 0.0
+    while row < rows:
+        goal = min(1.0, done + proposed)
+        if failed <= 1.0:
+            # The whole rest up to where it failed, if it is short enough by then; or half of it.
+            rest = failed - done
+            goal = failed if steepness * rest * rest <= 1.0 else done + 0.5 * rest
+        length = goal - done
+        last = max(row - 1, 0)
+        for i in range(m + 3):
+            ends[1, i] = given[row, i] if goal == 1.0 else (
+                given[last, i] + goal * (given[row, i] - given[last, i]))
+        _copy(old, new)
+        travel = _apply(ends[1], s, load)
+        solved = find_equilibrium(load, travel, sliders, s, new, room)
+        kept.counts[SOLVED] += 1
+        excess = np.inf if row > 0 else 0.0
+        turnover[TURNED], turnover[PRESSED] = 0.0, 0.0
+        if solved and row > 0:
+            _measure(s, sliders, old, new, ends, part, turnover)
+            turned, moved = turnover[TURNED], turnover[PRESSED]
+            if length == 1.0:
+                rubbed, pressed = max(rubbed, turned), max(pressed, moved)
+            floor = rubbed + pressed
+            for i in range(len(WORKS)):
+                floor += abs(part[i])
+            floor = 1e-14 * floor + 1e-300
+            excess = max(turnover[ERROR] / (rtol * max(rubbed, rubbing + turned) + floor),
+                         turnover[GAP] / (rtol * max(pressed, pressing + moved) + floor))
+        if not solved and (row == 0 or length <= _LEAST):
+            return row
+        if excess > 1.0:
+            if not solved or length > _SHORTEST:
+                kept.counts[CUT] += 1
+                failed = goal
+                steepness = excess / (length * length)
+                continue
+            kept.counts[JUMPS] += 1
+        for i in range(size):
+            total[i] += part[i]
+        _copy(new, old)
+        for i in range(m + 3):
+            ends[0, i] = ends[1, i]
+        done = goal
+        rubbing += turnover[TURNED]
+        pressing += turnover[PRESSED]
+        if goal >= failed or not np.isfinite(steepness):
+            failed = 2.0
+        proposed = length * min(8.0, max(0.9 / np.sqrt(max(excess, 1e-4)), 1.0))
+        if done == 1.0:
+            _keep(row, old, total, kept)
+            rubbed, pressed = max(rubbed, rubbing), max(pressed, pressing)
+            rubbing, pressing = 0.0, 0.0
+            row, done, proposed, failed = row + 1, 0.0, 1.0, 2.0
+    return rows

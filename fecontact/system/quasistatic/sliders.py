@@ -1,0 +1,113 @@
+"""Sliders of the contact nodes of a system: springs of friction laws, or of stuck contacts."""
+
+import math
+from collections.abc import Sequence
+from numbers import Real
+
+import numpy as np
+
+from fecontact.core.checks import as_floats
+from fecontact.core.errors import InputError, shown
+from fecontact.core.types import Array
+from fecontact.laws.friction_curve import static_coefficient
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.quasistatic.increment import Sliders
+
+# Penalty of rigid sticking, in stiffnesses of the contact or the body.
+_PENALTY = 1e3
+
+
+def require_sliders(system: ContactSystem) -> None:
+    """Raise InputError for friction with internal variables that are not deflections of springs."""
+    for _, share, law in system.law_groups("friction"):
+        if law.memory and law.sliders(share) is None:
+            raise InputError(f"{type(law).__name__} has no quasi-static limit made of springs and "
+                             f"sliders; use JenkinsFriction, IwanFriction or a law without memory.")
+
+
+def sliders_of(
+    system: ContactSystem, tangential_ratio: float,
+    tangential_stiffness: float | Sequence[float] | None, normal_slope: Array,
+) -> Sliders:
+    """Springs and limits of all contact nodes.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        Its Jenkins and Iwan laws have springs of their own.
+    tangential_ratio : float
+        c_T / c_N of all others, infinite for rigid sticking.
+    tangential_stiffness : float or (n,) sequence, optional
+        c_T of the whole face, or of each node [N/m], instead of the ratio.
+    normal_slope : (n,) array
+        c_N = dF/du under the preload [N/m]; nodes that are open there take the mean of the others
+        by their share of the face.
+
+    Raises
+    ------
+    InputError
+        For values that are not above zero, and where there is no c_N for the ratio.
+    """
+    n = system.basis.contact_nodes
+    groups = [(nodes, share, law, law.sliders(share) if law.memory else None)
+              for nodes, share, law in system.law_groups("friction")]
+    width = max(law.memory or 1 for _, _, law, _ in groups)
+    stiffness, limit, rigid = np.zeros((3, n, width))
+    plain = np.ones(n, dtype=bool)
+    for nodes, _, law, springs in groups:
+        if springs is not None:
+            stiffness[nodes, : law.memory], limit[nodes, : law.memory] = springs
+            plain[nodes] = False
+        else:
+            limit[nodes, 0] = static_coefficient(law, nodes.stop - nodes.start)
+    if plain.any():
+        share = system.share
+        given = _given(tangential_ratio, tangential_stiffness, n, share)
+        slope = _everywhere(normal_slope, share)
+        if given is not None:
+            held = given
+        elif math.isinf(tangential_ratio):
+            held = np.full(n, np.inf)
+        elif slope.any() or not limit[plain].any():
+            # Without friction no stiffness is needed.
+            held = tangential_ratio * np.where(slope > 0.0, slope, 1.0)
+        else:
+            raise InputError("The normal law has no stiffness under the preload, from which that "
+                             "of stuck contacts could follow; give tangential_stiffness, or "
+                             "tangential_ratio = inf for rigid sticking.")
+        infinite = np.isinf(held)
+        held = np.where(infinite, _penalty(system, slope), held)
+        stiffness[plain, 0], rigid[plain, 0] = held[plain], infinite[plain]
+    return Sliders(stiffness, limit, rigid)
+
+
+def _given(
+    ratio: float, stiffness: float | Sequence[float] | None, n: int, share: Array
+) -> Array | None:
+    """Stiffness (n,) that was given, if it was."""
+    if not (isinstance(ratio, Real) and not isinstance(ratio, bool) and ratio > 0.0):
+        raise InputError(f"tangential_ratio = {shown(ratio)} must be a number above zero; inf for "
+                         f"rigid sticking.")
+    if stiffness is None:
+        return None
+    values = as_floats(stiffness, "tangential_stiffness")
+    if values.shape not in ((), (n,)) or not (values > 0.0).all():
+        raise InputError(f"tangential_stiffness = {shown(stiffness)} must be one number above "
+                         f"zero, or one for each of the {n} contact nodes.")
+    return values * share if values.ndim == 0 else values
+
+
+def _everywhere(slope: Array, share: Array) -> Array:
+    """Slopes (n,) of closed nodes, and for open ones the mean of these by share."""
+    closed = slope > 0.0
+    if not closed.any():
+        return np.zeros_like(slope)
+    return np.where(closed, slope, share * slope[closed].sum() / share[closed].sum())
+
+
+def _penalty(system: ContactSystem, slope: Array) -> Array:
+    """Penalty (n,) for rigid sticking, well above the stiffness of contact and body."""
+    rows = system.arrays.Tx
+    size = np.maximum((rows**2).sum(axis=1), 1e-300)
+    body = ((rows**2) @ np.abs(np.diag(system.arrays.stiffness))) / size**2
+    return _PENALTY * np.maximum(np.maximum(slope, body), 1e-6 * max(body.max(), slope.max(), 1.0))

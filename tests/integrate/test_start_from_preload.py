@@ -1,0 +1,92 @@
+"""Runs that start at rest under friction, where a path of loads ended."""
+
+import numpy as np
+import pytest
+
+from fecontact import (
+    ContactSystem,
+    Ground,
+    InputError,
+    Load,
+    LoadPath,
+    PointLoad,
+    basis_from_matrices,
+    load_history,
+    simulate,
+)
+from fecontact.integrate import SetValued
+from fecontact.laws import (
+    Constant,
+    ConstantFriction,
+    DahlFriction,
+    IwanFriction,
+    JenkinsFriction,
+    LinearContact,
+)
+
+K = 1e4
+
+
+def chain(friction, force, **parts):
+    """Two masses that move along the ground and up and down, joined by a spring along it."""
+    rows = np.zeros((2, 3, 4))
+    rows[0, 0, 0] = rows[0, 1, 1] = rows[1, 0, 2] = rows[1, 1, 3] = 1.0
+    stiffness = np.zeros((4, 4))
+    stiffness[::2, ::2] = [[K, -K], [-K, K]]
+    basis = basis_from_matrices(np.eye(4), stiffness, {"contact": rows})
+    forces = (*(PointLoad(k, "y", signal=Constant(-10.0)) for k in (0, 1)),
+              PointLoad(1, "x", signal=Constant(force)))
+    return ContactSystem(basis, normal=LinearContact(2e6, 50.0), friction=friction,
+                         load=Load(forces=forces), **parts)
+
+
+def loaded(friction, **options):
+    """The chain under 6 N, after 8 N, at which its second node has slid."""
+    path = LoadPath(forces=(-10.0, -10.0, (0.0, 8.0, 6.0)))
+    return load_history(chain(friction, 6.0), path, **options)
+
+
+@pytest.mark.parametrize("friction", [JenkinsFriction(6e4, 0.5), IwanFriction(6e4, 0.5)])
+def test_springs_hold_what_they_held(friction):
+    history = loaded(friction)
+    assert (history.friction_force[-1] > 1.0).all()
+    run = simulate(history.system, 0.2, initial=history, outputs=201)
+    assert np.abs(run.modal_velocities).max() < 1e-8
+    assert np.abs(run.modal_coordinates - history.modal_coordinates[-1]).max() < 1e-9
+    assert run.friction_force[-1] == pytest.approx(history.friction_force[-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("ratio", [0.82, np.inf])
+@pytest.mark.parametrize("scheme", ["events", "stepping"])
+def test_set_valued_friction_holds_what_it_held(ratio, scheme):
+    history = loaded(ConstantFriction(0.5), tangential_ratio=ratio)
+    run = simulate(history.system, 0.2, initial=history.state(), outputs=101,
+                   solver=SetValued(scheme=scheme))
+    assert np.abs(run.modal_velocities).max() < 1e-8
+    assert np.abs(run.modal_coordinates - history.modal_coordinates[-1]).max() < 1e-9
+    assert run.friction_force[-1] == pytest.approx(history.friction_force[-1], rel=1e-6)
+
+
+def test_without_the_preload_the_masses_move():
+    history = loaded(JenkinsFriction(6e4, 0.5))
+    run = simulate(history.system, 0.02, outputs=51)
+    assert np.abs(run.modal_velocities).max() > 1e-3
+
+
+def test_smoothed_friction_creeps_from_where_it_was():
+    history = loaded(ConstantFriction(0.5, 1e6))
+    run = simulate(history.system, 0.01, initial=history, outputs=51)
+    start = history.modal_coordinates[-1]
+    assert run.modal_coordinates[0] == pytest.approx(start)
+    assert 1e-10 < np.abs(run.modal_coordinates[-1] - start).max() < 1e-7
+
+
+def test_other_friction_and_other_ground_are_refused():
+    history = loaded(JenkinsFriction(6e4, 0.5))
+    with pytest.raises(InputError, match="cannot go on from this state"):
+        simulate(chain(DahlFriction(0.5, 1e5), 6.0), 0.1, initial=history)
+    path = LoadPath(forces=(-10.0, -10.0, 0.0), travel=(0.0, 1e-4))
+    wavy = chain(JenkinsFriction(6e4, 0.5), 0.0, ground=Ground(amplitude=1e-6))
+    moved = load_history(wavy, path)
+    with pytest.raises(InputError, match="has travelled 0"):
+        simulate(wavy, 0.1, initial=moved)
