@@ -25,6 +25,7 @@ from fecontact.core.units import Summarised, listed, quantity
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.integrate.events import ContactEvents
+from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import Rodas5P
 from fecontact.integrate.trajectory import Trajectory
@@ -322,6 +323,11 @@ class Study(Summarised):
         with located(f"{title}: [preload]:", "LoadPath"):
             return self.preload.load(system)
 
+    def initial(self) -> Initial:
+        """What a run begins from: ``[simulation]``'s ``initial``, or the end of ``[preload]``."""
+        given = self.simulation.initial
+        return self.load_history() if given == "preload" else given
+
     def run(
         self, progress: bool | Callable[[float], None] | None = None,
         checkpoint: Path | None = None,
@@ -339,9 +345,7 @@ class Study(Summarised):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
-        initial: Any = settings.initial
-        if initial == "preload":
-            initial = self.load_history()
+        initial = self.initial()
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=initial, outputs=settings.outputs,
@@ -364,7 +368,7 @@ class Study(Summarised):
             return wear_history(
                 system, law, self.body.thickness, acceleration=wanted.acceleration,
                 blocks=wanted.blocks, periods=wanted.periods, settling=wanted.settling,
-                period=wanted.period, initial=settings.initial, outputs=wanted.outputs,
+                period=wanted.period, initial=self.initial(), outputs=wanted.outputs,
                 solver=settings.chosen_solver(), rtol=settings.rtol, progress=progress)
 
     @cached_property

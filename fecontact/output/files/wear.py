@@ -29,7 +29,7 @@ def write_wear(path: str | Path, history: WearHistory) -> Path:
     """
     require_kind("write_wear", WearHistory, history=history)
     law = history.law
-    require_kind("write_wear", EnergyWear | ArchardWear, law=law)
+    require_kind("write_wear", (EnergyWear, ArchardWear), law=law)
     with new_file(path) as file:
         group = file.create_group("wear")
         group.attrs.update(
