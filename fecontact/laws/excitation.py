@@ -205,7 +205,7 @@ class Load:
         F_N0, positive towards the ground [N]: the constant load ``[0, -normal, 0]`` at C.
     forces : sequence of PointLoad
         Further forces and moments at points.
-    gravity : (float, float)
+    gravity : (float, float), optional
         Acceleration g in x and y, (0, -9.81) towards ground below the body [m/s^2].
     base_acceleration_x, base_acceleration_y : Signal, optional
         Acceleration a of the base in the inertial frame [m/s^2].
@@ -220,18 +220,19 @@ class Load:
 
     normal: Annotated[float, Unit("N")] = 0.0
     forces: tuple[PointLoad, ...] = ()
-    gravity: Annotated[tuple[float, float], Unit("m/s^2")] = (0.0, 0.0)
+    gravity: Annotated[tuple[float, float] | None, Unit("m/s^2")] = None
     base_acceleration_x: Annotated[Signal | None, Unit("m/s^2")] = None
     base_acceleration_y: Annotated[Signal | None, Unit("m/s^2")] = None
     boundaries: tuple[BoundaryLoad, ...] = ()
 
     def __post_init__(self) -> None:
         require_finite("Load", normal=self.normal)
-        gravity = as_floats(self.gravity, "Load: gravity")
-        if gravity.shape != (2,) or not np.isfinite(gravity).all():
-            raise InputError(f"Load: gravity = {self.gravity!r} must be two finite numbers, the "
-                             f"accelerations in x and y [m/s^2].")
-        object.__setattr__(self, "gravity", tuple(gravity.tolist()))
+        if self.gravity is not None:
+            gravity = as_floats(self.gravity, "Load: gravity")
+            if gravity.shape != (2,) or not np.isfinite(gravity).all():
+                raise InputError(f"Load: gravity = {self.gravity!r} must be two finite numbers, "
+                                 f"the accelerations in x and y [m/s^2].")
+            object.__setattr__(self, "gravity", tuple(gravity.tolist()))
         for name, kind in (("forces", PointLoad), ("boundaries", BoundaryLoad)):
             given = getattr(self, name)
             if not isinstance(given, tuple | list) or not all(

@@ -339,7 +339,7 @@ class ContactSystem(Summarised):
 
 def _load_summary(load: Load) -> str:
     parts = [quantity(load.normal, "N")]
-    if any(load.gravity):
+    if load.gravity is not None:
         parts.append(f"gravity ({load.gravity[0]:.4g}, {load.gravity[1]:.4g}) m/s²")
     if load.boundaries:
         parts.append(f"on {listed([one.boundary for one in load.boundaries])}")

@@ -46,7 +46,7 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
     if load.normal:
         yield ActingLoad(f"normal = {load.normal!r}", basis.T[1, 1], -load.normal,
                          "'C' moves along y")
-    for axis, g in enumerate(load.gravity):
+    for axis, g in enumerate(load.gravity or ()):
         if g:
             what = f"gravity = {load.gravity}"
             yield ActingLoad(what, _inertia(basis, what)[axis], g,

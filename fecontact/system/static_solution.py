@@ -88,7 +88,7 @@ def nodal_forces(
         total += value(force.signal) * at(force.point)[_COMPONENTS.index(force.component)]
     carried = [0.0 if signal is None else value(signal)
                for signal in (load.base_acceleration_x, load.base_acceleration_y)]
-    acceleration = np.array(load.gravity) - carried
+    acceleration = np.array(load.gravity or (0.0, 0.0)) - carried
     if acceleration.any():
         total += inertia_forces(body) @ acceleration
     for one in load.boundaries:
