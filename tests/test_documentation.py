@@ -176,10 +176,20 @@ def check_set_valued(names, printed, folder):
     assert 0.97 < float(printed) <= 1.0 + 1e-9
 
 
+def check_rotation(names, printed, folder):
+    lines = printed.splitlines()
+    assert [line.endswith(" []") for line in lines[:2]] == [True, False]
+    first = [float(re.search(r"\[ *([\d.]+)", line).group(1)) for line in lines[2:]]
+    # Clamped beam of 29.86 rad/s: 3.516, and sqrt(11.2023^2 - 10^2) at ten times that.
+    unit = np.sqrt(2.1e11 * 0.02**2 / (12.0 * 7850.0)) / (2.0 * np.pi)
+    assert first[0] == pytest.approx(3.516 * unit, rel=2e-3)
+    assert first[1] == pytest.approx(5.049 * unit, rel=2e-2)
+
+
 CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
-          "set-valued.md": check_set_valued}
+          "set-valued.md": check_set_valued, "rotation.md": check_rotation}
 
 
 def test_every_page_with_code_is_known():
