@@ -188,6 +188,8 @@ def check_loads(names, printed, folder):
     assert np.abs(names["resting"].displacement).max() < np.abs(names["same"].displacement).max()
     assert (folder / "stress.png").stat().st_size > 10_000
     assert (folder / "stress.vtu").exists()
+
+
 def check_preload(names, printed, folder):
     # 4 mu F (X - mu F / k), where the spring of the body takes what friction does not.
     amplitude = (30.0 - 20.0) / 1e5
@@ -198,11 +200,21 @@ def check_preload(names, printed, folder):
     assert all((folder / name).stat().st_size > 5000 for name in ("shear.png", "loop.png"))
 
 
+def check_rotation(names, printed, folder):
+    lines = printed.splitlines()
+    assert [line.endswith(" []") for line in lines[:2]] == [True, False]
+    first = [float(re.search(r"\[ *([\d.]+)", line).group(1)) for line in lines[2:]]
+    # Clamped beam of 29.86 rad/s: 3.516, and sqrt(11.2023^2 - 10^2) at ten times that.
+    unit = np.sqrt(2.1e11 * 0.02**2 / (12.0 * 7850.0)) / (2.0 * np.pi)
+    assert first[0] == pytest.approx(3.516 * unit, rel=2e-3)
+    assert first[1] == pytest.approx(5.049 * unit, rel=2e-2)
+
+
 CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,
-          "preload.md": check_preload}
+          "preload.md": check_preload, "rotation.md": check_rotation}
 
 
 def test_every_page_with_code_is_known():

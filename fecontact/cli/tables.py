@@ -55,9 +55,10 @@ def run_table(trajectory: "Trajectory") -> Any:
 
 def complex_table(modes: "ComplexModes") -> Any:
     """Frequencies and damping ratios of complex modes, and which of them grow."""
-    rows = [(str(number), f"{hertz:.6g}", f"{ratio:.3%}", "grows" if ratio < 0.0 else "")
-            for number, (hertz, ratio) in enumerate(zip(
-                modes.frequencies_hz.tolist(), modes.damping_ratios.tolist(), strict=True))]
+    rows = [(str(number), f"{hertz:.6g}", f"{ratio:.3%}", "grows" if grows else "")
+            for number, (hertz, ratio, grows) in enumerate(zip(
+                modes.frequencies_hz.tolist(), modes.damping_ratios.tolist(),
+                modes.grows.tolist(), strict=True))]
     return table("mode", "frequency [Hz]", "damping", "", rows=rows)
 
 

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.core.units import quantity
 from fecontact.reduction.modal_basis import ModalBasis
 
 # Acceptable error of static compliance, below the uncertainty of contact laws.
@@ -149,6 +150,9 @@ class BasisReport:
         if self.highest_frequency_hz > 0.0:
             lines.append(f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by "
                          f"steps of {self.time_step:.2g} s")
+        if basis.rotation is not None:
+            lines.append(f"frequencies are those at rest, the body rotates at "
+                         f"{quantity(basis.rotation.speed, 'rad/s')}")
         lines.append(self.recommendation)
         return "\n".join(lines)
 

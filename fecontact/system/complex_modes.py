@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike, ComplexArray
@@ -118,9 +119,16 @@ class ComplexModes(Summarised):
         """Complex displacement (points, 3) of one mode at B, C, the contact and further points."""
         return np.asarray(basis.T @ self.right[: basis.modes, mode])
 
+    @property
+    def grows(self) -> NDArray[np.bool_]:
+        """Whether each mode grows (r,); real parts of the size of round-off count as zero."""
+        size = np.abs(self.eigenvalues)
+        largest = max(size.max(initial=0.0), np.abs(self.real_eigenvalues).max(initial=0.0))
+        return np.asarray(self.eigenvalues.real > 1e-10 * size + 1e-13 * largest)
+
     def growing(self) -> Array:
-        """Frequencies of the modes with negative damping [Hz]."""
-        return self.frequencies_hz[self.damping_ratios < 0.0]
+        """Frequencies of the modes that grow [Hz]."""
+        return self.frequencies_hz[self.grows]
 
 
 def _biorthonormal(

@@ -35,6 +35,7 @@ def test_gyroscopic_frequencies():
     modes = complex_modes(basis)
     assert 2.0 * np.pi * modes.frequencies_hz == pytest.approx([1.0, 9.0], rel=1e-12)
     assert modes.damping_ratios == pytest.approx([0.0, 0.0], abs=1e-13)
+    assert not modes.grows.any()
 
 
 def test_left_eigenvectors_are_biorthonormal():

@@ -23,6 +23,7 @@ from fecontact.analysis import complex_modes
 from fecontact.bifurcation import contact_field, stability_map
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import ConstantFriction, LinearContact
+from fecontact.reduction import BasisReport
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 
@@ -192,6 +193,7 @@ def test_speed_of_a_basis_is_a_parameter(tmp_path):
     assert (part.stiffness == moved.stiffness[np.ix_([0, 2], [0, 2])]).all()
     assert (part.centrifugal_load == moved.centrifugal_load[[0, 2]]).all()
     assert "rotation: 300 rad/s" in str(moved)
+    assert "at rest, the body rotates at 300 rad/s" in str(BasisReport(moved))
     system = apart(other)
     assert system.parameter("basis.rotation.speed") == 40.0
     name = "basis.rotation.speed"

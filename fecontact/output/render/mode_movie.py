@@ -194,4 +194,4 @@ def _chosen(
     ratio = modes.damping_ratios[mode]
     return (np.asarray(modes.right[: basis.modes, mode]),
             f"mode {mode}: {modes.frequencies_hz[mode]:.5g} Hz, damping ratio {ratio:.2%}"
-            f"{', grows' if ratio < 0.0 else ''}")
+            f"{', grows' if modes.grows[mode] else ''}")
