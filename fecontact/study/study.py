@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from fecontact.core.units import Summarised, listed, quantity
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.integrate.events import ContactEvents
+from fecontact.integrate.initial_state import RigidStart
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import Rodas5P
 from fecontact.integrate.trajectory import Trajectory
@@ -317,6 +318,11 @@ class Study(Summarised):
         with located(f"{title}: [preload]:", "LoadPath"):
             return self.preload.load(system)
 
+    def initial(self) -> Literal["rest", "sliding"] | RigidStart | LoadHistory:
+        """Initial state of the run; for 'preload' the loading at whose end it starts."""
+        given = self.simulation.initial
+        return self.load_history() if given == "preload" else given
+
     def run(
         self, progress: bool | Callable[[float], None] | None = None,
         checkpoint: Path | None = None,
@@ -334,9 +340,7 @@ class Study(Summarised):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
-        initial: Any = settings.initial
-        if initial == "preload":
-            initial = self.load_history()
+        initial = self.initial()
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=initial, outputs=settings.outputs,

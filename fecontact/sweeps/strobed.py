@@ -35,7 +35,7 @@ def strobed_rows(
             system, settings = study.system(), study.simulation
             system.basis.point_index(strobing.point)
             times = settings.t_start + strobe_times(forcing_period(system), strobing)
-            state = initial_state(system, settings.initial, settings.t_start)
+            state = initial_state(system, study.initial(), settings.t_start)
         except FecontactError as error:
             rows[case.key] = Row(case=case.key, values={}, reason=str(error))
         else:

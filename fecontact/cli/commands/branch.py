@@ -48,10 +48,10 @@ def branch(
         with waiting("Computing modes"):
             system = described.system()
         with titled_bar() as progress:
-            result = follow_branches(system, wanted, described.simulation.initial, progress)
+            result = follow_branches(system, wanted, described.initial(), progress)
         beneath = None
         if wanted.poincare_scan and not result.interrupted:
-            beneath = runs_beneath(system, wanted, described.simulation.initial)
+            beneath = runs_beneath(system, wanted, described.initial())
         with waiting("Writing"):
             files = write_branch_results(result, wanted, folder, described.name, beneath)
         for name, found in result.found.items():

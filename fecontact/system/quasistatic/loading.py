@@ -210,7 +210,7 @@ def _constant(source: Any) -> float:
 def _slope_under_preload(
     system: ContactSystem, path: LoadPath, given: Array, balance: Balance, q: Array, rtol: float
 ) -> Array:
-    """DF/du (n,) under the largest load of the path, with nodes that stick without limit."""
+    """Slope dF/du (n,) under the largest load of the path, with nodes that stick without limit."""
     arrays = system.arrays
     scale = np.abs(path.at_points(path.load_scale))
     preload = int(np.argmax(scale >= scale.max() * (1.0 - 1e-12)))
@@ -230,9 +230,7 @@ def _slope_under_preload(
 
 
 def _penetration(system: ContactSystem, given: Array, q: Array) -> Array:
+    """Penetration (n,) at a row of given loads and motions."""
     arrays = system.arrays
     heights = system.ground.height(arrays.abscissa + arrays.Tx @ q - given[-1])
-    motionless = system.ground.travel(0.0)
-    if motionless != 0.0:
-        heights = system.ground.height(arrays.abscissa + arrays.Tx @ q - given[-1] + motionless)
     return np.asarray(heights - arrays.Ty @ q - arrays.gap)
