@@ -27,6 +27,12 @@ def _frictionless(v, F, p):
     return 0.0, 0.0, 0.0
 
 
+@friction_law
+def follower(v, F, p):
+    """R = p[0] F, whatever the slip velocity: a contact that slides on at rest."""
+    return p[0] * F, 0.0, p[0]
+
+
 @signal
 def _still(t, p):
     return p[0], 0.0

@@ -61,7 +61,23 @@ class Loop(Summarised):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoadHistory(Summarised):
-    """Equilibria along a path of quasi-static loading.
+    r"""Equilibria along a path of quasi-static loading.
+
+    The friction of a node is that of springs c with sliders,
+
+    .. math::
+
+        R^* = c\,(x_j - s - z), \qquad R = R^* \min(1,\ \mu F / |R^*|), \qquad
+        z \leftarrow x_j - s - R / c
+
+    Jenkins' and Iwan's laws have springs and limits of their own. For laws without memory the
+    limit is the coefficient at rest, mu(0+), and the spring is the tangential stiffness of stuck
+    contacts, c_T = tangential_ratio c_N, with c_N = dF/du at the first point of the path at which
+    ``load_scale`` is largest, held all along; a node that is open there has the mean of the others.
+    The ratio 0.82 is 2 (1 - nu) / (2 - nu) of Mindlin for nu = 0.3; measured values reach down to
+    half of it. Where the contact force leans with waves, so it does here; travel of the ground does
+    the work ``-(R + F y_R') ds``. Increments are cut where nodes begin to slip, touch or lift,
+    until work, stored energy and loss agree.
 
     Attributes
     ----------
@@ -90,6 +106,10 @@ class LoadHistory(Summarised):
     statistics : dict
         Numbers of increments ``solved``, ``cut``, and of ``jumps``, which no increment however
         short could follow.
+
+    References
+    ----------
+    R. D. Mindlin, Compliance of elastic bodies in contact, Journal of Applied Mechanics 16 (1949).
     """
 
     system: ContactSystem

@@ -11,6 +11,8 @@ lambda is zero for a spring c, and the force so far of a slider that sticks rigi
 penalty of an augmented Lagrangian, which is repeated until g = z wherever R stays below its limit.
 """
 
+# mypy: allow-untyped-defs, allow-untyped-calls
+
 from typing import NamedTuple
 
 import numpy as np

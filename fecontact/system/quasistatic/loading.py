@@ -38,43 +38,26 @@ def load_history(
     tangential_stiffness: float | Sequence[float] | None = None,
     rtol: float = 1e-6,
 ) -> LoadHistory:
-    r"""Load a system quasi-statically along a path, with friction that keeps its history.
+    """Load a system quasi-statically along a path, with friction that keeps its history.
 
-    At each point the equilibrium of the elastic body with the springs of its drive, the normal law
-    at rest and friction is solved. The friction of a node is that of springs c with sliders,
-
-    .. math::
-
-        R^* = c\,(x_j - s - z), \qquad R = R^* \min(1,\ \mu F / |R^*|), \qquad
-        z \leftarrow x_j - s - R / c
-
-    Jenkins' and Iwan's laws have springs and limits of their own. For laws without memory the
-    limit is the coefficient at rest, mu(0+), and the spring is the tangential stiffness of stuck
-    contacts, c_T = tangential_ratio c_N: c_N = dF/du at the first point of the path at which
-    ``load_scale`` is largest, held from then on; a node that is open there has the mean of the
-    others. Where the contact force leans with waves, so it does here; travel of the ground does
-    the work ``-(R + F y_R') ds``. Increments are cut where nodes begin to slip, touch or lift,
-    until work, stored energy and loss agree.
+    At each point the equilibrium of body, drive springs, normal law at rest and friction is solved;
+    :class:`~fecontact.system.quasistatic.history.LoadHistory` says with which friction.
 
     Parameters
     ----------
     system : ContactSystem
-        Ground motion and histories of drive and loads in time do not matter: they come from the
-        path.
+        Motions of its ground, drive and loads in time do not count: they come from the path.
     path : LoadPath
         Loads and motions.
     start : LoadHistory or RestState, optional
         Go on from there, with its friction springs. By default the path begins at the equilibrium
-        without friction at its first vertex, so that bodies are pressed together without friction
-        first; a path that begins at a small load presses them with friction.
+        without friction at its first vertex; one that begins at a small load presses with friction.
     tangential_ratio : float
-        c_T / c_N, above zero; infinite for rigid sticking. 0.82 is 2 (1 - nu) / (2 - nu) of Mindlin
-        for nu = 0.3; measured values reach down to half of it.
+        c_T / c_N of stuck contacts, above zero; infinite for rigid sticking.
     tangential_stiffness : float or (n,) sequence, optional
         c_T of the whole face, or of each node [N/m], instead of the ratio.
     rtol : float
-        Error of work and loss of an increment, relative to the work that friction, and normal
-        forces, do.
+        Error of work and loss of an increment, relative to the work of the forces.
 
     Returns
     -------
@@ -84,19 +67,14 @@ def load_history(
     Raises
     ------
     InputError
-        For friction that is not made of springs and sliders (bristle laws), and values out of
-        range.
+        For bristle laws, which have no quasi-static limit of springs; values out of range.
     AnalysisError
-        If the first vertex has no equilibrium without friction.
+        If the first vertex has no equilibrium.
 
     Warns
     -----
     ModelWarning
-        If the path ends early, if a node jumps, and as for :func:`fecontact.static_equilibrium`.
-
-    References
-    ----------
-    R. D. Mindlin, Compliance of elastic bodies in contact, Journal of Applied Mechanics 16 (1949).
+        If the path ends early or the body jumps, and as for static equilibria.
     """
     require_kind("load_history", ContactSystem, system=system)
     require_kind("load_history", LoadPath, path=path)
@@ -210,7 +188,7 @@ def _constant(source: Any) -> float:
 def _slope_under_preload(
     system: ContactSystem, path: LoadPath, given: Array, balance: Balance, q: Array, rtol: float
 ) -> Array:
-    """DF/du (n,) under the largest load of the path, with nodes that stick without limit."""
+    """Slope dF/du (n,) under the largest load of the path, with nodes that stick without limit."""
     arrays = system.arrays
     scale = np.abs(path.at_points(path.load_scale))
     preload = int(np.argmax(scale >= scale.max() * (1.0 - 1e-12)))
@@ -230,9 +208,7 @@ def _slope_under_preload(
 
 
 def _penetration(system: ContactSystem, given: Array, q: Array) -> Array:
+    """Penetration (n,) at a row of given loads and motions."""
     arrays = system.arrays
     heights = system.ground.height(arrays.abscissa + arrays.Tx @ q - given[-1])
-    motionless = system.ground.travel(0.0)
-    if motionless != 0.0:
-        heights = system.ground.height(arrays.abscissa + arrays.Tx @ q - given[-1] + motionless)
     return np.asarray(heights - arrays.Ty @ q - arrays.gap)

@@ -11,22 +11,16 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_choice, shown
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, count, span
-from fecontact.laws.signatures import friction_law
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.jacobian import jacobian
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
-from fecontact.system.statics import at_rest, equilibrium
+from fecontact.system.statics import at_rest, equilibrium, follower
 from fecontact.system.steady_memory import settled
 
 # Eigenvalues below this part of the largest are zero: rigid modes are double roots.
 _ZERO = 1e-7
-
-
-@friction_law
-def _sliding(v, F, p):
-    return p[0] * F, 0.0, p[0]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,7 +130,7 @@ def prestressed_modes(
     # Sliding sliders as a friction law that follows the normal force.
     follow = (sliders.limit * np.sign(rest.slider_force) * sliding).sum(axis=1, keepdims=True)
     arrays = at_rest(system.arrays, rest.travel)._replace(
-        friction=np.full(n, _sliding.address), friction_parameters=np.ascontiguousarray(follow))
+        friction=np.full(n, follower.address), friction_parameters=np.ascontiguousarray(follow))
     full = np.empty((2 * m, 2 * m))
     jacobian(0.0, np.concatenate([rest.modal_coordinates, np.zeros(m)]), arrays, full)
     rigid = (sticking & (sliders.rigid > 0.0)).any(axis=1)
