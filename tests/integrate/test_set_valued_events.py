@@ -99,7 +99,7 @@ def test_ensemble_gives_what_single_runs_give():
             assert (each.events[k].time == run.events.time).all()
             assert each.steps[k] == run.statistics["steps"]
     assert found[0].finished.all()
-    chained = fc.ensemble([belt(), belt()], times[:2], initial=[0.5, 0.2], solver=STATIC, chain=2)
+    chained = fc.ensemble([belt(), belt()], times[:2], initial=starts[0], solver=STATIC, chain=2)
     assert (chained.states[1, 0] == chained.states[0, 1]).all()
 
 
@@ -107,7 +107,7 @@ def test_strobed_states_of_den_hartogs_oscillator():
     """Force cos(w t) and friction 0.4 over the stiffness, at 0.8 of the resonance."""
     system = belt(0.0, friction=ConstantFriction(0.4), drive=fc.Drive(
         stiffness_x=1.0, amplitude_x=1.0, angular_frequency=0.8 * np.sqrt(2.0)))
-    found = strobe(system, transient_periods=60, keep=4, initial=[0.0, 0.0], solver=SetValued(),
+    found = strobe(system, transient_periods=60, keep=4, initial=np.zeros(2), solver=SetValued(),
                    rtol=1e-10)
     assert np.ptp(found.states[0], axis=0) == pytest.approx(0.0, abs=1e-6)
 
@@ -172,5 +172,5 @@ def test_basins_of_stick_slip_and_steady_sliding():
     found = basins(belt(speed, dashpot), (Axis("B", "x"), [0.5, 0.5 + 0.5 * speed, 1.5]),
                    (Axis("B", "x", of="velocity"), [0.0, 0.1 * speed]), transient=150.0,
                    section=Crossing("B", "x", 0.5, sense="falling"), solver=STATIC)
-    labels = found.labels
+    labels = found.label
     assert labels[0, 0] == labels[1, 1] != labels[2, 0] == labels[2, 1]

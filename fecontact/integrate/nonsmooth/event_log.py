@@ -72,10 +72,14 @@ def _note_zone(j, zone, t, y, watch):
 @helper
 def _zone(j, p, progress, w):
     """State of a node as w sees it."""
-    pressed = w.nodes[j, FORCE] != 0.0 if p.restitution < 0.0 else progress.closed[j] != 0
+    status = progress.status[p.cluster[j]]
+    # At the very moment of a touch the force may be zero or not; the status of the cluster tells.
+    pressed = status != OPEN and w.nodes[j, FORCE] != 0.0
+    if p.restitution >= 0.0:
+        pressed = progress.closed[j] != 0
     if not pressed:
         return OPEN
-    return STICKING if progress.status[p.cluster[j]] == STICK else SLIPPING
+    return STICKING if status == STICK else SLIPPING
 
 
 @helper

@@ -163,7 +163,7 @@ def _omit_fixed(status, conditions):
 def _strike(t, touching, p, progress, w):
     """Change q' by the impact of the touching nodes, as w sees them; whether it was solved.
 
-    Its losses go to the works of normal damping and friction.
+    Its losses go to the works of normal damping and friction; that of friction never falls.
     """
     s, Y = p.system, progress.state
     n, m = s.Tx.shape
@@ -212,8 +212,11 @@ def _strike(t, touching, p, progress, w):
             if limit > 0.0:
                 rubbed = x[n + c] * conditions.slipping[j] * x[j] / limit
                 Y[first + BELT_FRICTION] -= rubbed * speed
-                Y[first + FRICTION] += rubbed * slip
-                Y[first + POWER_COUNT + j] += rubbed * slip
+                # Where normal impulses turn slip round, friction may give energy back in part.
+                worn = max(rubbed * slip, 0.0)
+                Y[first + FRICTION] += worn
+                Y[first + POWER_COUNT + j] += worn
+                Y[first + CONTACT_DAMPING] += rubbed * slip - worn
                 lost += rubbed * slip
         Y[first + BELT_NORMAL] += belt_normal_power(x[j], w.nodes[j, SLOPE], slip, speed, s)
     if lost < -_GAIN * energy:
