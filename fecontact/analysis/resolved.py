@@ -6,7 +6,7 @@ the motion after it, the run is repeated from there with more outputs until curv
 
 import math
 import warnings
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -237,8 +237,8 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
     options: dict[str, Any] = {"rtol": min(float(used.get("rtol", 1e-6)), 1e-2)}
     try:
         if used["solver"] == SetValued().name:
-            options["solver"] = SetValued(used.get("restitution"), used.get("static_coefficient"),
-                                          used.get("scheme", "auto"))
+            options["solver"] = SetValued(**{
+                entry.name: used[entry.name] for entry in fields(SetValued) if entry.name in used})
         with warnings.catch_warnings():
             # The original run has already issued these warnings.
             warnings.simplefilter("ignore")

@@ -196,6 +196,11 @@ def helper(function: Callable[..., Any]) -> Any:
     return njit(error_model="numpy", fastmath=_FASTMATH, forceinline=True)(function)
 
 
+def routine(function: Callable[..., Any]) -> Any:
+    """As :func:`helper`, for long functions that are called seldom: they are not copied."""
+    return njit(error_model="numpy", fastmath=_FASTMATH)(function)
+
+
 @intrinsic
 def borrowed(typingctx: Any, array: Any) -> Any:
     """The same array, or tuple of arrays, without reference counts.

@@ -24,6 +24,7 @@ from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, start
 from fecontact.integrate.simulate import require_max_step
+from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
@@ -75,6 +76,7 @@ def ensemble(
     times: ArrayLike,
     *,
     initial: Initial | Sequence[Any] = "rest",
+    solver: Solver = RODAS5P,
     rtol: float = 1e-6,
     max_step: float | None = None,
     chain: int = 1,
@@ -84,8 +86,8 @@ def ensemble(
 ) -> Ensemble:
     """Run many systems, or one from many initial states, and keep states at a few times.
 
-    The results are those of :func:`fecontact.simulate`, except that powers are not integrated and
-    do not limit the steps. Threads share the cores.
+    The results are those of :func:`fecontact.simulate`, except that Rodas5P does not integrate
+    powers, which do not limit its steps. Threads share the cores.
 
     Parameters
     ----------
@@ -95,6 +97,8 @@ def ensemble(
         Start of each run and the times to keep states at, ascending [s].
     initial : (E, size) array, sequence of E, or one for all
         Initial states, or anything that :func:`fecontact.integrate.initial_state` takes.
+    solver : Rodas5P, SetValued, Scipy or CVODE
+        Solver of all runs; see :func:`fecontact.simulate`.
     rtol : float
         Relative tolerance.
     max_step : float, optional
@@ -113,8 +117,10 @@ def ensemble(
     Raises
     ------
     InputError
-        For states or times that do not fit the systems, and values out of range.
+        For states or times that do not fit the systems, systems that the solver cannot run, and
+        values out of range.
     """
+    require_solver(solver)
     members, starts, instants = _members(systems, initial, times)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
@@ -127,24 +133,50 @@ def ensemble(
     status = [Status.INTERRUPTED] * count
     steps = np.zeros(count, dtype=np.int64)
     watched = as_events(events)
+    if watched and not solver.locates_events:
+        raise InputError(f"Events are located only by Rodas5P() and SetValued(), not by "
+                         f"{solver!r}; leave them out.")
     seen = [Events.none(members[0].size)] * count
     done, leave = [0], [False]
+
+    def compiled(index: int, state: Array) -> None:
+        run = start(members[index], state, instants[index], rtol=float(rtol), max_step=max_step,
+                    work=False, events=watched)
+        result = step_loop.RUNNING
+        while result == step_loop.RUNNING:
+            if leave[0]:
+                raise _LeftError
+            result = run.advance(100_000)
+        states[index, : run.outputs] = run.states[: run.outputs]
+        seen[index] = run.events
+        status[index], steps[index] = ENDS[result], run.statistics["steps"]
+
+    def other(index: int, state: Array) -> None:
+        def look(time: float) -> None:
+            if leave[0]:
+                raise _LeftError
+
+        if kept == 1:
+            states[index, 0], status[index] = state, Status.FINISHED
+            return
+        found = solver.run(Task(members[index], state, instants[index], float(rtol), max_step,
+                                watched, look))
+        outputs = int(np.searchsorted(instants[index], found.time[-1], side="right"))
+        states[index, :outputs] = found.states[:outputs]
+        if found.events is not None:
+            seen[index] = found.events
+        status[index], steps[index] = found.status, found.statistics.get("steps", 0)
+
+    run_one = compiled if isinstance(solver, Rodas5P) else other
 
     def run_chain(first: int) -> None:
         last: Array | None = None
         for index in range(first, min(first + chain, count)):
-            state = starts(index) if last is None else last
-            run = start(members[index], state, instants[index], rtol=float(rtol), max_step=max_step,
-                        work=False, events=watched)
-            result = step_loop.RUNNING
-            while result == step_loop.RUNNING:
-                if leave[0]:
-                    return
-                result = run.advance(100_000)
-            states[index, : run.outputs] = run.states[: run.outputs]
-            seen[index] = run.events
-            status[index], steps[index] = ENDS[result], run.statistics["steps"]
-            last = run.progress.state if result == step_loop.FINISHED else None
+            try:
+                run_one(index, starts(index) if last is None else last)
+            except _LeftError:
+                return
+            last = states[index, -1] if np.isfinite(states[index, -1]).all() else None
             done[0] += 1
 
     with (shown(progress, lambda: progress_bar("Running", count)) as tell,
@@ -161,6 +193,10 @@ def ensemble(
             leave[0] = True
             raise
     return Ensemble(instants, states, tuple(status), steps, tuple(seen) if watched else None)
+
+
+class _LeftError(Exception):
+    """Raised in a run whose results are no longer wanted."""
 
 
 def strobe(

@@ -66,7 +66,7 @@ def simulate(
     max_step : float, optional
         Longest step [s]; at most a fraction of the shortest period of drive, loads and waves.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        Located within the steps of Rodas5P and stored in :attr:`Trajectory.events`.
+        Located within the steps of Rodas5P or SetValued and stored in :attr:`Trajectory.events`.
     progress : bool or callable, optional
         True for a progress bar; a function is called with the time reached [s].
 
@@ -96,8 +96,8 @@ def simulate(
     require_max_step(max_step)
     require_solver(solver)
     if events is not None and not solver.locates_events:
-        raise InputError(f"Events are located only by Rodas5P(), not by {solver!r}; leave them "
-                         f"out, or evaluate the outputs of the run.")
+        raise InputError(f"Events are located only by Rodas5P() and SetValued(), not by "
+                         f"{solver!r}; leave them out, or evaluate the outputs of the run.")
     watched = as_events(events)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory | LoadHistory | RestState):

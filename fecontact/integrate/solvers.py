@@ -139,12 +139,17 @@ class SetValued(Solver):
     Parameters
     ----------
     restitution : float, optional
-        Rigid stops in place of the normal law, with Newton's coefficient of restitution, from 0
-        to 1.
+        Rigid stops in place of the normal law, with a coefficient of restitution from 0 to 1.
     static_coefficient : float or (n,) sequence, optional
         Limit of \|R\|/F in stick [-], for all contact nodes or each; default that of the law.
     scheme : 'auto', 'events' or 'stepping'
         Event-driven, for few nodes, or time-stepping, for any number of nodes.
+    impact_law : 'newton' or 'poisson'
+        Whether restitution is a ratio of velocities or of impulses. With friction, Newton's law
+        gains energy in some impacts unless both coefficients are equal; the status of a run
+        says so. Poisson's law does not.
+    tangential_restitution : float
+        Newton's coefficient along the ground, from 0 to 1, of contacts that stick in an impact.
 
     Raises
     ------
@@ -155,15 +160,30 @@ class SetValued(Solver):
     restitution: float | None = None
     static_coefficient: float | Sequence[float] | None = None
     scheme: str = "auto"
+    impact_law: str = "newton"
+    tangential_restitution: float = 0.0
 
+    locates_events: ClassVar[bool] = True
     smooth: ClassVar[bool] = False
     schemes: ClassVar[tuple[str, ...]] = ("auto", "events", "stepping")
+    impact_laws: ClassVar[tuple[str, ...]] = ("newton", "poisson")
 
     def __post_init__(self) -> None:
-        if self.restitution is not None and not (
-                isinstance(self.restitution, Real) and 0.0 <= self.restitution <= 1.0):
-            raise InputError(f"SetValued: restitution = {self.restitution!r} must be a number from "
-                             f"0 to 1.")
+        for name in ("restitution", "tangential_restitution"):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, Real) and 0.0 <= value <= 1.0):
+                raise InputError(f"SetValued: {name} = {value!r} must be a number from 0 to 1.")
+        if self.impact_law not in self.impact_laws:
+            raise InputError(f"SetValued: impact_law = {self.impact_law!r} must be one of "
+                             f"{choices(self.impact_laws)}"
+                             f"{nearest(str(self.impact_law), self.impact_laws)}.")
+        if self.impact_law == "poisson" and self.tangential_restitution != 0.0:
+            raise InputError(f"SetValued: tangential_restitution = {self.tangential_restitution!r} "
+                             f"is for impact_law = 'newton' alone; leave it out.")
+        if self.restitution is None and (self.impact_law != "newton"
+                                         or self.tangential_restitution != 0.0):
+            raise InputError("SetValued: impact_law and tangential_restitution are for rigid "
+                             "stops; give a restitution too.")
         if self.scheme not in self.schemes:
             raise InputError(f"SetValued: scheme = {self.scheme!r} must be one of "
                              f"{choices(self.schemes)}{nearest(str(self.scheme), self.schemes)}.")
@@ -191,10 +211,13 @@ class SetValued(Solver):
 
         found = integrate_set_valued(
             task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
+            impact_law=self.impact_law, tangential_restitution=self.tangential_restitution,
             static_coefficient=self.static_coefficient, scheme=self.scheme,
-            longest=longest_step(task.system, task.times, task.max_step), progress=task.progress)
+            longest=longest_step(task.system, task.times, task.max_step), events=task.events,
+            progress=task.progress)
         # Options in the statistics make the run reproducible.
-        told = {"restitution": self.restitution, "static_coefficient": self.static_coefficient}
+        told = {name: getattr(self, name) for name in (
+            "restitution", "impact_law", "tangential_restitution", "static_coefficient")}
         return replace(found, statistics=found.statistics | told)
 
 

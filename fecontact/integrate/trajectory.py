@@ -17,7 +17,6 @@ from fecontact.integrate.events import Events
 from fecontact.laws.wear import WearLaw
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import POWERS
 
 
 class Status(Enum):
@@ -34,6 +33,9 @@ class Status(Enum):
     ENERGY_NOT_FINITE = ("Energies or forces of the run are beyond all numbers, so that nothing "
                          "can be said of their balance: a speed, a load or a stiffness is far out "
                          "of range.")
+    PARADOX = "Rigid stops with friction have no acceleration, or several (Painleve's paradox)."
+    IMPACT_UNSOLVED = "No impulses meet the conditions of an impact with friction."
+    IMPACT_GAINED = "An impact gained energy: use equal restitutions, or impact_law = 'poisson'."
     FAILED = "The integrator could not go on; what was computed until then is kept."
 
 
@@ -430,14 +432,13 @@ class Trajectory(Summarised):
             motion = drive.motions[axis]
             ends = motion.history(t)[:, 0]
             spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
-        contact = system.stored_energy(self.penetration)
         bristles = self._bristles[0].sum(axis=1)
-        put = dict(zip(POWERS, self.work.T, strict=True))
+        put = dict(zip(kernels.POWERS, self.work.T, strict=True))
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
             elastic=0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1),
             drive_spring=spring,
-            contact=contact,
+            contact=system.stored_energy(self.penetration),
             bristles=bristles,
             bristle_work=bristles - bristles[0] - put["bristles"],
             **{f"{name}_work": put[name] for name in ("drive", "belt_normal", "belt_friction",

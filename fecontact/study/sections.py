@@ -201,13 +201,17 @@ class SimulationSettings:
         breakpoints of the excitation.
     restitution : float, optional
         For 'set-valued': rigid stops with this coefficient in place of the normal law.
+    impact_law : str, optional
+        For 'set-valued': 'newton', restitution of velocities, or 'poisson', of impulses.
+    tangential_restitution : float, optional
+        For 'set-valued': coefficient along the ground of contacts that stick in an impact.
     static_coefficient : float, optional
         For 'set-valued': limit of R/F in stick [-]; default that of the law.
     scheme : str, optional
         For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
     events : bool
-        For 'rodas5p': locate touch-down, lift-off, stick and slip of every contact node and store
-        them with the run.
+        For 'rodas5p' and 'set-valued': locate touch-down, lift-off, stick and slip of every
+        contact node and store them with the run.
     stop : list of str
         Events that end the run when they first occur: 'touch-down', 'lift-off', 'stick', 'slip'.
     initial : 'rest', 'sliding', 'preload' or RigidStart
@@ -222,6 +226,8 @@ class SimulationSettings:
     rtol: float = 1e-6
     max_step: Annotated[float | None, Unit("s")] = None
     restitution: float | None = None
+    impact_law: str | None = None
+    tangential_restitution: float | None = None
     static_coefficient: float | None = None
     scheme: str | None = None
     events: bool = False
@@ -243,13 +249,14 @@ class SimulationSettings:
             solver = self.chosen_solver()
         if (self.events or self.stop) and not solver.locates_events:
             raise InputError(f"SimulationSettings: events and stop are for solver = 'rodas5p' "
-                             f"alone, not '{self.solver}'; leave them out.")
+                             f"or 'set-valued', not '{self.solver}'; leave them out.")
 
     def chosen_solver(self) -> Solver:
         """The solver object with its options."""
         return solver_by_name(self.solver, {
-            "restitution": self.restitution, "static_coefficient": self.static_coefficient,
-            "scheme": self.scheme})
+            "restitution": self.restitution, "impact_law": self.impact_law,
+            "tangential_restitution": self.tangential_restitution,
+            "static_coefficient": self.static_coefficient, "scheme": self.scheme})
 
 
 @dataclass(frozen=True)

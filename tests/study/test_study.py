@@ -172,6 +172,13 @@ def test_solvers_have_one_name_in_files_and_in_python(tiny):
     assert np.array_equal(run.states, same.states)
     assert run.statistics["solver"] == "set-valued"
     assert not np.array_equal(run.states, tiny.run().states)
+    stops = tiny.with_(**{"simulation.solver": "set-valued", "simulation.restitution": 0.5,
+                          "simulation.impact_law": "poisson"})
+    assert stops.simulation.chosen_solver() == SetValued(restitution=0.5, impact_law="poisson")
+    stops = stops.with_(**{"simulation.impact_law": "newton",
+                           "simulation.tangential_restitution": 0.2})
+    assert stops.simulation.chosen_solver() == SetValued(restitution=0.5,
+                                                         tangential_restitution=0.2)
 
 
 def test_basis_keys_reach_the_basis(tiny):
@@ -288,10 +295,10 @@ MISTAKES = [
      r"\[simulation\]: solver = 'rodas' must be one of .* \(did you mean 'rodas5p'\?\)"),
     ({"simulation.restitution": 0.5},
      r"\[simulation\]: restitution = 0\.5 is only for solver = 'set-valued', not 'rodas5p'"),
-    ({"simulation.solver": "set-valued", "simulation.restitution": 1.01},
-     r"\[simulation\]: restitution = 1\.01 must be a number from 0 to 1\.$"),
+    ({"simulation.solver": "set-valued", "simulation.restitution": 1.5},
+     r"\[simulation\]: restitution = 1\.5 must be a number from 0 to 1\.$"),
     ({"simulation.solver": "radau", "simulation.stop": ["stick"]},
-     r"\[simulation\]: events and stop are for solver = 'rodas5p' alone, not 'radau'"),
+     r"\[simulation\]: events and stop are for solver = 'rodas5p' or 'set-valued', not 'radau'"),
     ({"geometry.shape": "bem"}, r"\[geometry\]: shape = \"bem\" must be one of .*mean 'beam'"),
     ({"geometry.length": -1}, r"\[geometry\]: length = -1\.0 must be a finite number above zero"),
     ({"geometry.file": "x.msh"}, r"\[geometry\] must have either a shape .* or the file of a"),

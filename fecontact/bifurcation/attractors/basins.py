@@ -12,6 +12,7 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing
+from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.system.contact_system import ContactSystem
 
 
@@ -99,6 +100,7 @@ def basins(
     keep: int = 32,
     section: Crossing | None = None,
     tolerance: float = 1e-3,
+    solver: Solver = RODAS5P,
     rtol: float = 1e-6,
     workers: int | None = None,
     progress: bool | Callable[[int], None] | None = None,
@@ -126,7 +128,7 @@ def basins(
     tolerance : float
         States that differ by less are the same, in parts of the largest modal displacement, and
         velocity, of all starts and sections.
-    rtol, workers, progress
+    solver, rtol, workers, progress
         As for :func:`fecontact.ensemble`.
 
     Raises
@@ -152,8 +154,8 @@ def basins(
                          f"itself with the modes of this body; take other points or axes.")
     wanted = np.stack(np.meshgrid(a, b, indexing="ij"), axis=-1).reshape(-1, 2)
     states = start + (wanted - rows @ start) @ np.linalg.pinv(rows).T
-    settings: dict[str, Any] = {"initial": states, "rtol": rtol, "workers": workers,
-                                "progress": progress}
+    settings: dict[str, Any] = {"initial": states, "solver": solver, "rtol": rtol,
+                                "workers": workers, "progress": progress}
     if section is None:
         if transient_periods is None or transient is not None:
             raise InputError("basins: without a section give transient_periods, the periods of "

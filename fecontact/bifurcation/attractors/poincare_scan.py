@@ -12,6 +12,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensemble import strobe
+from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
@@ -68,6 +69,7 @@ def poincare_scan(
     initial: Any = "rest",
     down: bool = True,
     chains: int | None = None,
+    solver: Solver = RODAS5P,
     rtol: float = 1e-5,
     workers: int | None = None,
     progress: bool | Callable[[int], None] | None = None,
@@ -95,7 +97,7 @@ def poincare_scan(
         Whether to go down again.
     chains : int, optional
         Number of chains each way; default eight a core, at least eight values long.
-    rtol, workers, progress
+    solver, rtol, workers, progress
         As for :func:`fecontact.ensemble`.
 
     Raises
@@ -133,7 +135,7 @@ def poincare_scan(
     index = np.concatenate(both)
     found = strobe([made[k] for k in index], transient_periods=transient_periods, keep=keep,
                    initial=initial,
-                   chain=length, rtol=rtol, workers=workers, progress=progress)
+                   chain=length, solver=solver, rtol=rtol, workers=workers, progress=progress)
     states = np.empty((2, count, keep, system.size))
     for way, part in enumerate(both):
         states[way, part] = found.states[way * len(order) : (way + 1) * len(order)]

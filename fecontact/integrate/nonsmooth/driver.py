@@ -3,15 +3,22 @@
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.events import AnyEvent, Events
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
+from fecontact.integrate.nonsmooth.event_log import note_events
+from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.reference.scipy import longest_step
+from fecontact.integrate.rodas5p.event_arrays import watch_for
+from fecontact.integrate.rodas5p.event_kernels import FOUND
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
@@ -23,6 +30,10 @@ _FEW = 8
 _STEPS_PER_CALL = 2000
 # Errors of velocities count relative to this part of what drive and loads bring about.
 _DRIVEN = 1e-3
+# How runs end before their last output time.
+_EARLY = {kinds.STUCK: Status.MINIMUM_STEP, kinds.DIVERGED: Status.NOT_FINITE,
+          kinds.PARADOX: Status.PARADOX, kinds.UNSOLVED: Status.IMPACT_UNSOLVED,
+          kinds.STOPPED: Status.EVENT}
 
 
 def integrate_set_valued(
@@ -33,8 +44,11 @@ def integrate_set_valued(
     rtol: float = 1e-6,
     scheme: str = "auto",
     restitution: float | None = None,
+    impact_law: str = "newton",
+    tangential_restitution: float = 0.0,
     static_coefficient: float | Sequence[float] | None = None,
     longest: float | None = None,
+    events: Sequence[AnyEvent] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Solution:
     r"""Integrate with friction whose smoothing slope k_s is infinite.
@@ -61,13 +75,20 @@ def integrate_set_valued(
         From event to event with steps of order 8: for nodes whose slip velocities, equal ones
         counted once, are independent. Or by implicit steps of order 3, for any number of nodes.
     restitution : float, optional
-        Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and Newton's
-        coefficient e, from 0 to 1, gives their rebound ``u'+ = -e u'-``. Nodes that move
-        along the ground have to be free of friction. Penetration at the start is taken away.
+        Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and a coefficient
+        e from 0 to 1 gives their rebound. Penetration at the start is taken away. Friction has to
+        be proportional to the normal force.
+    impact_law : 'newton' or 'poisson'
+        Whether e is a ratio of velocities, ``u'+ = -e u'-``, or of impulses; see
+        :mod:`fecontact.integrate.nonsmooth.rigid_stops`.
+    tangential_restitution : float
+        Newton's coefficient along the ground of contacts that stick in an impact, from 0 to 1.
     static_coefficient : float or (n,) sequence, optional
         Limit of \|R\|/F in stick, at least the law's mu(0+) [-]; default is that.
     longest : float, optional
         Longest step [s]; default from the run, the excitation and the ground.
+    events : sequence of ContactEvents, Crossing and Event
+        Events to locate, from event to event only.
     progress : callable, optional
         Called with the time reached [s] now and then.
 
@@ -90,31 +111,40 @@ def integrate_set_valued(
     """
     times = np.ascontiguousarray(times, dtype=float)
     longest = longest_step(system, times) if longest is None else longest
-    problem = _problem(system, restitution, static_coefficient, longest)
+    problem, rubbing = _problem(system, restitution, static_coefficient, longest)
+    problem = problem._replace(tangential=float(tangential_restitution),
+                               poisson=int(impact_law == "poisson"))
     scheme = _chosen(problem, scheme)
     begin = clock.perf_counter()
     n, m = system.basis.contact_nodes, system.basis.modes
-    course = kinds.progress_for(problem, state, float(times[0]), 0.01 * longest)
+    course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
         np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
         _floor(system, state, times, longest), rtol, longest)
     output = kinds.Output(times, np.empty((len(times), len(course.state))),
                           np.empty((len(times), n)), np.empty((len(times), n)))
-    room: Any
+    workspace = kinds.workspace_for(problem)
+    run: Callable[..., int]
+    found = _Found(system, events)
     if scheme == "events":
-        from fecontact.integrate.nonsmooth.event_driven import run_events as run
+        from fecontact.integrate.nonsmooth.event_driven import run_events
         from fecontact.integrate.nonsmooth.event_search import room_for
-        room = room_for(problem, len(course.state))
+        run = partial(run_events, problem, limits, course, output, workspace,
+                      room_for(problem, len(course.state)), found.watch)
     else:
         from fecontact.integrate.nonsmooth.time_stepping import room_for as stepping_room
-        from fecontact.integrate.nonsmooth.time_stepping import run_steps as run
-        room = stepping_room(problem)
-    workspace = kinds.workspace_for(problem)
+        from fecontact.integrate.nonsmooth.time_stepping import run_steps
+        if events:
+            raise InputError("SetValued: scheme = 'stepping', which this system needs, locates no "
+                             "events; leave them out, or use fewer contact nodes.")
+        run = partial(run_steps, problem, limits, course, output, workspace,
+                      stepping_room(problem))
     counts, reached = course.counts, course.clock
     outcome, ended = kinds.GOING_ON, Status.FINISHED
     try:
         while outcome == kinds.GOING_ON:
-            outcome = run(problem, limits, course, output, workspace, room, _STEPS_PER_CALL)
+            outcome = run(_STEPS_PER_CALL)
+            found.empty()
             if progress is not None:
                 progress(float(reached[kinds.TIME]))
     except KeyboardInterrupt:
@@ -126,19 +156,44 @@ def integrate_set_valued(
         "rejected": int(counts[kinds.REJECTED]), "events": int(counts[kinds.EVENTS]),
         "impacts": int(counts[kinds.IMPACTS]),
         "seconds": clock.perf_counter() - begin}
-    if outcome in (kinds.STUCK, kinds.DIVERGED):
-        ended = Status.MINIMUM_STEP if outcome == kinds.STUCK else Status.NOT_FINITE
+    ended = _EARLY.get(outcome, ended)
+    if ended is Status.FINISHED and counts[kinds.GAINED]:
+        ended = Status.IMPACT_GAINED
     done, Y, last = int(counts[kinds.OUTPUTS]), course.state, float(reached[kinds.TIME])
     time, states = times[:done], output.states[:done]
     friction, normal = output.friction[:done], output.normal[:done]
-    if ended is not Status.FINISHED and done and last > time[-1] and np.isfinite(Y).all():
+    if done < len(times) and done and last > time[-1] and np.isfinite(Y).all():
         time, states = np.append(time, last), np.vstack([states, Y])
         friction = np.vstack([friction, friction[-1:]])
         normal = np.vstack([normal, normal[-1:]])
     end = 2 * m + POWER_COUNT
     return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
                     statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
-                    friction_force=friction)
+                    friction_force=friction, events=found.events)
+
+
+class _Found:
+    """Room for the events of a run, and those found so far."""
+
+    def __init__(self, system: ContactSystem, events: Sequence[AnyEvent]) -> None:
+        watch = watch_for(system, events, False)
+        self.watch = watch._replace(note=note_events.address if events else 0)
+        self._rows: list[tuple[Array, Array]] = []
+
+    def empty(self) -> None:
+        """Take the events out of the room."""
+        count = int(self.watch.counts[FOUND])
+        if count:
+            self._rows.append((self.watch.found[:count].copy(), self.watch.states[:count].copy()))
+            self.watch.counts[FOUND] = 0
+
+    @property
+    def events(self) -> Events:
+        """All in chronological order."""
+        size = self.watch.states.shape[1]
+        found, states = zip(*self._rows, (np.zeros((0, 3)), np.zeros((0, size))),
+                            strict=True)
+        return Events.of_rows(np.vstack(found), np.vstack(states))
 
 
 def _problem(
@@ -146,7 +201,8 @@ def _problem(
     restitution: float | None,
     static_coefficient: float | Sequence[float] | None,
     longest: float,
-) -> kinds.NonsmoothProblem:
+) -> tuple[kinds.NonsmoothProblem, NDArray[np.bool_]]:
+    """The problem, and which of its clusters (k,) friction may stop."""
     n = system.basis.contact_nodes
     groups = [(_unsmoothed(law), share) for _, share, law in system.law_groups("friction")]
     tables = [law.table(share) for law, share in groups]
@@ -158,12 +214,15 @@ def _problem(
     wave = ground.shortest_wavelength if ground.wavy else None
     problem = kinds.NonsmoothProblem(
         arrays, _static(static_coefficient, n), cluster, rows, 1e-4 * longest,
-        -1.0 if restitution is None else float(restitution),
+        -1.0 if restitution is None else float(restitution), 0.0, 0,
         np.array([*ground.height_range, np.inf if wave is None else wave]),
-        int(ground.motion is None), compiled_derivative.address)
+        int(ground.motion is None), compiled_derivative.address, compiled_change.address)
+    rubbing = np.any(rows != 0.0, axis=1)
     if restitution is not None:
-        _require_free_stops(system, groups, problem)
-    return problem
+        rough = _rough_nodes(groups, problem.static)
+        rubbing &= np.array([rough[cluster == c].any() for c in range(len(rows))])
+        _require_independence(arrays.Ty, rows[rubbing])
+    return problem, rubbing
 
 
 def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
@@ -199,23 +258,29 @@ def _static(given: float | Sequence[float] | None, n: int) -> Array:
     return np.broadcast_to(values, (n,)).copy()
 
 
-def _require_free_stops(
-    system: ContactSystem, groups: list[tuple[FrictionLaw, Array]], problem: kinds.NonsmoothProblem
-) -> None:
-    limits = np.concatenate([
-        [law.kernel.python(kinds.CREEP, 1.0, row)[0] for row in law.table(share)]
-        for law, share in groups])
-    rubbing = np.any(problem.system.Tx != 0.0, axis=1) & (
-        (limits != 0.0) | (problem.static > 0.0))
-    if rubbing.any():
-        raise InputError(f"Rigid stops are without friction, but contact node "
-                         f"{int(np.argmax(rubbing))} moves along the ground with friction; give "
-                         f"it the friction coefficient zero.")
-    Ty = problem.system.Ty
-    if np.linalg.matrix_rank(Ty, tol=1e-9 * np.abs(Ty).max(initial=1e-300)) < len(Ty):
-        raise InputError(f"The motion of the {len(Ty)} contact nodes is not independent, so that "
-                         f"forces on rigid stops cannot be told apart; use fewer nodes, or more "
-                         f"modes.")
+def _rough_nodes(groups: list[tuple[FrictionLaw, Array]], static: Array) -> NDArray[np.bool_]:
+    """Nodes (n,) with friction, which has to be proportional to the normal force."""
+    rough = []
+    for law, share in groups:
+        for row in law.table(share):
+            small, large = (law.kernel.python(1e-3, force, row)[0] for force in (1.0, 10.0))
+            if abs(large - 10.0 * small) > 1e-9 * abs(large):
+                raise InputError(f"Friction of {type(law).__name__} is not proportional to the "
+                                 f"normal force, as that of rigid stops has to be; use another "
+                                 f"law, or leave restitution out.")
+            rough.append(law.kernel.python(kinds.CREEP, 1.0, row)[0] != 0.0)
+    return np.array(rough) | (static > 0.0)
+
+
+def _require_independence(Ty: Array, rows: Array) -> None:
+    """Raise InputError unless motions normal to the ground and along it can be told apart."""
+    scale = max(np.abs(Ty).max(initial=1e-300), np.abs(rows).max(initial=0.0))
+    together = np.vstack([Ty, rows])
+    if np.linalg.matrix_rank(together, tol=1e-9 * scale) < len(together):
+        along = f", and along it in {len(rows)} ways with friction," if len(rows) else ""
+        raise InputError(f"The {len(Ty)} contact nodes move normal to the ground{along} by "
+                         f"motions that are not independent in {Ty.shape[1]} modes, so that forces "
+                         f"of rigid stops cannot be told apart; use fewer nodes, or more modes.")
 
 
 def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:

@@ -1,4 +1,4 @@
-"""Compiled equations of motion with set-valued friction or rigid stops.
+"""Compiled equations of motion with set-valued friction and rigid stops.
 
 Nodes whose rows along the ground are equal have one slip velocity and form a cluster c. With the
 friction force ``R_c``, the sum over the nodes, and the relative acceleration
@@ -7,7 +7,9 @@ friction force ``R_c``, the sum over the nodes, and the relative acceleration
     a_c = a0_c - sum_d W_cd R_d,    W = Tx Tx^T
 
 Sticking clusters have ``a_c = 0``, which gives their ``R_c``; each node takes a part of it in
-proportion to its limit. The state of these kernels is Y = [q, q', work, friction work per node].
+proportion to its limit. Closed rigid stops add u'' = 0 for their normal forces, and friction that
+slips is proportional to these. The state of these kernels is Y = [q, q', work, friction work per
+node].
 """
 
 from numba import types
@@ -27,8 +29,8 @@ from fecontact.integrate.nonsmooth.problem import (
     CURVED,
     FIXED,
     FORCE,
+    GRIP,
     LIMIT,
-    OPEN,
     PENETRATION,
     PRESSING,
     PROBLEM,
@@ -125,15 +127,20 @@ def observe(moved, Y, p, nodes):
     s = p.system
     for j in range(len(nodes)):
         contact = node_contact(j, node_motion(j, Y, s), moved, s)
-        force = 0.0
+        force, grip = 0.0, 0.0
         if p.restitution < 0.0:
             force = normal_at(s.normal[j])(contact.penetration, contact.rate,
                                            s.normal_parameters[j])[0]
+        else:
+            grip = pressing_force(contact.place, 1.0, s)
+            if stick_limit(j, grip, p) == 0.0:
+                grip = 0.0
         pressing = pressing_force(contact.place, force, s)
         nodes[j, FORCE], nodes[j, PRESSING] = force, pressing
         nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
         nodes[j, SLIP], nodes[j, SLOPE] = contact.slip, contact.slope
+        nodes[j, GRIP] = grip
         nodes[j, CURVED] = contact.curvature * contact.slip * contact.slip
 
 
@@ -157,34 +164,99 @@ def slipping_force(j, slip, sign, pressing, s):
 
 
 @helper
-def hold_stops(t, p, closed, w, acceleration):
-    """Normal forces of closed rigid stops, from u'' = 0, put into w.nodes and ``acceleration``."""
+def sense(state, slip):
+    """Sense in which a cluster slips, 0 if it does not, from its status."""
+    if state == FIXED:
+        return 1 if slip > 0.0 else (-1 if slip < 0.0 else 0)
+    return 0 if state == STICK else state
+
+
+@helper
+def held_row(a, i, p, w):
+    """Change by mode i of the height over the ground of node a, or of the place of a cluster.
+
+    Clusters are counted behind the nodes.
+    """
+    n = len(p.cluster)
+    return sinking_row(a, i, w, p.system) if a < n else p.rows[a - n, i]
+
+
+@helper
+def pushing_row(a, i, p, w):
+    """Modal force i of a unit normal force of node a, or of a unit friction force of a cluster.
+
+    With the normal force goes the friction that ``w.friction`` names.
+    """
+    s = p.system
+    n = len(p.cluster)
+    if a < n:
+        return lifting_row(a, i, w, s) - s.Tx[a, i] * w.friction[a]
+    return -p.rows[a - n, i]
+
+
+@helper
+def hold_contacts(t, p, status, closed, w, acceleration):
+    """Forces of closed rigid stops and of the clusters that stick on them.
+
+    From u'' = 0 and a = 0, put into w and ``acceleration``; friction of stops that slip is
+    proportional to their normal forces.
+    """
     s = p.system
     n, m = s.Tx.shape
     count = 0
     for j in range(n):
+        c = p.cluster[j]
+        slip = w.nodes[j, SLIP]
+        w.slip[c] = slip
         if closed[j]:
             w.indices[count] = j
             count += 1
+            direction = sense(status[c], slip)
+            if direction != 0:
+                w.friction[j] = slipping_force(j, slip, float(direction), w.nodes[j, GRIP], s)
     if count == 0:
         return
+    for c in range(len(p.rows)):
+        if status[c] == STICK:
+            w.indices[count] = n + c
+            count += 1
     ground = speed_rate(t, p)
     for a in range(count):
         j = w.indices[a]
-        w.right[a] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
+        w.right[a] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground if j < n else ground
         for i in range(m):
-            w.right[a] -= sinking_row(j, i, w, s) * acceleration[i]
+            w.right[a] -= held_row(j, i, p, w) * acceleration[i]
         for b in range(count):
             total = 0.0
             for i in range(m):
-                total += sinking_row(j, i, w, s) * lifting_row(w.indices[b], i, w, s)
+                total += held_row(j, i, p, w) * pushing_row(w.indices[b], i, p, w)
             w.matrix[a, b] = total
     solve_small(w, count)
     for a in range(count):
-        j = w.indices[a]
-        w.nodes[j, FORCE] = w.right[a]
         for i in range(m):
-            acceleration[i] += lifting_row(j, i, w, s) * w.right[a]
+            acceleration[i] += pushing_row(w.indices[a], i, p, w) * w.right[a]
+        if w.indices[a] < n:
+            w.nodes[w.indices[a], FORCE] = w.right[a]
+        else:
+            w.total[w.indices[a] - n] = w.right[a]
+    for j in range(n):
+        c, force = p.cluster[j], w.nodes[j, FORCE]
+        w.nodes[j, PRESSING] = force * w.nodes[j, GRIP]
+        w.nodes[j, LIMIT] = stick_limit(j, w.nodes[j, PRESSING], p)
+        w.pressing[c] += w.nodes[j, PRESSING]
+        w.limit[c] += w.nodes[j, LIMIT]
+        w.friction[j] *= force
+        if status[c] != STICK:
+            w.total[c] += w.friction[j]
+
+
+@helper
+def share_friction(p, status, w):
+    """Put the parts of the nodes in the friction of sticking clusters into ``w.friction``."""
+    for j in range(len(p.cluster)):
+        c = p.cluster[j]
+        if status[c] == STICK and w.limit[c] > 0.0:
+            w.friction[j] = w.total[c] * w.nodes[j, LIMIT] / w.limit[c]
 
 
 @helper
@@ -233,7 +305,7 @@ def _derivative(t, held_Y, held_p, held_status, held_closed, held_w, held_out):
     w.pressing[:] = 0.0
     w.friction[:] = 0.0
     if p.restitution >= 0.0:
-        hold_stops(t, p, closed, w, acceleration)
+        hold_contacts(t, p, status, closed, w, acceleration)
     else:
         for j in range(n):
             c = p.cluster[j]
@@ -241,21 +313,16 @@ def _derivative(t, held_Y, held_p, held_status, held_closed, held_w, held_out):
             w.slip[c] = slip
             w.pressing[c] += pressing
             w.limit[c] += w.nodes[j, LIMIT]
-            state = status[c]
-            if state == FIXED:
-                state = 1 if slip > 0.0 else (-1 if slip < 0.0 else OPEN)
-            if pressing > 0.0 and (state == 1 or state == -1):
-                w.friction[j] = slipping_force(j, slip, float(state), pressing, s)
+            direction = sense(status[c], slip)
+            if pressing > 0.0 and direction != 0:
+                w.friction[j] = slipping_force(j, slip, float(direction), pressing, s)
                 w.total[c] += w.friction[j]
             force = w.nodes[j, FORCE]
             for i in range(m):
                 acceleration[i] += (lifting_row(j, i, w, s) * force
                                     - s.Tx[j, i] * w.friction[j])
         hold_clusters(t, p, status, w, acceleration)
-        for j in range(n):
-            c = p.cluster[j]
-            if status[c] == STICK and w.limit[c] > 0.0:
-                w.friction[j] = w.total[c] * w.nodes[j, LIMIT] / w.limit[c]
+    share_friction(p, status, w)
     body_powers(t, Y, s, out[2 * m :])
     contact_powers(moved, s, w.nodes, w.friction, p.restitution < 0.0, out[2 * m :])
 

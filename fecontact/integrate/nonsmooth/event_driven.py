@@ -13,6 +13,7 @@ from numba import types
 from fecontact.core.compiled import borrowed, helper, i8, kernel
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative
+from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
 from fecontact.integrate.nonsmooth.event_search import ROOM, first_changes
 from fecontact.integrate.nonsmooth.problem import (
     DEPTH_SIZE,
@@ -26,6 +27,7 @@ from fecontact.integrate.nonsmooth.problem import (
     LIMITS,
     OUTPUT,
     OUTPUTS,
+    PARADOX,
     PENETRATION,
     PROBLEM,
     PROGRESS,
@@ -36,16 +38,21 @@ from fecontact.integrate.nonsmooth.problem import (
     STARTED,
     STEPS,
     STICK,
+    STOPPED,
     STUCK,
     TIME,
+    UNSOLVED,
     WORKSPACE,
     Step,
 )
-from fecontact.integrate.nonsmooth.transitions import (
-    decide_clusters,
-    hold_velocity,
-    resolve_impacts,
+from fecontact.integrate.nonsmooth.rigid_stops import (
+    NO_ACCELERATION,
+    NO_IMPULSES,
+    change_contacts_at,
+    settle,
 )
+from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
+from fecontact.integrate.rodas5p.event_kernels import WATCH
 from fecontact.system.kernels import DRIVE, drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
@@ -55,10 +62,20 @@ _MOST_IDLE = 200
 
 
 @helper
+def _outcome(flight):
+    """Whether a run goes on after a change of contact."""
+    return PARADOX if flight == NO_ACCELERATION else (
+        UNSOLVED if flight == NO_IMPULSES else GOING_ON)
+
+
+@helper
 def _start(t, p, limits, progress, w, room):
     """Decide at the start of a run which clusters stick and which stops are closed."""
-    largest, clusters = progress.largest, len(p.rows)
+    largest = progress.largest
     derivative(t, progress.state, p, progress.status, progress.closed, w, room.rate)
+    for c in range(len(p.rows)):
+        room.released[c] = room.arrived[c] = False
+        largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
     if p.restitution >= 0.0:
         height = 0.0
         for j in range(len(p.cluster)):
@@ -66,13 +83,12 @@ def _start(t, p, limits, progress, w, room):
             room.parting[j] = False
             height = max(height, abs(w.nodes[j, PENETRATION]))
             largest[RATE_SIZE] = max(largest[RATE_SIZE], abs(w.nodes[j, RATE]))
-        resolve_impacts(t, p, progress, room, 1e-9 * largest[RATE_SIZE], height,
-                        1e-9 * limits.longest, w, room.rate)
-    else:
-        for c in range(clusters):
-            room.released[c] = room.arrived[c] = False
-            largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
-        decide_clusters(t, p, progress, room, 1e-12 * largest[SLIP_SIZE], w, room.rate)
+        flight = change_contacts_at(p.change)(
+            t, p, progress, room, w, 1e-9 * largest[RATE_SIZE], height, 1e-9 * limits.longest,
+            room.rate)
+        return _outcome(flight)
+    decide_clusters(t, p, progress, room, 1e-12 * largest[SLIP_SIZE], w, room.rate)
+    return GOING_ON
 
 
 @helper
@@ -168,7 +184,9 @@ def _accept(step, t, passing, p, progress, output, w, room):
     for c in range(len(p.rows)):
         room.held[c] = status[c] == STICK
         any_held = any_held or room.held[c]
-    if any_held:
+    if p.restitution >= 0.0:
+        settle(t, p, status, closed, w, room.rate, Y)
+    elif any_held:
         derivative(t, Y, p, status, closed, w, room.rate)
         hold_velocity(p, room.held, w, Y)
     if passing:
@@ -189,22 +207,8 @@ def _holds_on(p, progress, w, room):
 
 
 @helper
-def _change_stops(t, p, limits, progress, w, room):
-    """Impacts and partings of the marked stops; returns the longest flight of a rebound [s]."""
-    clusters, closed, largest = len(p.rows), progress.closed, progress.largest
-    for j in range(len(p.cluster)):
-        event = room.past[clusters + j]
-        room.touched[j] = event and closed[j] == 0
-        room.parting[j] = event and closed[j] == 1
-        if room.touched[j]:
-            progress.counts[IMPACTS] += 1
-    return resolve_impacts(t, p, progress, room, 0.01 * limits.rtol * largest[RATE_SIZE],
-                           largest[DEPTH_SIZE], 1e-9 * limits.longest, w, room.slopes[0])
-
-
-@helper
-def _change_clusters(t, again, p, progress, w, room):
-    """Release the marked clusters that stick, and bring those that slip to rest.
+def _mark_clusters(again, p, progress, w, room):
+    """Tell the marked clusters that begin to slip from those that come to rest.
 
     None is released if the moment is the begin of the step, looked at ``again``.
     """
@@ -215,17 +219,55 @@ def _change_clusters(t, again, p, progress, w, room):
         room.arrived[c] = past and (status[c] == 1 or status[c] == -1)
         if room.released[c]:
             status[c] = 1 if w.total[c] > 0.0 else -1
+
+
+@helper
+def _change_stops(t, again, p, limits, progress, w, room):
+    """Impacts, partings and changes of friction at rigid stops.
+
+    Returns the longest flight of a rebound [s], or why there is none.
+    """
+    clusters, closed, largest = len(p.rows), progress.closed, progress.largest
+    _mark_clusters(again, p, progress, w, room)
+    for j in range(len(p.cluster)):
+        event = room.past[clusters + j]
+        room.touched[j] = event and closed[j] == 0
+        room.parting[j] = event and closed[j] == 1
+        if room.touched[j]:
+            progress.counts[IMPACTS] += 1
+    return change_contacts_at(p.change)(
+        t, p, progress, room, w, 0.01 * limits.rtol * largest[RATE_SIZE], largest[DEPTH_SIZE],
+        1e-9 * limits.longest, room.slopes[0])
+
+
+@helper
+def _change_clusters(t, again, p, progress, w, room):
+    """Release the marked clusters that stick, and bring those that slip to rest."""
+    _mark_clusters(again, p, progress, w, room)
     decide_clusters(t, p, progress, room, 1e-9 * progress.largest[SLIP_SIZE], w, room.slopes[0])
 
 
-@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, i8))
-def run_events(held_p, held_limits, held_progress, held_output, held_w, held_room, most):
+@helper
+def _stop_within(step, part, p, progress, output, w, room):
+    """End the run at a part of a step."""
+    reached = step.t + part * step.h
+    _write_within(step, reached, True, p, progress, output, w, room)
+    interpolate(part, progress.state, room.parts, room.state)
+    progress.state[:] = room.state
+    progress.clock[TIME] = reached
+
+
+@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, WATCH, i8), nogil=True)
+def run_events(held_p, held_limits, held_progress, held_output, held_w, held_room, held_watch,
+               most):
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
 
-    The rows of ``output`` are filled as ``progress.counts`` says.
+    The rows of ``output`` are filled as ``progress.counts`` says. Ends early where the table of
+    events is full.
     """
     p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
     output, w, room = borrowed(held_output), borrowed(held_w), borrowed(held_room)
+    watch = borrowed(held_watch)
     Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
     clock, largest, longest = progress.clock, progress.largest, limits.longest
     t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
@@ -236,11 +278,21 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
     room.fresh[:] = False
     if counts[STARTED] == 0:
         counts[STARTED] = 1
-        _start(t, p, limits, progress, w, room)
+        outcome = _start(t, p, limits, progress, w, room)
+        if outcome != GOING_ON:
+            # The state at the start is the only output.
+            _write_at(t, progress, output, w)
+            return outcome
+        # Work counts from the state after an impact at the start, the first output.
+        for i in range(2 * p.rows.shape[1], len(Y)):
+            Y[i] = 0.0
+        if watch.note != 0:
+            derivative(t, Y, p, status, closed, w, room.slopes[0])
+            note_at(watch.note)(Step(t, 0.0, t), 0.0, BEGIN, p, progress, w, room, watch)
     derivative(t, Y, p, status, closed, w, room.slopes[0])
     _write_at(t, progress, output, w)
     for _ in range(most):
-        if t >= end:
+        if t >= end or (watch.note != 0 and full(watch)):
             break
         goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
         left = goal - t
@@ -277,6 +329,11 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
             continue
         if again:
             high = 0.0
+        if watch.note != 0:
+            part = note_at(watch.note)(step, high, WITHIN, p, progress, w, room, watch)
+            if part <= 1.0:
+                _stop_within(step, part, p, progress, output, w, room)
+                return STOPPED
         reached = goal if reaching and not found else t + high * length
         _write_within(step, reached, not found, p, progress, output, w, room)
         if not found:
@@ -306,11 +363,18 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
         else:
             counts[EVENTS] += 1
             if p.restitution >= 0.0:
-                flight = _change_stops(t, p, limits, progress, w, room)
+                flight = _change_stops(t, again, p, limits, progress, w, room)
+                if _outcome(flight) != GOING_ON:
+                    clock[TIME], clock[LENGTH] = t, length
+                    return _outcome(flight)
                 h = min(h, max(0.5 * flight, tiny))
             else:
                 _change_clusters(t, again, p, progress, w, room)
         # Wherever the motion goes on from, an output at this moment shows what comes after.
         _write_at(t, progress, output, w)
+        if watch.note != 0 and note_at(watch.note)(
+                Step(t, length, step.latest), 0.0, CHANGED, p, progress, w, room, watch) <= 1.0:
+            clock[TIME], clock[LENGTH] = t, h
+            return STOPPED
     clock[TIME], clock[LENGTH] = t, h
     return FINISHED if t >= end else GOING_ON

@@ -408,6 +408,8 @@ def first_changes(step, held_p, held_limits, held_progress, held_w, held_room):
     room.place[:] = NOWHERE
     if p.restitution >= 0.0:
         first, shorter, forces = _search_stops(step, p, progress, room)
+        rest, sticking = _search_clusters(step, p, progress, room)
+        first, forces = min(first, rest), forces or sticking
     else:
         first, forces = _search_clusters(step, p, progress, room)
         first, shorter, forces = _search_nodes(first, forces, step, p, limits, progress, room)

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from fecontact.core.compiled import f8, i8, integers, matrix, vector
 from fecontact.core.types import Array, Integers
@@ -14,20 +15,22 @@ from fecontact.system.kernels import POWER_COUNT, SYSTEM
 STEEP, CREEP = 1e36, 1e-18
 
 # Columns of `Workspace.nodes`.
-NODE_COLUMNS = 8
-FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT = range(NODE_COLUMNS)
+NODE_COLUMNS = 9
+FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT, GRIP = range(NODE_COLUMNS)
 
 # Status of a cluster; a slipping one has the sign of its slip velocity, +1 or -1.
 OPEN, STICK, FIXED = 0, 2, 3
 
-# What a run returns: steps used up, end reached, step too short, numbers not finite.
-GOING_ON, FINISHED, STUCK, DIVERGED = range(4)
+# What a run returns: steps used up, end reached, step too short, numbers not finite, no unique
+# accelerations at rigid stops, no impulses of an impact, an event at which it is to end.
+GOING_ON, FINISHED, STUCK, DIVERGED, PARADOX, UNSOLVED, STOPPED = range(7)
 
 # Entries of Progress.clock: the time reached, and the length of the next step.
 TIME, LENGTH = range(2)
-# Entries of Progress.counts: what the run has done, outputs written, whether it has begun.
-COUNTS = 6
-STEPS, REJECTED, EVENTS, IMPACTS, OUTPUTS, STARTED = range(COUNTS)
+# Entries of Progress.counts: what the run has done, outputs written, whether it has begun, impacts
+# that gained energy.
+COUNTS = 7
+STEPS, REJECTED, EVENTS, IMPACTS, OUTPUTS, STARTED, GAINED = range(COUNTS)
 # Entries of Progress.largest: slip velocity, penetration rate and penetration.
 SIZES = 3
 SLIP_SIZE, RATE_SIZE, DEPTH_SIZE = range(SIZES)
@@ -39,10 +42,12 @@ class NonsmoothProblem(NamedTuple):
     ``system`` has unsmoothed friction; ``static`` (n,) is the coefficient that limits stick, below
     zero for the law's own; ``cluster`` (n,) is the cluster of each node, ``rows`` (k, m) are those
     of the clusters; ``tick`` is the time over which the ground's speed is differentiated;
-    ``restitution`` is below zero for compliant contact; ``relief`` (3,) are the lowest and the
+    ``restitution`` is below zero for compliant contact, ``tangential`` is that along the ground,
+    and ``poisson`` is not zero where it is one of impulses; ``relief`` (3,) are the lowest and the
     highest ground and its shortest wave, infinite where it is level; ``steady`` is zero if the
-    speed of the ground changes; ``derivative`` is the address of
-    :data:`fecontact.integrate.nonsmooth.equations.compiled_derivative`.
+    speed of the ground changes; ``derivative`` and ``change`` are the addresses of
+    :data:`fecontact.integrate.nonsmooth.equations.compiled_derivative` and
+    :data:`fecontact.integrate.nonsmooth.rigid_stops.compiled_change`.
     """
 
     system: Any
@@ -51,12 +56,15 @@ class NonsmoothProblem(NamedTuple):
     rows: Array
     tick: float
     restitution: float
+    tangential: float
+    poisson: int
     relief: Array
     steady: int
     derivative: int
+    change: int
 
 
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, vector, i8, i8],
+PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, f8, i8, vector, i8, i8, i8],
                            NonsmoothProblem)
 
 
@@ -142,16 +150,18 @@ WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, ma
 def workspace_for(problem: NonsmoothProblem) -> Workspace:
     """Room for a problem."""
     n, k = len(problem.cluster), len(problem.rows)
-    size = max(n, k)
+    size = n + k
     return Workspace(np.zeros((n, NODE_COLUMNS)), np.zeros(n), np.zeros(k), np.zeros(k),
                      np.zeros(k), np.zeros(k), np.zeros((size, size)), np.zeros(size),
                      np.zeros(size, np.int64), np.zeros(size, np.int64))
 
 
-def progress_for(problem: NonsmoothProblem, state: Array, time: float, length: float) -> Progress:
-    """A run that is about to start."""
+def progress_for(
+    problem: NonsmoothProblem, rubbing: NDArray[np.bool_], state: Array, time: float, length: float
+) -> Progress:
+    """A run that is about to start; ``rubbing`` (k,) are the clusters that friction may stop."""
     n = len(problem.cluster)
-    status = np.where(np.any(problem.rows != 0.0, axis=1), OPEN, FIXED)
+    status = np.where(rubbing, OPEN, FIXED)
     return Progress(
         np.array([time, length]), np.zeros(COUNTS, dtype=np.int64),
         np.concatenate([state, np.zeros(POWER_COUNT + n)]), status,

@@ -342,7 +342,7 @@ def _pass_break(step, t, p, progress, output):
         output.states[last, first + DRIVE] += work
 
 
-@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, i8))
+@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, i8), nogil=True)
 def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room, most):
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
 

@@ -1,37 +1,16 @@
-"""Compiled decisions of set-valued contact: which clusters stick, which stops close, and impacts.
+"""Compiled decisions of set-valued friction: which clusters stick and which slip.
 
 A cluster without slip velocity sticks if a friction force within its limit holds it. Those of all
 such clusters are the solution of a quadratic program, found by projected Gauss-Seidel sweeps:
 
     -L_c <= R_c <= L_c,    a_c = 0 where |R_c| < L_c,    sign(R_c) a_c >= 0 where |R_c| = L_c
-
-Impacts on rigid stops follow Newton's law with restitution e: impulses P_j >= 0 of the nodes in
-contact, with the penetration rates v- before and v+ after, ``v+ + e max(v-, 0) <= 0``, and
-``P_j = 0`` unless that is zero.
 """
-
-import math
 
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.integrate.nonsmooth.equations import (
-    derivative,
-    lifting_row,
-    sinking_row,
-    solve_small,
-    speed_rate,
-)
-from fecontact.integrate.nonsmooth.problem import (
-    CURVED,
-    FIXED,
-    OPEN,
-    PENETRATION,
-    RATE,
-    SLOPE,
-    STICK,
-)
-from fecontact.system.kernels import CONTACT_DAMPING
+from fecontact.integrate.nonsmooth.equations import derivative, solve_small, speed_rate
+from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, STICK
 
 SWEEPS = 20000
 
@@ -144,134 +123,3 @@ def decide_clusters(t, p, progress, room, near, w, out):
             break
     hold_velocity(p, held, w, Y)
     derivative(t, Y, p, status, closed, w, out)
-
-
-@helper
-def _stop_matrix(p, w):
-    """Fill w.matrix (n, n) with the change of -u' of each node by unit impulses at the others."""
-    s = p.system
-    n, m = s.Tx.shape
-    for j in range(n):
-        for k in range(n):
-            total = 0.0
-            for i in range(m):
-                total += sinking_row(j, i, w, s) * lifting_row(k, i, w, s)
-            w.matrix[j, k] = total
-
-
-@helper
-def _impulses(touching, wanted, w):
-    """Impulses (n,) of the touching nodes, put into w.right, that bring ``wanted`` to zero."""
-    n = len(touching)
-    w.right[:] = 0.0
-    for _ in range(SWEEPS):
-        moved, scale = 0.0, 0.0
-        for j in range(n):
-            if not touching[j]:
-                continue
-            impulse = max(0.0, w.right[j] + wanted[j] / w.matrix[j, j])
-            change = impulse - w.right[j]
-            w.right[j] = impulse
-            for k in range(n):
-                wanted[k] -= w.matrix[k, j] * change
-            moved, scale = max(moved, abs(change)), max(scale, impulse)
-        if moved <= 1e-15 * scale:
-            break
-
-
-@helper
-def _push(p, touching, w, Y, first):
-    """Bring the quantity in w.right of the touching nodes to zero: u (first 0) or u' (first m)."""
-    s = p.system
-    n, m = s.Tx.shape
-    count = 0
-    for j in range(n):
-        if touching[j]:
-            w.indices[count] = j
-            count += 1
-    for a in range(count):
-        j = w.indices[a]
-        for b in range(count):
-            total = 0.0
-            for i in range(m):
-                total += sinking_row(j, i, w, s) * lifting_row(w.indices[b], i, w, s)
-            w.matrix[a, b] = total
-    solve_small(w, count)
-    for a in range(count):
-        for i in range(m):
-            Y[first + i] += lifting_row(w.indices[a], i, w, s) * w.right[a]
-
-
-@helper
-def _pack(touching, w, column):
-    count = 0
-    for j in range(len(touching)):
-        if touching[j]:
-            w.right[count] = w.nodes[j, column]
-            count += 1
-    return count
-
-
-@helper
-def resolve_impacts(t, p, progress, room, slow, height, brief, w, out):
-    """Impacts of the ``room.touched`` nodes, then which stops stay closed.
-
-    ``room.parting`` nodes were closed and lift off. After the impact, stops whose penetration rate
-    is below ``slow``, or whose rebound is lower than the rounding of the ``height`` [m] or shorter
-    than the time ``brief`` [s], close if a force presses them. Returns the longest flight that a
-    rebound may take [s], infinite if none, and fills ``out`` with Y'.
-    """
-    s = p.system
-    n, m = s.Tx.shape
-    Y, status, closed = progress.state, progress.status, progress.closed
-    touched, parting, fresh = room.touched, room.parting, room.fresh[len(p.rows):]
-    touching = np.zeros(n, np.bool_)
-    for j in range(n):
-        touching[j] = touched[j] or closed[j] or parting[j]
-        fresh[j] = False
-    derivative(t, Y, p, status, closed, w, out)
-    if _pack(touched, w, PENETRATION):
-        _push(p, touched, w, Y, 0)
-    derivative(t, Y, p, status, closed, w, out)
-    before = 0.0
-    for i in range(m):
-        before += 0.5 * Y[m + i] * Y[m + i]
-    _stop_matrix(p, w)
-    wanted = np.empty(n)
-    for j in range(n):
-        rate = w.nodes[j, RATE]
-        wanted[j] = rate + p.restitution * max(rate, 0.0)
-    _impulses(touching, wanted, w)
-    for j in range(n):
-        for i in range(m):
-            Y[m + i] += lifting_row(j, i, w, s) * w.right[j]
-    for i in range(m):
-        before -= 0.5 * Y[m + i] * Y[m + i]
-    Y[2 * m + CONTACT_DAMPING] += before
-
-    derivative(t, Y, p, status, closed, w, out)
-    closed[:] = False
-    derivative(t, Y, p, status, closed, w, out)
-    pressed = np.empty(n)
-    _stop_matrix(p, w)
-    ground = speed_rate(t, p)
-    resting = np.zeros(n, np.bool_)
-    for j in range(n):
-        pressed[j] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
-        for i in range(m):
-            pressed[j] -= sinking_row(j, i, w, s) * out[m + i]
-        blurred = 30.0 * math.sqrt(2.2e-16 * height * abs(pressed[j])) + brief * abs(pressed[j])
-        resting[j] = (touching[j] and not parting[j]
-                      and abs(w.nodes[j, RATE]) <= max(slow, blurred))
-    falling = pressed.copy()
-    _impulses(resting, pressed, w)
-    flight = math.inf
-    for j in range(n):
-        closed[j] = resting[j] and w.right[j] > 0.0
-        fresh[j] = touching[j] and not closed[j]
-        if fresh[j] and falling[j] > 0.0:
-            flight = min(flight, -2.0 * w.nodes[j, RATE] / falling[j])
-    if _pack(closed, w, RATE):
-        _push(p, closed, w, Y, m)
-    derivative(t, Y, p, status, closed, w, out)
-    return flight

@@ -11,7 +11,6 @@ lambda is zero for a spring c, and the force so far of a slider that sticks rigi
 penalty of an augmented Lagrangian, which is repeated until g = z wherever R stays below its limit.
 """
 
-# mypy: allow-untyped-defs, allow-untyped-calls
 
 from typing import NamedTuple
 

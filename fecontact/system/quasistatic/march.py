@@ -6,7 +6,6 @@ two disagree where sliders begin to slide or nodes close and open within it; an 
 until they agree.
 """
 
-# mypy: allow-untyped-defs, allow-untyped-calls
 
 from typing import NamedTuple
 

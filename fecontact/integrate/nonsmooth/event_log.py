@@ -1,0 +1,236 @@
+"""Noting events of runs that go from event to event: contact nodes, and users' functions.
+
+Clusters and stops change at moments at which a step ends anyway. Normal laws that come and go
+while a cluster slips, and functions of users, are looked at some times a step, and what has
+changed is narrowed down by bisection; what `Crossing` watches is a polynomial within the step,
+whose changes of sign are found however close.
+"""
+
+from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8, routine
+from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
+from fecontact.integrate.courses import MOST
+from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
+from fecontact.integrate.nonsmooth.equations import derivative
+from fecontact.integrate.nonsmooth.event_search import ROOM
+from fecontact.integrate.nonsmooth.problem import FORCE, PROBLEM, PROGRESS, STEP, STICK, WORKSPACE
+from fecontact.integrate.rodas5p.event_kernels import (
+    FIRST_OWN,
+    FOUND,
+    LIFT_OFF,
+    NODES,
+    OPEN,
+    SLIP_BEGINS,
+    SLIPPING,
+    STICKING,
+    TOUCH_DOWN,
+    WATCH,
+    event_at,
+)
+from fecontact.integrate.rodas5p.event_kernels import STICK as STICK_BEGINS
+
+# What is noted: the state at the start, a step or a part of it, a change of contact.
+BEGIN, WITHIN, CHANGED = range(3)
+NOTE = f8(STEP, f8, i8, PROBLEM, PROGRESS, WORKSPACE, ROOM, WATCH)
+note_at = function_at(NOTE)
+
+_LOOKS, _HALVINGS = 16, 44
+
+
+@helper
+def full(watch):
+    """Whether the events of one more step may find no place."""
+    most = (_LOOKS + 2) * (3 * len(watch.zones) + len(watch.own))
+    return watch.counts[FOUND] + most > len(watch.found)
+
+
+@routine
+def _note(watch, t, kind, node, y):
+    row = watch.counts[FOUND]
+    watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
+    for i in range(watch.states.shape[1]):
+        watch.states[row, i] = y[i]
+    watch.counts[FOUND] = row + 1
+
+
+@routine
+def _note_zone(j, zone, t, y, watch):
+    """Note what a node does that is in a state from now on."""
+    old = watch.zones[j]
+    watch.zones[j] = zone
+    if old == zone:
+        return
+    if old == OPEN:
+        _note(watch, t, TOUCH_DOWN, j, y)
+    if zone == OPEN:
+        _note(watch, t, LIFT_OFF, j, y)
+    elif zone == STICKING:
+        _note(watch, t, STICK_BEGINS, j, y)
+    elif old == STICKING:
+        _note(watch, t, SLIP_BEGINS, j, y)
+
+
+@helper
+def _zone(j, p, progress, w):
+    """State of a node as w sees it."""
+    status = progress.status[p.cluster[j]]
+    # At the very moment of a touch the force may be zero or not; the status of the cluster tells.
+    pressed = status != OPEN and w.nodes[j, FORCE] != 0.0
+    if p.restitution >= 0.0:
+        pressed = progress.closed[j] != 0
+    if not pressed:
+        return OPEN
+    return STICKING if status == STICK else SLIPPING
+
+
+@helper
+def _counts(rising, k, watch):
+    """Whether a change of sign has the direction that is watched."""
+    return watch.own_direction[k] >= 0 if rising else watch.own_direction[k] <= 0
+
+
+@routine
+def _look(part, step, p, progress, w, room):
+    """Put the state at a part of the step into room.state, and what acts into w; the time."""
+    t = min(step.t + part * step.h, step.latest)
+    interpolate(part, progress.state, room.parts, room.state)
+    derivative(t, room.state, p, progress.status, progress.closed, w, room.rate)
+    return t
+
+
+@routine
+def _note_linear(k, upto, step, p, progress, w, room, watch):
+    """Note the passages of a linear function of the state."""
+    row, c, b = watch.own_parameters[k], room.nested, room.bound
+    size = watch.states.shape[1]
+    c[:] = 0.0
+    c[0] = -row[0]
+    for i in range(size):
+        c[0] += row[1 + i] * progress.state[i]
+        for q in range(PARTS):
+            c[1 + q] += row[1 + i] * room.parts[q, i]
+    from_nested(c, b)
+    sign = b[0] if b[0] != 0.0 else watch.own_values[k]
+    places = watch.changed[:MOST]
+    for i in range(sign_changes(b, room.halves, room.along, places)):
+        sign = -sign
+        if places[i] <= upto and _counts(sign > 0.0, k, watch):
+            t = _look(places[i], step, p, progress, w, room)
+            _note(watch, t, FIRST_OWN + k, -1, room.state)
+
+
+@routine
+def _note_own(k, left, right, new, step, p, progress, w, room, watch):
+    """Note the change of sign of a user's function between two looks."""
+    g, row, size = event_at(watch.own[k]), watch.own_parameters[k], watch.states.shape[1]
+    old = watch.own_values[k]
+    rising = old < 0.0 <= new
+    if not (rising or old > 0.0 >= new) or not _counts(rising, k, watch):
+        return
+    low, high = left, right
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        t = _look(middle, step, p, progress, w, room)
+        value = g(t, room.state[:size], row)
+        if (value >= 0.0) if rising else (value <= 0.0):
+            high = middle
+        else:
+            low = middle
+    t = _look(high, step, p, progress, w, room)
+    _note(watch, t, FIRST_OWN + k, -1, room.state)
+
+
+@routine
+def _note_touch(j, left, right, step, p, progress, w, room, watch):
+    """Note that the normal law of a node begins or ends between two looks."""
+    low, high, old = left, right, watch.zones[j]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        _look(middle, step, p, progress, w, room)
+        if _zone(j, p, progress, w) == old:
+            low = middle
+        else:
+            high = middle
+    t = _look(high, step, p, progress, w, room)
+    _note_zone(j, _zone(j, p, progress, w), t, room.state, watch)
+
+
+@routine
+def _note_step(upto, step, p, progress, w, room, watch):
+    """Note the events of a step up to a part of it."""
+    size = watch.states.shape[1]
+    nodes = watch.counts[NODES] != 0 and p.restitution < 0.0
+    looks = nodes
+    for k in range(len(watch.own)):
+        if watch.linear[k]:
+            _note_linear(k, upto, step, p, progress, w, room, watch)
+        else:
+            looks = True
+    for look in range(_LOOKS if looks else 1):
+        left, right = (upto * look / _LOOKS, upto * (look + 1) / _LOOKS) if looks else (0.0, upto)
+        t = _look(right, step, p, progress, w, room)
+        for j in range(len(watch.zones)):
+            if nodes and _zone(j, p, progress, w) != watch.zones[j]:
+                _note_touch(j, left, right, step, p, progress, w, room, watch)
+                _look(right, step, p, progress, w, room)
+        for k in range(len(watch.own)):
+            new = event_at(watch.own[k])(t, room.state[:size], watch.own_parameters[k])
+            if not watch.linear[k]:
+                _note_own(k, left, right, new, step, p, progress, w, room, watch)
+                _look(right, step, p, progress, w, room)
+            watch.own_values[k] = new
+
+
+@routine
+def _note_change(t, begin, p, progress, w, room, watch):
+    """Note what has changed at a moment, of which w knows; or take it for the start."""
+    Y, size = progress.state, watch.states.shape[1]
+    for j in range(len(watch.zones)):
+        zone = _zone(j, p, progress, w)
+        if begin:
+            watch.zones[j] = zone
+        elif watch.counts[NODES] != 0:
+            if room.touched[j] and watch.zones[j] == OPEN and zone == OPEN:
+                _note(watch, t, TOUCH_DOWN, j, Y)
+                _note(watch, t, LIFT_OFF, j, Y)
+            room.touched[j] = False
+            _note_zone(j, zone, t, Y, watch)
+    for k in range(len(watch.own)):
+        old = watch.own_values[k]
+        new = event_at(watch.own[k])(t, Y[:size], watch.own_parameters[k])
+        rising = old < 0.0 < new
+        if not begin and (rising or old > 0.0 > new) and _counts(rising, k, watch):
+            _note(watch, t, FIRST_OWN + k, -1, Y)
+        watch.own_values[k] = new
+
+
+def _note_events(step, upto, what, held_p, held_progress, held_w, held_room, held_watch):
+    """Note events; the part of the step after which the run ends, or NOWHERE.
+
+    Events after the first at which the run ends are dropped.
+    """
+    p, progress, w = borrowed(held_p), borrowed(held_progress), borrowed(held_w)
+    room, watch = borrowed(held_room), borrowed(held_watch)
+    begun = watch.counts[FOUND]
+    if what == WITHIN:
+        _note_step(upto, step, p, progress, w, room, watch)
+    else:
+        _note_change(step.t, what == BEGIN, p, progress, w, room, watch)
+    stop = NOWHERE
+    for row in range(begun, watch.counts[FOUND]):
+        if watch.stops[int(watch.found[row, 1])] != 0:
+            part = (watch.found[row, 0] - step.t) / step.h if what == WITHIN else 0.0
+            stop = min(stop, max(part, 0.0))
+    if stop <= 1.0 and what == WITHIN:
+        kept = begun
+        for row in range(begun, watch.counts[FOUND]):
+            if (watch.found[row, 0] - step.t) / step.h <= stop:
+                watch.found[kept, :] = watch.found[row, :]
+                watch.states[kept, :] = watch.states[row, :]
+                kept += 1
+        watch.counts[FOUND] = kept
+    return stop
+
+
+# By its address, so that it is not compiled into the loop over the steps.
+note_events = compile_law(
+    NOTE, "note_events(step, upto, what, p, progress, w, room, watch)", _note_events)

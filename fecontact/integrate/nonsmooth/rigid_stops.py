@@ -1,0 +1,341 @@
+"""Compiled transitions at rigid stops with friction: impacts, what stays closed, what sticks.
+
+Impacts follow Newton's law in the form of Moreau or Poisson's law, with normal impulses L_j of the
+touching nodes, tangential ones P_c of the clusters, penetration rates u' and slip velocities s:
+
+    Newton    0 <= L_j  complementary to  -(u'+ + e max(u'-, 0)) >= 0,
+              P_c in Sgn(s+ + e_T s-) sum mu_j L_j
+    Poisson   compression: Newton's law with e = e_T = 0, impulses L^C; then expansion from there:
+              0 <= L_j - e L_j^C  complementary to  -u'+ >= 0,  P_c in Sgn(s+) sum mu_j L_j
+
+mu_j is that of the slip velocity before the impact. Closed stops beside those that are struck take
+part. After an impact, or where a force has reached its limit, the same conditions for forces and
+accelerations tell which stops stay closed and which clusters stick; where they have no solution,
+or several, the run ends (Painleve's paradox).
+
+References
+----------
+J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM Courses and
+Lectures 302 (1988). F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, Wiley
+1996. P. Painleve, Sur les lois du frottement de glissement, Comptes Rendus 121 (1895).
+"""
+
+import math
+
+import numpy as np
+
+from fecontact.core.compiled import borrowed, compile_law, f8, function_at, routine, vector
+from fecontact.integrate.nonsmooth.contact_conditions import (
+    Conditions,
+    new_case,
+    solve_conditions,
+    solve_uniquely,
+)
+from fecontact.integrate.nonsmooth.equations import (
+    derivative,
+    held_row,
+    pushing_row,
+    slipping_force,
+    solve_small,
+    speed_rate,
+    stick_limit,
+)
+from fecontact.integrate.nonsmooth.event_search import ROOM
+from fecontact.integrate.nonsmooth.problem import (
+    CREEP,
+    CURVED,
+    FIXED,
+    GAINED,
+    GRIP,
+    OPEN,
+    PENETRATION,
+    PROBLEM,
+    PROGRESS,
+    RATE,
+    RATE_SIZE,
+    SLIP_SIZE,
+    SLOPE,
+    STICK,
+    WORKSPACE,
+)
+from fecontact.system.kernels import (
+    BELT_FRICTION,
+    BELT_NORMAL,
+    CONTACT_DAMPING,
+    FRICTION,
+    POWER_COUNT,
+    belt_normal_power,
+    ground_motion,
+)
+
+# What is returned in place of a time of flight.
+NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
+# Slip velocities below this part of the largest are none, energies gained rounding.
+_NEAR, _GAIN = 1e-9, 1e-10
+
+CHANGE = f8(f8, PROBLEM, PROGRESS, ROOM, WORKSPACE, f8, f8, f8, vector)
+change_contacts_at = function_at(CHANGE)
+
+
+@routine
+def _push(count, first, p, w, Y):
+    """Change Y[first:] by contact forces so that what w.right says is left of it vanishes.
+
+    The constraints are the first of ``w.indices``, clusters behind the nodes.
+    """
+    m = p.rows.shape[1]
+    w.friction[:] = 0.0
+    for a in range(count):
+        for b in range(count):
+            total = 0.0
+            for i in range(m):
+                total += held_row(w.indices[a], i, p, w) * pushing_row(w.indices[b], i, p, w)
+            w.matrix[a, b] = total
+    solve_small(w, count)
+    for a in range(count):
+        for i in range(m):
+            Y[first + i] += pushing_row(w.indices[a], i, p, w) * w.right[a]
+
+
+@routine
+def settle(t, p, status, closed, w, out, Y):
+    """Change q' so that closed stops do not sink and sticking clusters do not slip."""
+    n, m = p.system.Tx.shape
+    if not closed.any():
+        return
+    derivative(t, Y, p, status, closed, w, out)
+    count = 0
+    for j in range(n):
+        if closed[j]:
+            w.indices[count], w.right[count] = j, w.nodes[j, RATE]
+            count += 1
+    for c in range(len(p.rows)):
+        if status[c] == STICK:
+            w.indices[count], w.right[count] = n + c, -w.slip[c]
+            count += 1
+    _push(count, m, p, w, Y)
+
+
+@routine
+def _set_matrix(p, w, matrix):
+    """Fill matrix (n + k, n + k) with the change of [-u', -s] by unit impulses."""
+    n, m = p.system.Tx.shape
+    w.friction[:] = 0.0
+    for a in range(len(matrix)):
+        for b in range(len(matrix)):
+            total = 0.0
+            for i in range(m):
+                total += held_row(a, i, p, w) * pushing_row(b, i, p, w)
+            matrix[a, b] = total if a < n else -total
+
+
+@routine
+def _conditions(touching, p, w):
+    """Conditions of contact at the touching nodes, all of whose clusters may stick or slip.
+
+    Coefficients are those of the slip velocities in w; nothing is given yet.
+    """
+    n, k = len(p.cluster), len(p.rows)
+    matrix, mode = np.empty((n + k, n + k)), np.zeros(k, np.int64)
+    sticking, slipping = np.zeros(n), np.zeros(n)
+    _set_matrix(p, w, matrix)
+    for j in range(n):
+        c = p.cluster[j]
+        if touching[j]:
+            grip = w.nodes[j, GRIP]
+            slipping[j] = slipping_force(j, abs(w.slip[c]), 1.0, grip, p.system)
+            sticking[j] = max(stick_limit(j, grip, p),
+                              slipping_force(j, CREEP, 1.0, grip, p.system))
+            mode[c] = STICK
+    return Conditions(matrix, np.zeros(n + k), np.zeros(n), sticking, slipping, p.cluster,
+                      touching, mode)
+
+
+@routine
+def _omit_fixed(status, conditions):
+    """Leave out the clusters on which friction has no effect."""
+    for c in range(len(status)):
+        if status[c] == FIXED:
+            conditions.mode[c] = OPEN
+
+
+@routine
+def _strike(t, touching, p, progress, w):
+    """Change q' by the impact of the touching nodes, as w sees them; whether it was solved.
+
+    Its losses go to the works of normal damping and friction; that of friction never falls.
+    """
+    s, Y = p.system, progress.state
+    n, m = s.Tx.shape
+    k = len(p.rows)
+    conditions, case = _conditions(touching, p, w), new_case(n, k)
+    _omit_fixed(progress.status, conditions)
+    given, x = conditions.given, np.zeros(n + k)
+    # An impact knows one coefficient, whether its contact sticks or slips.
+    conditions.sticking[:] = conditions.slipping
+    poisson = p.poisson != 0
+    for j in range(n):
+        rate = w.nodes[j, RATE]
+        given[j] = -rate if poisson else -(rate + p.restitution * max(rate, 0.0))
+    for c in range(k):
+        given[n + c] = -w.slip[c] if poisson else -(1.0 + p.tangential) * w.slip[c]
+    if not solve_conditions(conditions, case):
+        return False
+    x[:] = case.x
+    if poisson:
+        given[:] = case.y
+        conditions.least[:] = p.restitution * case.x[:n]
+        if not solve_conditions(conditions, case):
+            return False
+        x += case.x
+
+    speed, first = ground_motion(t, s).speed, 2 * m
+    energy, lost = 0.0, 0.0
+    w.friction[:] = 0.0
+    mean = 0.5 * (conditions.matrix @ x)
+    for i in range(m):
+        energy += 0.5 * Y[m + i] * Y[m + i]
+    for a in range(n + k):
+        for i in range(m):
+            Y[m + i] += pushing_row(a, i, p, w) * x[a]
+    for j in range(n):
+        c = p.cluster[j]
+        slip, damped = w.slip[c], x[j] * (w.nodes[j, RATE] - mean[j])
+        lost += damped
+        Y[first + CONTACT_DAMPING] += damped
+        if progress.status[c] != FIXED:
+            slip -= mean[n + c]
+            limit = 0.0
+            for other in range(n):
+                if p.cluster[other] == c:
+                    limit += conditions.slipping[other] * x[other]
+            if limit > 0.0:
+                rubbed = x[n + c] * conditions.slipping[j] * x[j] / limit
+                Y[first + BELT_FRICTION] -= rubbed * speed
+                # Where normal impulses turn slip round, friction may give energy back in part.
+                worn = max(rubbed * slip, 0.0)
+                Y[first + FRICTION] += worn
+                Y[first + POWER_COUNT + j] += worn
+                Y[first + CONTACT_DAMPING] += rubbed * slip - worn
+                lost += rubbed * slip
+        Y[first + BELT_NORMAL] += belt_normal_power(x[j], w.nodes[j, SLOPE], slip, speed, s)
+    if lost < -_GAIN * energy:
+        progress.counts[GAINED] += 1
+    return True
+
+
+@routine
+def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
+    """Fill a case with the forces that ``fall`` (n,), u'' without contact, asks for.
+
+    Whether there is one solution. ``near`` is a slip velocity that counts as none; after a strike
+    only such clusters may stick.
+    """
+    n, k = len(p.cluster), len(p.rows)
+    status, friction = progress.status, False
+    conditions = _conditions(resting, p, w)
+    _omit_fixed(status, conditions)
+    ground = speed_rate(t, p)
+    for j in range(n):
+        conditions.given[j] = -fall[j]
+    for c in range(k):
+        conditions.given[n + c] = ground
+        for i in range(p.rows.shape[1]):
+            conditions.given[n + c] -= p.rows[c, i] * room.rate[i]
+        if conditions.mode[c] != STICK:
+            continue
+        friction = True
+        still = abs(w.slip[c]) <= near
+        if room.released[c] and still:
+            conditions.mode[c] = status[c]
+        elif not (still or (not struck and (status[c] == STICK or room.arrived[c]))):
+            conditions.mode[c] = 1 if w.slip[c] > 0.0 else -1
+    for c in range(k):
+        room.held[c] = conditions.mode[c] == STICK
+        room.fresh[c] = room.held[c] or room.released[c]
+    return solve_uniquely(conditions, case) if friction else solve_conditions(conditions, case)
+
+
+@routine
+def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w, out):
+    """Decide which touching stops stay closed and which clusters stick; see `change_contacts`."""
+    s, Y, status, closed = p.system, progress.state, progress.status, progress.closed
+    n, m = s.Tx.shape
+    k = len(p.rows)
+    # Without contact; the status is kept for what depends on it.
+    closed[:] = 0
+    before = status.copy()
+    for c in range(k):
+        if status[c] != FIXED:
+            status[c] = OPEN
+    derivative(t, Y, p, status, closed, w, out)
+    room.rate[:m] = out[m : 2 * m]
+    status[:] = before
+    ground = speed_rate(t, p)
+    fall, resting = np.empty(n), np.zeros(n, np.bool_)
+    w.friction[:] = 0.0
+    for j in range(n):
+        fall[j] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
+        for i in range(m):
+            fall[j] -= held_row(j, i, p, w) * room.rate[i]
+        blurred = 30.0 * math.sqrt(2.2e-16 * height * abs(fall[j])) + brief * abs(fall[j])
+        resting[j] = (touching[j] and not room.parting[j]
+                      and abs(w.nodes[j, RATE]) <= max(slow, blurred))
+    case = new_case(n, k)
+    if not _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
+        return NO_ACCELERATION
+    flight = math.inf
+    for j in range(n):
+        closed[j] = 1 if resting[j] and case.pressed[j] and case.x[j] > 0.0 else 0
+        room.fresh[k + j] = touching[j] and closed[j] == 0
+        if room.fresh[k + j] and fall[j] > 0.0:
+            flight = min(flight, -2.0 * w.nodes[j, RATE] / fall[j])
+    for c in range(k):
+        if status[c] == FIXED:
+            continue
+        status[c] = OPEN
+        for j in range(n):
+            if closed[j] and p.cluster[j] == c:
+                status[c] = case.mode[c]
+        room.fresh[c] = room.fresh[c] and (status[c] == 1 or status[c] == -1)
+    settle(t, p, status, closed, w, out, Y)
+    derivative(t, Y, p, status, closed, w, out)
+    return flight
+
+
+def _change_contacts(t, held_p, held_progress, held_room, held_w, slow, height, brief, held_out):
+    """Impact of the ``room.touched`` nodes, then which stops stay closed and what sticks.
+
+    ``room.parting`` nodes were closed and lift off, ``room.released`` clusters begin to slip in
+    the sense of their status, ``room.arrived`` ones have come to rest. After an impact, stops whose
+    penetration rate is below ``slow``, or whose rebound is lower than the rounding of the
+    ``height`` [m] or shorter than the time ``brief`` [s], close if a force presses them. Returns
+    the longest flight that a rebound may take [s], infinite if none, NO_ACCELERATION or
+    NO_IMPULSES, and fills ``out`` with Y'.
+    """
+    p, progress, room = borrowed(held_p), borrowed(held_progress), borrowed(held_room)
+    w, out = borrowed(held_w), borrowed(held_out)
+    Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest
+    n, count = len(p.cluster), 0
+    touching = np.zeros(n, np.bool_)
+    derivative(t, Y, p, status, closed, w, out)
+    near = max(largest[SLIP_SIZE], largest[RATE_SIZE])
+    for c in range(len(p.rows)):
+        near = max(near, abs(w.slip[c]))
+    for j in range(n):
+        touching[j] = room.touched[j] or closed[j] or room.parting[j]
+        if room.touched[j]:
+            near = max(near, abs(w.nodes[j, RATE]))
+            w.indices[count], w.right[count] = j, w.nodes[j, PENETRATION]
+            count += 1
+    if count > 0:
+        _push(count, 0, p, w, Y)
+        derivative(t, Y, p, status, closed, w, out)
+        if not _strike(t, touching, p, progress, w):
+            return NO_IMPULSES
+    return _decide(t, touching, count > 0, slow, height, brief, _NEAR * near, p, progress, room, w,
+                   out)
+
+
+compiled_change = compile_law(
+    CHANGE, "change_contacts(t, p, progress, room, w, slow, height, brief, out)", _change_contacts)
