@@ -191,7 +191,7 @@ class FourParameterIwanFriction(_MaxwellSlip):
 
     The distribution is cut into N intervals, each wider than the one before by the same ratio; an
     interval is one element, with all of its stiffness and all of its limit, so that K_T and F_S are
-    exact. The delta is one more element. With 16 intervals of ratio 1.3 the loss is right to 3 %
+    exact. The delta is one more element. With 16 intervals of ratio 1.3 the loss is right to 6 %
     down to 0.02 phi_max, with 50 of ratio 1.1 to 1 % down to 0.01 phi_max. Below the first limit
     nothing is lost. Internal variables follow their limits as in :class:`JenkinsFriction`.
 
