@@ -171,7 +171,7 @@ class SetValued(Solver):
     def __post_init__(self) -> None:
         for name in ("restitution", "tangential_restitution"):
             value = getattr(self, name)
-            if value is not None and not (isinstance(value, Real) and 0.0 <= value <= 1.0):
+            if value is not None and not (isinstance(value, Real) and 0.0 <= float(value) <= 1.0):
                 raise InputError(f"SetValued: {name} = {value!r} must be a number from 0 to 1.")
         if self.impact_law not in self.impact_laws:
             raise InputError(f"SetValued: impact_law = {self.impact_law!r} must be one of "
