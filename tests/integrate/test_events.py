@@ -145,7 +145,7 @@ def test_bad_input():
         Crossing("B", "x", value=float("nan"))
     with pytest.raises(InputError, match="events: 'touch-down' must be"):
         simulate(drop(), 1.0, initial=START, events=["touch-down"])
-    with pytest.raises(InputError, match=r"only by Rodas5P\(\), not by Scipy\(method='Radau'\)"):
+    with pytest.raises(InputError, match=r"SetValued\(\), not by Scipy\(method='Radau'\)"):
         simulate(drop(), 1.0, initial=START, events=ContactEvents(),
                  solver=Scipy("Radau"))
 

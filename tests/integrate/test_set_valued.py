@@ -30,6 +30,7 @@ from fecontact.laws import (
     RoughSurface,
     SpeedRamp,
 )
+from fecontact.system.kernels import CONTACT_DAMPING, FRICTION, LOAD
 
 BOTH = pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
     ("events", 1e-11, 1e-11), ("stepping", 1e-6, 2e-6)])
@@ -87,8 +88,8 @@ def test_coulomb_decay(nodes, scheme, rtol, tolerance):
     assert rate[-1] == pytest.approx(0.0, abs=1e-12)
     # Stuck: friction is what the spring wants, not what it could be.
     assert run.friction_force[-1] == pytest.approx(-0.5 / nodes, rel=5e-5)
-    assert run.work[-1, 7] == pytest.approx(0.5e4 * (0.85e-3**2 - 0.05e-3**2), rel=1e-5)
-    assert run.node_friction_work[-1] == pytest.approx(run.work[-1, 7] / nodes, rel=1e-9)
+    assert run.work[-1, FRICTION] == pytest.approx(0.5e4 * (0.85e-3**2 - 0.05e-3**2), rel=1e-5)
+    assert run.node_friction_work[-1] == pytest.approx(run.work[-1, FRICTION] / nodes, rel=1e-9)
     assert imbalance(system, run) < max(1e3 * tolerance * 1e-3, 1e-9)
 
 
@@ -239,8 +240,8 @@ def test_bouncing_ball(restitution):
     assert run.states[:, 0] == pytest.approx(height, abs=1e-11)
     assert run.states[-1] == pytest.approx(0.0, abs=1e-15)
     assert run.normal_force[-1] == pytest.approx(10.0, rel=1e-12)
-    assert run.work[-1, 3] == pytest.approx(10.0, rel=1e-12)
-    assert run.work[-1, 6] == pytest.approx(10.0, rel=1e-9)
+    assert run.work[-1, LOAD] == pytest.approx(10.0, rel=1e-12)
+    assert run.work[-1, CONTACT_DAMPING] == pytest.approx(10.0, rel=1e-9)
 
 
 def test_mass_lifted_off_a_rigid_stop():

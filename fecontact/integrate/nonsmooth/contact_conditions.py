@@ -22,6 +22,9 @@ C. Glocker, Set-Valued Force Laws, Springer 2001. R. I. Leine, N. van de Wouw, S
 Convergence of Mechanical Systems with Unilateral Constraints, Springer 2008.
 """
 
+# Compiled functions: their types are those of their signatures for numba.
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False, disallow-untyped-calls=False
+
 import math
 from typing import NamedTuple
 

@@ -6,6 +6,9 @@ changed is narrowed down by bisection; what `Crossing` watches is a polynomial w
 whose changes of sign are found however close.
 """
 
+# Compiled functions: their types are those of their signatures for numba.
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False, disallow-untyped-calls=False
+
 from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8, routine
 from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
 from fecontact.integrate.courses import MOST

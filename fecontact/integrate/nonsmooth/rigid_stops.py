@@ -20,6 +20,9 @@ Lectures 302 (1988). F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral
 1996. P. Painleve, Sur les lois du frottement de glissement, Comptes Rendus 121 (1895).
 """
 
+# Compiled functions: their types are those of their signatures for numba.
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False, disallow-untyped-calls=False
+
 import math
 
 import numpy as np
