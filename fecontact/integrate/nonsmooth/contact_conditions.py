@@ -23,7 +23,6 @@ Convergence of Mechanical Systems with Unilateral Constraints, Springer 2008.
 """
 
 # Compiled functions: their types are those of their signatures for numba.
-# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False, disallow-untyped-calls=False
 
 import math
 from typing import NamedTuple

@@ -7,7 +7,6 @@ whose changes of sign are found however close.
 """
 
 # Compiled functions: their types are those of their signatures for numba.
-# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False, disallow-untyped-calls=False
 
 from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8, routine
 from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes

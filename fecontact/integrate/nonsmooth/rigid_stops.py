@@ -21,7 +21,6 @@ Lectures 302 (1988). F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral
 """
 
 # Compiled functions: their types are those of their signatures for numba.
-# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False, disallow-untyped-calls=False
 
 import math
 
