@@ -22,6 +22,10 @@ EXAMPLES = {
     # The middle fifth carries most of 5 kN; both tables as in docs/convergence.md.
     "contact_convergence": ((), [(r"^\| 10 \| 10 \|[^|]*\| (\S+) \|", 20.71, 0.01),
                                  (r"^\| 5 \| 20 \|[^|]*\| (\S+) \|", 20.43, 0.01)], set()),
+    # Hertz: 1.2121 GPa; Cattaneo: sqrt(1/2).
+    "line_contact": (("out",), [(r"^nu = 0.3: p_0 = (\S+) GPa", 1.21207, 1e-3),
+                                (r"^nu = 0.49: .* c / b = (\S+)$", 0.70711, 1e-3)],
+                     {"out/line_contact.png"}),
     "squeal": (("out",), [(r"coefficient of (\S+) on", 0.3108, 2e-4),
                           (r"at (\S+) Hz,", 646.0, 0.1)],
                {"out/squeal_map.png", "out/squeal_modes.png"}),

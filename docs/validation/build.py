@@ -11,6 +11,7 @@ import eigenfrequencies
 import friction_cases
 import friction_section
 import impact_section
+import line_contact_section
 import normal_contact
 import two_mass_section
 
@@ -34,6 +35,7 @@ def main() -> None:
     for name, make in (("eigenfrequencies", eigenfrequencies.section),
                        ("impacts of one mass", normal_contact.section),
                        ("friction of one mass", friction_cases.section),
+                       ("line contact", lambda: line_contact_section.section(images)),
                        ("continuation", continuation_cases.section),
                        ("section 4.2", lambda: impact_section.section(images)),
                        ("section 4.3", lambda: friction_section.section(images)),
