@@ -8,7 +8,6 @@ from .core.errors import (
     ModelWarning,
 )
 from .fem.elastic_body import ElasticBody, Material
-from .fem.fields import BodyFields
 from .fem.generate import Beam, Block, Pendulum, generate
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
@@ -46,7 +45,6 @@ __all__ = [
     "AnalysisError",
     "Beam",
     "Block",
-    "BodyFields",
     "BoundaryLoad",
     "ContactState",
     "ContactSystem",

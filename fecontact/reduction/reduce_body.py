@@ -49,15 +49,14 @@ def modal_basis(
     modes : int
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground, its outward normal pointing to -y. Each of several
-        boundaries is a contact group, which may have its own laws.
+        Boundary that touches the ground, its outward normal pointing to -y; each of several is a
+        contact group.
     contact_nodes : int or 'all', or one of them for each boundary
         Number of equal segments of the boundary, each with a contact node at its centre that moves
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, (x, y), or a
-        :class:`~fecontact.Patch`. Default: the mesh's point of that name, else zero
-        rows.
+        :class:`~fecontact.Patch`. Default: the mesh's point of that name, else zero rows.
     points : mapping of name to place, optional
         Further points to observe.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
@@ -70,17 +69,15 @@ def modal_basis(
         For 'residual': largest fraction of its static compliance that may be missing at any of
         these points, in x or y, or for one of the loads. Zero keeps all residual vectors.
     loads : sequence of 'gravity' or place
-        Further loads whose static response is added, if not for 'vibration': 'gravity' (and base
-        acceleration), pressure and shear on a boundary, forces at a further point or place.
+        Further loads whose static response is added, if not for 'vibration': 'gravity', boundaries
+        under pressure and shear, further points under forces.
     rotation : Rotation, optional
-        The body rotates, and its displacements are those in the frame that rotates with it. The
-        modes are those at rest, coupled by the terms of the rotation.
+        The body rotates; displacements are those in its frame, modes those at rest.
 
     Raises
     ------
     InputError, MeshError
-        For unknown names, places outside the body, an upward contact face, more modes than
-        unknowns, or more contact nodes than the boundary has.
+        For unknown names, places outside the body, an upward contact face, too many modes or nodes.
     """
     import scipy.sparse as sp
 

@@ -25,9 +25,9 @@ class PreloadSettings(LoadPath):
     forces : list of float or list, optional
         Values of ``load.forces``, in their order [N], [N m]; by default their constant parts.
     motion_x, motion_y : float or list, optional
-        Displacements of the driven ends of the springs at B; by default their constant parts.
+        Displacements of the driven ends of the springs at B [m]; by default their constant parts.
     travel : float or list
-        Travel of the ground in +x.
+        Travel of the ground in +x [m].
     steps : int or list
         Increments between two vertices, of each of the sections if it is a list.
     tangential_ratio : float

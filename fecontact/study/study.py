@@ -1,12 +1,10 @@
 """Studies: TOML files that describe a model from its geometry to the run and its plots."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.core.checks import as_path, require_kind
@@ -31,12 +29,11 @@ from fecontact.integrate.solvers import Rodas5P
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.integrate.wear import WearHistory, wear_history
 from fecontact.laws.base import FrictionLaw, NormalLaw
-from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
-from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES, with_folder
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.study.assembly import contact_system
 from fecontact.study.geometry_section import Geometry, MeshFile, geometry_from_table, geometry_table
 from fecontact.study.preload_section import PreloadSettings
 from fecontact.study.sections import (
@@ -49,13 +46,8 @@ from fecontact.study.sections import (
     WearSettings,
 )
 from fecontact.study.sweep_section import SweepSettings, flat_axes
-from fecontact.system.contact_system import (
-    NO_FRICTION_LAW,
-    NO_NORMAL_LAW,
-    ContactSystem,
-    needs_friction,
-)
-from fecontact.system.gap import Crown, gap_values
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.gap import Crown
 from fecontact.system.quasistatic.history import LoadHistory
 
 Gap = float | tuple[float, ...] | Crown
@@ -410,65 +402,3 @@ def _gap(value: Any, title: str) -> Gap:
     if not all(0.0 <= number < float("inf") for number in numbers):
         raise InputError(f"{title}: gap = {shown(value)} must be finite and zero or above.")
     return gap
-
-
-LAWS = ("normal", "friction")
-
-
-def contact_system(study: "Study", basis: ModalBasis, title: str) -> ContactSystem:
-    """Contact system of a study on a modal basis; ``title`` names the study in messages.
-
-    Raises
-    ------
-    InputError
-        For laws, loads or a gap that do not fit the basis; the message names the section.
-    """
-    groups = dict(basis.groups)
-    for name in study.contact:
-        if name not in groups:
-            raise InputError(f"{title}: [contact.{name}]: the basis has no contact group '{name}'"
-                             f"{nearest(name, groups)}; its groups are: {choices(groups)}.")
-    if study.normal is None and len(_own(study, "normal")) < len(groups):
-        raise InputError(NO_NORMAL_LAW.format(f"{title} lacks the section [normal]"))
-    if study.friction is None and len(_own(study, "friction")) < len(groups) and (
-            needs_friction(basis)):
-        raise InputError(NO_FRICTION_LAW.format(f"{title} lacks the section [friction]"))
-    for section, law, count in _laws(study, groups):
-        with located(f"{title}: [{section}]:", type(law).__name__):
-            law.table(np.full(count, 1.0 / count))
-            require_sound(law)
-    for force in study.load.forces:
-        with located(f"{title}: [load.forces]:"):
-            if not isinstance(force.point, tuple):
-                basis.point_index(force.point)
-    for load in study.load.boundaries:
-        with located(f"{title}: [load.boundaries]:"):
-            basis.boundary_row(load.boundary)
-    with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
-        gap = gap_values(study.gap, basis.contact_x)
-    parts: dict[str, Any] = {part: getattr(study, part) for part in PART_CLASSES}
-    for part in LAWS:
-        own = _own(study, part)
-        if own:
-            usual = parts[part] or ConstantFriction(0.0)
-            parts[part] = dict.fromkeys(groups, usual) | own
-    with located(f"{title}:", "ContactSystem"):
-        return ContactSystem(basis, gap=gap, **parts)
-
-
-def _own(study: "Study", part: str) -> dict[str, Any]:
-    """Laws given for single contact groups."""
-    return {group: law for group, laws in study.contact.items()
-            if (law := getattr(laws, part)) is not None}
-
-
-def _laws(study: "Study", groups: Mapping[str, int]) -> Iterator[tuple[str, Any, int]]:
-    """Section of each law, the law, and the number of nodes that use it."""
-    for part in LAWS:
-        own = _own(study, part)
-        for group, law in own.items():
-            yield f"contact.{group}.{part}", law, groups[group]
-        for count in [sum(groups.values())] if not own else [
-                count for group, count in groups.items() if group not in own]:
-            if getattr(study, part) is not None:
-                yield part, getattr(study, part), count

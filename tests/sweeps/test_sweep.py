@@ -207,7 +207,8 @@ def test_bodies_that_change_are_computed_once_each(study, tmp_path, monkeypatch)
     made = []
     original = BasisSettings.modal_basis
     monkeypatch.setattr(BasisSettings, "modal_basis",
-                        lambda self, body: made.append(body.thickness) or original(self, body))
+                        lambda self, body, rotation: (made.append(body.thickness)
+                                                      or original(self, body, rotation)))
     axes = {"ground.speed": [1e-3, 2e-3, 3e-3], "body.thickness": [0.1, 0.15]}
     table = sweep(study, axes, Serial(), folder=tmp_path / "f", batch=2)
     assert sorted(made) == [0.1, 0.15]

@@ -83,10 +83,8 @@ class _MaxwellSlip(LimitedFriction):
 
     def sliders(self, share: Array) -> tuple[Array, Array]:
         """Stiffness (n, s) of the springs [N/m], and limits (n, s) of the sliders as parts of F."""
-        stiffness, coefficient = self.table(share)[:, :2].T
-        part = (2.0 * np.arange(self.memory) + 1.0) / self.memory**2
-        return (np.repeat(stiffness[:, None] / self.memory, self.memory, axis=1),
-                coefficient[:, None] * part)
+        _, stiffness, limits = np.split(self.table(share), [1, 1 + self.memory], axis=1)
+        return stiffness, limits
 
     @property
     def state_scale(self) -> Array:
