@@ -34,8 +34,8 @@ class PreloadSettings(LoadPath):
         Tangential over normal stiffness of stuck contacts [-], ``inf`` for rigid sticking; not for
         Jenkins and Iwan friction, which have springs of their own.
     tangential_stiffness : float or list, optional
-        Tangential stiffness of stuck contacts of the whole face, or of each node, instead of the
-        ratio.
+        Tangential stiffness of stuck contacts of the whole face, or of each node [N/m], instead of
+        the ratio.
     rtol : float
         Relative error of work and loss of an increment.
     """

@@ -181,7 +181,8 @@ _bases: OrderedDict[tuple[str, bool], ModalBasis] = OrderedDict()
 
 def _basis(batch: Batch, study: Study, key: str) -> ModalBasis:
     """Basis of a key: cached in this process, sent with the batch, read from a file or computed."""
-    mark = key, batch.frames > 0
+    at_places = any(isinstance(force.point, tuple) for force in study.load.forces)
+    mark = key, batch.frames > 0 or at_places
     basis = _bases.get(mark)
     if basis is None:
         given = batch.bases.get(key)

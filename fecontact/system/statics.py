@@ -132,7 +132,6 @@ def resting(
 ) -> tuple["Balance", Array]:
     """Problem and equilibrium (m,) without friction under modal loads (m,) and drive motions (2,).
 
-    All forces of the ground along x are left to friction.
     AnalysisError if there is none.
     """
     arrays = system.arrays
@@ -140,7 +139,7 @@ def resting(
     arrays = at_rest(arrays, travel)._replace(
         constant_load=load + pulls, drive_shapes=np.zeros_like(arrays.drive_shapes),
         load_shapes=np.zeros_like(arrays.load_shapes))
-    problem = Balance(arrays._replace(leans=0), 0.0, system.penetration_scale)
+    problem = Balance(arrays, 0.0, system.penetration_scale)
     solution = problem.equilibrium()
     if solution is None:
         raise AnalysisError(_reason(system, problem, False))
