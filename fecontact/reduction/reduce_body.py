@@ -60,7 +60,7 @@ def modal_basis(
     points : mapping of name to place, optional
         Further points to observe.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
-        See :func:`fecontact.reduction.damping.modal_damping`; the last ratio is for all that follow.
+        See :func:`fecontact.reduction.damping.modal_damping`; the last ratio holds on.
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Vibration modes alone; vibration modes and residual vectors of forces at B, C and the
         contact nodes, for exact static deflections there; or fixed-interface and constraint modes.
