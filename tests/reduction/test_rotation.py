@@ -8,6 +8,7 @@ from fecontact import (
     ContactSystem,
     ElasticBody,
     InputError,
+    Load,
     Material,
     Mesh,
     Pendulum,
@@ -22,7 +23,7 @@ from fecontact import (
 from fecontact.analysis import complex_modes
 from fecontact.bifurcation import contact_field, stability_map
 from fecontact.io import read_basis, write_basis
-from fecontact.laws import ConstantFriction, LinearContact
+from fecontact.laws import Constant, ConstantFriction, LinearContact
 from fecontact.reduction import BasisReport
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
@@ -236,3 +237,11 @@ def test_bad_rotations_are_refused():
         basis.with_rotation_speed(1.0)
     with pytest.raises(InputError, match=r"basis\.rotation\.speed'.* does not rotate"):
         apart(basis).parameter("basis.rotation.speed")
+
+
+def test_loads_of_one_direction_in_space_are_refused():
+    _, basis = clamped(1.0, 0.1, 4, 1, 4, rotation=Rotation(10.0))
+    with pytest.raises(InputError, match=r"gravity = .* cannot act on a body that rotates"):
+        apart(basis, load=Load(gravity=(0.0, -9.81)))
+    with pytest.raises(InputError, match=r"base_acceleration_x .*rotates"):
+        apart(basis, load=Load(base_acceleration_x=Constant(1.0)))
