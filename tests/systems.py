@@ -2,6 +2,7 @@
 
 import numpy as np
 from meshes_for_tests import rectangle
+from scipy.optimize import brentq
 
 from fecontact import (
     ContactSystem,
@@ -172,3 +173,28 @@ def beam(n=4, modes=6, **parts):
 
 DRIVEN = {"ground": Ground(speed=0.05), "drive": Drive(
     stiffness_x=1e5, damping_x=5.0, amplitude_x=1e-4, angular_frequency=300.0)}
+
+
+def belt_of_unit_mass(speed=0.2, dashpot=0.0, **parts):
+    """A unit mass on a unit spring, pressed on a belt; kinetic friction 1/2."""
+    row = [[1.0], [0.0], [0.0]]
+    modes = basis_from_matrices([[1.0]], [[1.0]], {"contact": [row], "B": row, "C": row},
+                                damping=[[dashpot]])
+    return ContactSystem(modes, **{"normal": PrescribedForce(1.0),
+                                   "friction": ConstantFriction(0.5),
+                                   "ground": Ground(speed=speed), **parts})
+
+
+def last_speed_of_stick_slip(dashpot):
+    """Belt speed above which slip no longer ends: the next crest of the speed just reaches it."""
+    w = np.sqrt(1.0 - 0.25 * dashpot**2)
+
+    def short(speed):
+        z, v = 0.5 - dashpot * speed, speed
+        times = np.linspace(0.5 * np.pi, 2.5 * np.pi, 20001)
+        b = (v + 0.5 * dashpot * z) / w
+        rate = np.exp(-0.5 * dashpot * times) * (
+            v * np.cos(w * times) - (w * z + 0.5 * dashpot * b) * np.sin(w * times))
+        return rate.max() - speed
+
+    return brentq(short, 0.1, 2.0, xtol=1e-12)

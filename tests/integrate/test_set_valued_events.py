@@ -2,25 +2,17 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from systems import belt_of_unit_mass as belt
+from systems import last_speed_of_stick_slip as last_speed
 
 import fecontact as fc
 from fecontact import Status
 from fecontact.bifurcation import Axis, basins
 from fecontact.integrate import ContactEvents, Crossing, SetValued, strobe
-from fecontact.laws import ConstantFriction, LinearContact, PrescribedForce, RoughSurface
+from fecontact.laws import ConstantFriction, LinearContact, RoughSurface
 
-SIDEWAYS, UPWARDS = [[1.0], [0.0], [0.0]], [[0.0], [1.0], [0.0]]
+UPWARDS = [[0.0], [1.0], [0.0]]
 STATIC = SetValued(static_coefficient=1.0)
-
-
-def belt(speed=0.2, dashpot=0.0, **parts):
-    """A unit mass on a unit spring, pressed on a belt; kinetic friction 1/2."""
-    basis = fc.basis_from_matrices([[1.0]], [[1.0]], {
-        "contact": [SIDEWAYS], "B": SIDEWAYS, "C": SIDEWAYS}, damping=[[dashpot]])
-    return fc.ContactSystem(basis, **{"normal": PrescribedForce(1.0),
-                                      "friction": ConstantFriction(0.5),
-                                      "ground": fc.Ground(speed=speed), **parts})
 
 
 def ball(**parts):
@@ -134,21 +126,6 @@ def test_multipliers_of_stick_slip():
     assert found.states[-1] == pytest.approx(start, abs=1e-7)
     multipliers = np.linalg.eigvals(found.monodromy)
     assert np.sort(np.abs(multipliers)) == pytest.approx([0.0, 1.0], abs=1e-5)
-
-
-def last_speed(dashpot):
-    """Belt speed above which slip no longer ends: the next crest of the speed just reaches it."""
-    w = np.sqrt(1.0 - 0.25 * dashpot**2)
-
-    def short(speed):
-        z, v = 0.5 - dashpot * speed, speed
-        times = np.linspace(0.5 * np.pi, 2.5 * np.pi, 20001)
-        b = (v + 0.5 * dashpot * z) / w
-        rate = np.exp(-0.5 * dashpot * times) * (
-            v * np.cos(w * times) - (w * z + 0.5 * dashpot * b) * np.sin(w * times))
-        return rate.max() - speed
-
-    return brentq(short, 0.1, 2.0, xtol=1e-12)
 
 
 def test_end_of_stick_slip_over_the_speed_of_the_belt():

@@ -22,12 +22,13 @@ from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits import shooting_branches, starts
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.bifurcation.orbits.restored import rescaled, restored
+from fecontact.bifurcation.orbits.restored import rescaled, restored, solver_of
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.shooting import require_segments
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError, require_finite, require_positive
 from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
 
 # Factors of the first step, tried in this order to leave a special point.
@@ -79,6 +80,9 @@ class Shooting:
         Relative tolerance of the derivatives, as for :func:`fecontact.sensitivity`. With many
         fast modes that the motion hardly excites, 1e-2 saves most of the time and affects only
         their small multipliers; with impacts it makes all multipliers inaccurate.
+    solver : Rodas5P or SetValued
+        What runs the segments. With SetValued orbits have friction without smoothing, from a motion
+        of the same solver; derivatives are differences of its runs, relative accuracy 1e-6.
 
     Raises
     ------
@@ -89,9 +93,13 @@ class Shooting:
     segments: int = 4
     rtol: float = 1e-9
     derivative_rtol: float | None = None
+    solver: Solver = RODAS5P
 
     def __post_init__(self) -> None:
         require_segments(self.segments)
+        if not isinstance(self.solver, Rodas5P | SetValued):
+            raise InputError(f"Shooting: solver = {self.solver!r} must be Rodas5P() or "
+                             f"SetValued().")
         require_positive("Shooting", rtol=self.rtol)
         if self.derivative_rtol is not None:
             require_positive("Shooting", derivative_rtol=self.derivative_rtol)
@@ -201,7 +209,7 @@ def _method_of(point: BranchPoint) -> Collocation | Shooting:
     known = point.branch.attributes
     if point.by_shooting:
         return Shooting(int(known["segments"]), float(known.get("rtol", 1e-9)),
-                        known.get("derivative_rtol"))
+                        known.get("derivative_rtol"), solver_of(known))
     return Collocation(len(point.values["mesh"]) - 1, int(known["degree"]))
 
 
@@ -233,7 +241,7 @@ def _from_hopf(
         return _first_that_goes(
             starts.at_hopf(field, point, 50, 4, options, scales, width),
             lambda found: shooting_branches.born(found[0], method.segments, method.rtol,
-                                                 method.derivative_rtol, options))
+                                                 method.derivative_rtol, method.solver, options))
     return _first_that_goes(
         starts.at_hopf(field, point, method.intervals, method.degree, options, scales, width),
         lambda found: _followed(found[0], options, found[1]))
@@ -255,7 +263,7 @@ def _from_motion(
     if isinstance(method, Shooting):
         return shooting_branches.from_motion(
             field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
-            options, widths, direction, both)
+            method.solver, options, widths, direction, both)
     problem, u = starts.corrected(*starts.from_samples(
         field, given, free, motion.times, motion.states, motion.period, method.intervals,
         method.degree, motion.periods, widths))

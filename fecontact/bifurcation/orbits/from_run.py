@@ -9,6 +9,7 @@ from fecontact.core.errors import AnalysisError, InputError, require_not_negativ
 from fecontact.core.types import Array
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period
@@ -21,7 +22,7 @@ _MISFIT = 1e-2
 
 def periodic_motion(
     system: ContactSystem, *, initial: Initial = "rest", transient: float | None = None,
-    longest_period: float | None = None, rtol: float = 1e-8,
+    longest_period: float | None = None, solver: Solver = RODAS5P, rtol: float = 1e-8,
 ) -> PeriodicMotion:
     """Run a system until its motion repeats.
 
@@ -35,6 +36,8 @@ def periodic_motion(
         Transient before the motion is examined [s]; 200 excitation periods by default.
     longest_period : float, optional
         Longest period considered [s]; 16 excitation periods by default.
+    solver : Rodas5P, SetValued, Scipy or CVODE
+        What runs it; see :func:`fecontact.simulate`.
     rtol : float
         Relative tolerance.
 
@@ -61,7 +64,7 @@ def periodic_motion(
             raise InputError("Nothing excites the system with a period; give transient, the time "
                              "until its motion settles, and longest_period, both in s.")
         end = transient + 2.2 * longest_period
-        run = _run(system, initial, end, np.linspace(transient, end, 6 * _SAMPLES), rtol)
+        run = _run(system, initial, end, np.linspace(transient, end, 6 * _SAMPLES), solver, rtol)
         if _at_rest(run):
             raise AnalysisError(f"The run comes to rest, or slides steadily, after {transient:g} "
                                 f"s; there is no periodic orbit to start from, so take another "
@@ -71,11 +74,11 @@ def periodic_motion(
     largest = _LARGEST if longest_period is None else max(1, round(longest_period / excitation))
     checks = largest + max(2 * largest, 8)
     instants: Array = excitation * np.arange(first, first + checks + 1, dtype=float)
-    run = _run(system, initial, float(instants[-1]), instants, rtol)
+    run = _run(system, initial, float(instants[-1]), instants, solver, rtol)
     fine = _run(system, run.states[-1], float(instants[-1] + excitation * largest),
                 float(instants[-1]) + excitation * np.linspace(0.0, largest,
                                                                largest * _SAMPLES + 1),
-                rtol, float(instants[-1]))
+                solver, rtol, float(instants[-1]))
     size = np.ptp(fine.states, axis=0)
     size = np.maximum(size, 1e-9 * np.abs(fine.states).max(axis=0)) + 1e-300
     found = count_periods(run.states, size, largest=largest)
@@ -90,14 +93,15 @@ def periodic_motion(
 
 
 def _run(
-    system: ContactSystem, initial: Initial, end: float, outputs: Array, rtol: float,
-    begin: float = 0.0,
+    system: ContactSystem, initial: Initial, end: float, outputs: Array, solver: Solver,
+    rtol: float, begin: float = 0.0,
 ) -> Trajectory:
     """Run with the requested outputs; the start is included only if requested."""
     extra = outputs[0] > begin
     times = np.append(begin, outputs) if extra else outputs
     times[-1] = end
-    run = simulate(system, end, t_start=begin, initial=initial, outputs=times, rtol=rtol)
+    run = simulate(system, end, t_start=begin, initial=initial, outputs=times, solver=solver,
+                   rtol=rtol)
     if run.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
     if run.status is not Status.FINISHED:

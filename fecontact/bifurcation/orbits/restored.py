@@ -1,7 +1,9 @@
 """Continuation problems of orbits, restored from points of branches."""
 
-from dataclasses import replace
-from typing import TypeVar
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate.solvers import RODAS5P, SetValued, Solver
 
 P = TypeVar("P", CollocationProblem, ShootingProblem)
 
@@ -59,8 +62,19 @@ def restored_shooting(
     problem = ShootingProblem(field, values, free, np.asarray(point.values["mesh"], dtype=float),
                               point.u[: field.dimension].copy(),
                               np.asarray(known["scales"], dtype=float), int(known["periods"]),
-                              float(known.get("rtol", 1e-9)), known.get("derivative_rtol"))
+                              float(known.get("rtol", 1e-9)), known.get("derivative_rtol"),
+                              solver_of(known))
     return problem, point.u, point.tangent
+
+
+def solver_text(solver: Solver) -> str | None:
+    """Options of a set-valued solver as text for a branch's attributes; None for the default."""
+    return json.dumps(asdict(solver)) if isinstance(solver, SetValued) else None
+
+
+def solver_of(known: Mapping[str, Any]) -> Solver:
+    """The solver of a branch by shooting, from its attributes."""
+    return SetValued(**json.loads(known["solver"])) if "solver" in known else RODAS5P
 
 
 def rescaled(problem: P, scales: ArrayLike | None, width: float | None) -> P:

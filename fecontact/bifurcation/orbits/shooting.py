@@ -21,15 +21,19 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensemble import ensemble
 from fecontact.integrate.sensitivity import Sensitivity, sensitivity
+from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 
-# Samples of a segment, for the extremes of the states.
-_SAMPLES = 33
+_SAMPLES = 33  # of a segment, for the extremes of the states
 # Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
 # Phase after the start of a segment below which the start itself is used.
 _AT_START = 1e-10
+# Part of a period over which rates of set-valued motions are taken.
+_BRIEF = 1e-5
+# Largest gap between the runs of a set-valued orbit, in scales of the states.
+_RETURNS = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,8 @@ class ShootingProblem(Problem):
         Relative tolerance of the runs.
     derivative_rtol : float or None
         Relative tolerance of the derivatives; see :func:`fecontact.sensitivity`.
+    solver : Rodas5P or SetValued
+        What runs the segments.
     precision : float
         Tolerance of the location of special points, relative to the step. Below it, differences
         between the steps of the runs dominate, and each trial costs a run with derivatives.
@@ -83,6 +89,7 @@ class ShootingProblem(Problem):
     periods: int = 1
     rtol: float = 1e-9
     derivative_rtol: float | None = None
+    solver: Solver = RODAS5P
     precision: float = 1e-7
     before: tuple[Array, Array] | None = None
     bend: Array | None = None
@@ -121,9 +128,18 @@ class ShootingProblem(Problem):
     @cached_property
     def phase_row(self) -> Array:
         """Unit direction (d,) of the motion at the reference, in the scaled states."""
-        f = self.field.rates(np.zeros(1), self.reference[None], self.values)[0]
+        f = self.rates(0.0, self.reference, self.values)
         row = f / self.scales[: len(f)] ** 2
         return row / np.linalg.norm(row * self.scales[: len(f)])
+
+    def rates(self, t: float, state: Array, values: Array) -> Array:
+        """Rates (d,) of a state; of a set-valued motion those of a brief run from there."""
+        if isinstance(self.solver, Rodas5P):
+            return np.asarray(self.field.rates(np.array([t]), state[None].copy(), values)[0])
+        h = _BRIEF * float(self.scales[-2])
+        first, middle, last = run_from(self.field.system(values), t + np.array([[0.0, h, 2.0 * h]]),
+                                       state[None].copy(), self.rtol, self.solver)[0]
+        return np.asarray((4.0 * middle - 3.0 * first - last) / (2.0 * h))
 
     def linearise(self, u: Array) -> "ShootingLinearisation":
         """Residual and linearisation at u, each computed on demand."""
@@ -170,12 +186,21 @@ class ShootingProblem(Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""
+        if not isinstance(self.solver, Rodas5P):
+            self._require_return(u)
         stability = linearisation.floquet
         states = linearisation.paths.reshape(-1, self.field.dimension)
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh,
                 "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
+
+    def _require_return(self, u: Array) -> None:
+        """Raise AnalysisError unless the runs from u meet: a jump of theirs looks like a solution."""
+        d = self.field.dimension
+        gaps = self.linearise(u).residual[: len(u) - self.common].reshape(-1, d)
+        if np.abs(gaps / self.scales[:d]).max() > _RETURNS:
+            raise AnalysisError("The set-valued motion jumps there: an event appears or vanishes.")
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -223,7 +248,7 @@ class ShootingProblem(Problem):
             begin = self.mesh[segments[runs]]
             times = self.period(u) * np.stack([begin, begin + since[runs]], axis=1)
             found[runs] = run_from(self.field.system(self.parameters(u)), times, found[runs],
-                                   self.rtol)[:, -1]
+                                   self.rtol, self.solver)[:, -1]
         return found
 
 
@@ -235,7 +260,7 @@ def require_segments(segments: int) -> None:
 
 def shooting_from(
     problem: CollocationProblem, u: Array, segments: int = 4, rtol: float = 1e-9,
-    derivative_rtol: float | None = None,
+    derivative_rtol: float | None = None, solver: Solver = RODAS5P,
 ) -> tuple[ShootingProblem, Array]:
     """The shooting problem of an orbit, with segments of equal length, and its first guess.
 
@@ -252,13 +277,15 @@ def shooting_from(
     mesh = np.linspace(0.0, 1.0, segments + 1)
     starts = interpolate(problem.mesh, problem.nodes(u), mesh[:-1])
     result = ShootingProblem(field, problem.parameters(u), problem.free, mesh, starts[0].copy(),
-                             problem.scales, problem.periods, rtol, derivative_rtol)
+                             problem.scales, problem.periods, rtol, derivative_rtol, solver)
     return result, np.concatenate([starts.reshape(-1), u[problem.size :]])
 
 
-def run_from(system: ContactSystem, times: Array, starts: Array, rtol: float) -> Array:
+def run_from(
+    system: ContactSystem, times: Array, starts: Array, rtol: float, solver: Solver = RODAS5P
+) -> Array:
     """States (K, k, d) at times (K, k) of runs from starts (K, d); AnalysisError if one fails."""
-    found = ensemble(system, times, initial=starts, rtol=rtol)
+    found = ensemble(system, times, initial=starts, rtol=rtol, solver=solver)
     if not found.finished.all():
         status = found.status[int(np.argmin(found.finished))]
         if status is Status.INTERRUPTED:
@@ -340,7 +367,8 @@ class ShootingLinearisation:
         def run(start: Array, begin: float, end: float) -> Sensitivity:
             return sensitivity(self._system, float(end), t_start=float(begin), initial=start,
                                parameter=(lambda _, value: moved(value), float(self.u[-1])),
-                               rtol=problem.rtol, derivative_rtol=problem.derivative_rtol)
+                               solver=problem.solver, rtol=problem.rtol,
+                               derivative_rtol=problem.derivative_rtol)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             return list(pool.map(run, problem.starts(self.u), self._times[:-1], self._times[1:]))
@@ -349,7 +377,8 @@ class ShootingLinearisation:
     def paths(self) -> Array:
         """States (K, samples, d) of the segments, from start to end."""
         times = np.linspace(self._times[:-1], self._times[1:], _SAMPLES, axis=1)
-        return run_from(self._system, times, self.problem.starts(self.u), self.problem.rtol)
+        return run_from(self._system, times, self.problem.starts(self.u), self.problem.rtol,
+                        self.problem.solver)
 
     @cached_property
     def _ends(self) -> Array:
@@ -380,7 +409,7 @@ class ShootingLinearisation:
             factors.local[j, :, d : 2 * d] = -np.eye(d)
             factors.local[j, :, -1] = run.parameter_derivative
             if problem.autonomous:
-                f = problem.field.rates(np.zeros(1), run.states[-1:].copy(), values)[0]
+                f = problem.rates(0.0, run.states[-1], values)
                 factors.local[j, :, -2] = (problem.mesh[j + 1] - problem.mesh[j]) * f
             elif slope:
                 factors.local[j, :, -1] += slope * self._shifted(j, run, values)
@@ -398,8 +427,8 @@ class ShootingLinearisation:
 
     def _shifted(self, j: int, run: Sensitivity, values: Array) -> Array:
         """Derivative (d,) of the end of segment j with respect to the period."""
-        problem, rates = self.problem, self.problem.field.rates
-        before, after = (rates(self._times[k : k + 1], state[None].copy(), values)[0]
+        problem = self.problem
+        before, after = (problem.rates(float(self._times[k]), state, values)
                          for k, state in ((j, run.states[0]), (j + 1, run.states[-1])))
         moved = problem.mesh[j + 1] * after - problem.mesh[j] * (run.monodromy @ before)
         return np.asarray(moved)

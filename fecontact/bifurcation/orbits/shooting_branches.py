@@ -13,7 +13,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
+from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting, solver_text
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.shooting import (
     ShootingLinearisation,
@@ -23,6 +23,7 @@ from fecontact.bifurcation.orbits.shooting import (
 from fecontact.bifurcation.orbits.starts import Start, from_samples
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate.solvers import Solver
 
 # Distance of the two halves of an orbit, relative to the largest one, at which a branch of doubled
 # orbits ends. Single orbits solve the equations too: closer to them the corrector may find either,
@@ -40,6 +41,8 @@ def _attributes(problem: ShootingProblem) -> dict[str, Any]:
              "segments": len(problem.mesh) - 1, "periods": problem.periods, "rtol": problem.rtol}
     if problem.derivative_rtol is not None:
         found["derivative_rtol"] = problem.derivative_rtol
+    if (solver := solver_text(problem.solver)) is not None:
+        found["solver"] = solver
     return found
 
 
@@ -48,12 +51,12 @@ def _name(problem: ShootingProblem) -> str:
 
 
 def born(
-    start: Start, segments: int, rtol: float, derivative_rtol: float | None,
+    start: Start, segments: int, rtol: float, derivative_rtol: float | None, solver: Solver,
     options: ContinuationOptions
 ) -> Branch:
     """Branch from a start at a Hopf point, for orbits that reach stick on steep friction."""
     found, u, leaving = start
-    problem, first = shooting_from(found, u, segments, rtol, derivative_rtol)
+    problem, first = shooting_from(found, u, segments, rtol, derivative_rtol, solver)
     shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
     tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
     return continue_branch(problem, first, options, name=_name(problem),
@@ -63,8 +66,8 @@ def born(
 
 def from_motion(
     field: VectorField, values: Array, free: int, motion: PeriodicMotion, segments: int,
-    rtol: float, derivative_rtol: float | None, options: ContinuationOptions, widths: Array,
-    direction: float, both: bool,
+    rtol: float, derivative_rtol: float | None, solver: Solver, options: ContinuationOptions,
+    widths: Array, direction: float, both: bool,
 ) -> Branch:
     """Branch through the orbit to which a motion of a contact system has settled.
 
@@ -84,7 +87,7 @@ def from_motion(
                                     field.system().basis.modes)
     found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
                          motion.periods, widths)
-    problem, u = shooting_from(*found, segments, rtol, derivative_rtol)
+    problem, u = shooting_from(*found, segments, rtol, derivative_rtol, solver)
     try:
         return continue_branch(problem, u, options, name=_name(problem), direction=direction,
                                both=both,
@@ -273,6 +276,7 @@ def _doubled(problem: ShootingProblem, u: Array) -> tuple[_Doubled, Array, Array
     start = np.concatenate([starts.reshape(-1), starts.reshape(-1), tail])
     shape = np.concatenate(carried)
     twice = _Doubled(problem.field, problem.values, problem.free, mesh, problem.reference, scales,
-                     2 * problem.periods, problem.rtol, problem.derivative_rtol)
+                     2 * problem.periods, problem.rtol, problem.derivative_rtol,
+                     problem.solver)
     tangent = np.concatenate([shape, -shape, np.zeros(problem.common)])
     return twice, start, tangent / np.sqrt(twice.weights() @ tangent**2)
