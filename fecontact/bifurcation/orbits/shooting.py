@@ -196,7 +196,7 @@ class ShootingProblem(Problem):
                 "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
 
     def _require_return(self, u: Array) -> None:
-        """Raise AnalysisError unless the runs from u meet: a jump of theirs looks like a solution."""
+        """Raise AnalysisError unless the runs from u meet; a jump looks like a solution."""
         d = self.field.dimension
         gaps = self.linearise(u).residual[: len(u) - self.common].reshape(-1, d)
         if np.abs(gaps / self.scales[:d]).max() > _RETURNS:
