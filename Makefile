@@ -5,6 +5,10 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SYSTEM := $(VENV)/.system-libraries
 
+# What is compiled beside the integrator, on another core.
+SECOND := fecontact.bifurcation.linalg.bordered, fecontact.bifurcation.linalg.periodic_schur, \
+  fecontact.system.quasistatic.march, fecontact.fem.mesh_files, fecontact.integrate.nonsmooth.driver
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-slow check bench validation clean
 
@@ -63,7 +67,9 @@ $(READY): pyproject.toml | $(BIN)/python
 	@echo "Installing fecontact and what it needs"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@echo "Compiling its kernels"
-	@$(BIN)/python -c 'import fecontact.integrate.rodas5p.driver, fecontact.fem.mesh_files, fecontact.study.study'
+	@$(BIN)/python -c 'import fecontact.integrate.rodas5p.driver' & first=$$!; \
+	  $(BIN)/python -c 'import $(SECOND)' && wait $$first
+	@$(BIN)/python -c 'import fecontact.study.study'
 	@touch $@
 
 $(SYSTEM): .ci/system-libraries fecontact/core/system_libraries.py | $(BIN)/python
