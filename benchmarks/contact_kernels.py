@@ -34,7 +34,8 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     xi = s.abscissa + x - speed * t
     slip = x_rate - speed
     u = ground.amplitude * np.sin(k * xi) - height - s.gap
-    rate = ground.amplitude * k * np.cos(k * xi) * slip - height_rate
+    tilt = ground.amplitude * k * np.cos(k * xi)
+    rate = tilt * slip - height_rate
     c, R, b = s.normal_parameters.T
     z = u / R
     elastic = c * R * np.where(z <= 0.0, 0.0, np.where(z < 1.0, 0.5 * z * z, z - 0.5))
@@ -43,9 +44,9 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     friction = ((mu0 - mu) * np.exp(-decay * np.abs(slip)) + mu) * F * (
         2.0 / np.pi) * np.arctan(slope * slip)
     drive = system.drive
-    force = (s.constant_load + drive.amplitude_x * np.sin(drive.angular_frequency * t)
-             * s.drive_shapes[0] - s.stiffness @ q - s.damping @ v + s.Ty.T @ F
-             - s.Tx.T @ friction)
+    pull = s.drive_stiffness[0] * drive.amplitude_x * np.sin(drive.angular_frequency * t)
+    force = (s.constant_load + pull * s.drive_shapes[0] - s.stiffness @ q - s.damping @ v
+             + s.Ty.T @ F - s.Tx.T @ (friction + F * tilt))
     return np.concatenate([v, force])
 
 

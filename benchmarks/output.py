@@ -23,6 +23,7 @@ from fecontact import (
 from fecontact.io import export_pvd
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.plot import rendering_problem
+from fecontact.system.kernels import POWERS
 
 FRAMES = 200
 
@@ -37,7 +38,7 @@ def bouncing_beam(element_size: float = 0.00145) -> Trajectory:
     w = 2.0 * np.pi * 100.0 * np.arange(1, basis.modes + 1)
     size = 1e-5 / np.arange(1, basis.modes + 1)
     return Trajectory(system, t, size * np.sin(w * t[:, None]),
-                      size * w * np.cos(w * t[:, None]), np.zeros((len(t), 8)))
+                      size * w * np.cos(w * t[:, None]), np.zeros((len(t), len(POWERS))))
 
 
 def best_of(count: int, task) -> float:

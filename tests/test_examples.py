@@ -38,7 +38,7 @@ EXAMPLES = {
                                        (r"^c: three modes .* (\S+) Hz", HELD_HZ, 0.05),
                                        (r"equilibrium: (\S+) N", 14.0, 1e-6)],
                             {f"out/{name}.png" for name in (
-                                "phase", "irregular", "spectrogram", "block-contact",
+                                "phase", "irregular", "leaning", "spectrogram", "block-contact",
                                 "block-friction-work")}),
     "impact_oscillator": ((), [(r"\| 2 \| period (\d)", 1.0, 0.0),
                                (r"\| 2 \|.* ([-+][\d.]+) \|$", -6.254, 0.01)], set()),
