@@ -1,7 +1,6 @@
 from .output.files.branches import read_branch, read_branches, write_branch, write_branches
 from .output.files.dataset import to_xarray
-from .output.files.export import export_csv, export_mat, export_netcdf
-from .output.files.fields import export_fields
+from .output.files.export import export_csv, export_fields, export_mat, export_netcdf
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .output.files.wear import read_wear, write_wear

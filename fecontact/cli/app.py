@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from fecontact.cli.commands import about, branch, preload, run, study, sweep
+from fecontact.cli.commands import about, branch, run, study, sweep
 from fecontact.core.errors import InputError
 
 
@@ -30,7 +30,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.init,
     study.mesh,
     study.modes,
-    preload.preload,
+    study.preload,
     study.run,
     study.wear,
     sweep.sweep,

@@ -81,8 +81,7 @@ def results(waiting: deque[Job], pool: Pool) -> Iterator[tuple[Job, Any]]:
                             replace(job, batch=replace(job.batch, cases=(case,)))
                             for case in reversed(job.batch.cases))
     finally:
-        for future in flying:
-            future.cancel()
+        pool.cancel(flying)
 
 
 def _launch(

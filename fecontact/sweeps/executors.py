@@ -6,7 +6,7 @@ import os
 import re
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from multiprocessing.connection import wait
 from typing import Any
@@ -46,6 +46,11 @@ class Pool:
         raise AnalysisError("The executor broke because one of its workers ended; finished cases "
                             "are kept, go on with a new executor and resume.")
 
+    def cancel(self, futures: "Iterable[Future[Any]]") -> None:
+        """Cancel the calls that have not begun."""
+        for future in futures:
+            future.cancel()
+
     def close(self, *, at_once: bool) -> None:
         """End the use of the executor; ``at_once`` cancels pending work."""
 
@@ -72,6 +77,13 @@ class Processes(Pool):
                                 f"{self.workers} processes.")
         self.close(at_once=True)
         self.executor = self._start()
+
+    def cancel(self, futures: "Iterable[Future[Any]]") -> None:
+        """Do nothing: ``close`` cancels what is pending.
+
+        The thread that manages the processes fails (CPython before 3.12.1) where it finds futures
+        cancelled by others when a process ends.
+        """
 
     def close(self, *, at_once: bool) -> None:
         """End the processes."""

@@ -50,8 +50,20 @@ class ComplexModes(Summarised):
     real_eigenvalues: Array
 
     @classmethod
-    def of(cls, matrix: ArrayLike) -> "ComplexModes":
+    def of(
+        cls, matrix: ArrayLike, *, within: Array | None = None, zero: float = 0.0
+    ) -> "ComplexModes":
         """The modes of a real square matrix A (d, d).
+
+        Parameters
+        ----------
+        matrix : (d, d) array
+            A.
+        within : (d, k) array, optional
+            Orthonormal columns that span the states which constraints allow.
+        zero : float
+            Part of the largest eigenvalue up to which eigenvalues count as zero: rigid modes are
+            double roots, which rounding parts.
 
         Raises
         ------
@@ -64,8 +76,11 @@ class ComplexModes(Summarised):
         if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.isfinite(A).all():
             raise InputError(f"Complex modes need a square matrix of finite numbers, not an array "
                              f"of shape {A.shape}{'' if np.isfinite(A).all() else ' with others'}.")
-        eigenvalues, left, right = eig(A, left=True)
+        free = np.eye(len(A)) if within is None else within
+        eigenvalues, left, right = eig(free.T @ A @ free, left=True)
+        left, right = free @ left, free @ right
         size = np.abs(eigenvalues).max(initial=0.0)
+        eigenvalues = np.where(np.abs(eigenvalues) <= zero * size, 0.0, eigenvalues)
         chosen = np.flatnonzero(eigenvalues.imag > 0.0)
         # Frequencies that coincide in flutter differ by rounding; the growing one comes first.
         frequencies = np.round(eigenvalues[chosen].imag / (_REPEATED * size or 1.0))

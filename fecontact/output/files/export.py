@@ -1,4 +1,4 @@
-"""Runs as tables and arrays for other programs: CSV, MATLAB, netCDF; and VTU for ParaView."""
+"""Runs and fields for other programs: CSV, MATLAB, netCDF; VTU for ParaView."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import as_path
+from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.files.atomic_write import replaced
+from fecontact.fem.fields import BodyFields
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.dataset import columns, coordinates, to_xarray, variables
 
@@ -134,6 +135,34 @@ def export_run(
         raise InputError(f"{path} must end in {SUFFIXES[form]} for the format {form}.")
     writers = {"csv": export_csv, "mat": export_mat, "netcdf": export_netcdf}
     return writers[form](trajectory, path)
+
+
+def export_fields(fields: BodyFields, path: str | Path) -> Path:
+    """Write displacement and stress over a body as a VTU file, for ParaView and other programs.
+
+    At the nodes of the undeformed body: ``displacement`` [m], ``stress_xx``, ``stress_yy``,
+    ``stress_zz``, ``stress_xy`` and ``von_mises`` [Pa].
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in .vtu, or the file cannot be written.
+    """
+    require_kind("export_fields", BodyFields, fields=fields)
+    path = as_path(path, "fields")
+    from fecontact.fem.mesh_files import write_fields
+
+    stresses = zip(("xx", "yy", "zz", "xy"), fields.stress.T, strict=True)
+    write_fields(path, fields.nodes, fields.cells, {
+        "displacement": fields.displacement,
+        **{f"stress_{name}": values for name, values in stresses},
+        "von_mises": fields.von_mises})
+    return path
 
 
 def _whole(path: str | Path, write: Callable[[Path], None]) -> Path:
