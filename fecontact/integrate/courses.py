@@ -135,8 +135,10 @@ def _set_heights(travel, s, bounds, places, heights):
     for j in range(len(heights)):
         heights[j] = bounds[HIGHEST]
         if bounds[STEEPEST] != 0.0:
-            heights[j] = ground_at(s.profile)(s.abscissa[j] + places[j] - travel,
-                                              s.profile_parameters)[0]
+            heights[j] = 0.0
+            if s.on_ground[j]:
+                heights[j] = ground_at(s.profile)(
+                    s.abscissa[j] + places[j] - s.sliding[j] * travel, s.profile_parameters)[0]
 
 
 @helper
@@ -176,9 +178,10 @@ def _restless_nodes(speed, h, s, shapes, control, room):
     """As :func:`doubtful`, without slip velocities of nodes clear of the ground."""
     levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
     n, m = len(s.gap), len(control.largest)
-    spread = control.ground[QUICKEST] * h
     some = False
     for j in range(n):
+        spread = abs(s.sliding[j]) * control.ground[QUICKEST] * h
+        passing = s.sliding[j] * speed
         k1, k2, k3, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(m):
             along, away = shapes[i, j], shapes[i, n + j]
@@ -197,7 +200,7 @@ def _restless_nodes(speed, h, s, shapes, control, room):
             mixed = low + shift < 0.0 and high + shift > 0.0
             some |= (mixed or low + shift < felt) and not monotone
             touching |= low + shift < 0.0 or level > 0
-        first, last = ends[1, j] - speed, nodes[1, j] - speed
+        first, last = ends[1, j] - passing, nodes[1, j] - passing
         low, high, monotone = _range(first, last, r1, r2, r3)
         largest = max(-low, high) + spread
         mixed = low < spread and high > -spread and largest > control.slip_scale[j]
@@ -217,7 +220,6 @@ def _restless_modes(speed, h, s, control, room):
         largest = control.largest[i]
         move += largest * _departure(dense[0, i], dense[1, i], dense[2, i])
         quicken += largest * _departure(dense[0, m + i], dense[1, m + i], dense[2, m + i])
-    quicken += bounds[QUICKEST] * h
     wavy = bounds[STEEPEST] != 0.0
     if wavy:
         _set_heights(room.given[motion.TRAVEL], s, bounds, nodes[0], ends[2, n:])
@@ -237,8 +239,10 @@ def _restless_modes(speed, h, s, control, room):
             low, high = min(first, last) - reach, max(first, last) + reach
             some |= (low < 0.0 and high > 0.0) or low < 2.0 * min(min(first, last), 0.0)
             touching |= low < 0.0 or level > 0
-        first, last = ends[1, j] - speed, nodes[1, j] - later
-        low, high = min(first, last) - quicken, max(first, last) + quicken
+        factor = s.sliding[j]
+        first, last = ends[1, j] - factor * speed, nodes[1, j] - factor * later
+        part = quicken + abs(factor) * bounds[QUICKEST] * h
+        low, high = min(first, last) - part, max(first, last) + part
         largest = max(-low, high)
         mixed = low < 0.0 and high > 0.0 and largest > control.slip_scale[j]
         felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j])
@@ -253,7 +257,7 @@ def _departure(k1, k2, k3):
 
 
 @helper
-def doubtful(speed, h, bounds, levels, slip_scale, room):
+def doubtful(speed, h, s, bounds, levels, slip_scale, room):
     """Whether forces within the step may differ from what its ends suggest.
 
     A gap or slip velocity may change sign more often than its end values show, a contact be twice
@@ -263,12 +267,12 @@ def doubtful(speed, h, bounds, levels, slip_scale, room):
     """
     c = room.courses
     n = levels.shape[1]
-    spread = bounds[QUICKEST] * h
     for j in range(n):
-        low = min(min(min(c[0, j], c[1, j]), min(c[2, j], c[3, j])), c[4, j]) - speed - spread
-        high = max(max(max(c[0, j], c[1, j]), max(c[2, j], c[3, j])), c[4, j]) - speed + spread
+        spread, v = abs(s.sliding[j]) * bounds[QUICKEST] * h, s.sliding[j] * speed
+        low = min(min(min(c[0, j], c[1, j]), min(c[2, j], c[3, j])), c[4, j]) - v - spread
+        high = max(max(max(c[0, j], c[1, j]), max(c[2, j], c[3, j])), c[4, j]) - v + spread
         largest = max(-low, high)
-        felt = 2.0 * max(max(abs(c[0, j] - speed), abs(c[4, j] - speed)), slip_scale[j])
+        felt = 2.0 * max(max(abs(c[0, j] - v), abs(c[4, j] - v)), slip_scale[j])
         mixed = low < 0.0 and high > 0.0 and largest > slip_scale[j]
         c[DOUBT, j] = 1.0 if mixed or largest > felt + spread else 0.0
         c[DOUBT, n + j] = 0.0
@@ -290,7 +294,7 @@ def doubtful(speed, h, bounds, levels, slip_scale, room):
     some = 0.0
     for j in range(2 * n):
         # A monotonic control polygon implies a monotonic curve.
-        if (spread if j < n else bounds[STEEPEST]) == 0.0 and (
+        if bounds[QUICKEST if j < n else STEEPEST] == 0.0 and (
                 (c[0, j] <= c[1, j] <= c[2, j] <= c[3, j] <= c[4, j])
                 or (c[0, j] >= c[1, j] >= c[2, j] >= c[3, j] >= c[4, j])):
             c[DOUBT, j] = 0.0
@@ -304,9 +308,12 @@ def ground_part(part, course):
     s, step, row = course.system, course.step, course.row
     now = min(step.t + part * step.h, step.latest)
     if course.what == SLIP:
-        return signal_at(s.ground_motion)(now, s.ground_motion_parameters)[1]
+        return s.sliding[course.node] * signal_at(s.ground_motion)(
+            now, s.ground_motion_parameters)[1]
     if course.bounds[STEEPEST] == 0.0:
         return course.bounds[HIGHEST]
+    if not s.on_ground[course.node]:
+        return 0.0
     travel = signal_at(s.ground_motion)(now, s.ground_motion_parameters)[0]
     column = 2 * s.gap.shape[0] + course.node
     for k in range(COEFFICIENTS):
@@ -314,7 +321,7 @@ def ground_part(part, course):
     for k in range(COEFFICIENTS - 1, 0, -1):
         for i in range(k):
             row[i] += part * (row[i + 1] - row[i])
-    return ground_at(s.profile)(s.abscissa[course.node] + row[0] - travel,
+    return ground_at(s.profile)(s.abscissa[course.node] + row[0] - s.sliding[course.node] * travel,
                                 s.profile_parameters)[0]
 
 
@@ -339,8 +346,8 @@ def _ground_bound(course):
     """Largest rate of change of what the ground adds, over the step."""
     bounds, h = course.bounds, course.step.h
     if course.what == SLIP:
-        return bounds[QUICKEST] * h
-    if bounds[STEEPEST] == 0.0:
+        return abs(course.system.sliding[course.node]) * bounds[QUICKEST] * h
+    if bounds[STEEPEST] == 0.0 or not course.system.on_ground[course.node]:
         return 0.0
     # The node's own motion over the ground, and that of the ground.
     bound, column = 0.0, 2 * course.system.gap.shape[0] + course.node

@@ -115,13 +115,13 @@ def _rest_under_friction(
     """State at rest with what its friction remembers."""
     rest = initial.state() if isinstance(initial, LoadHistory) else initial
     memory = rest.memory(system)
-    ground = system.ground
-    moved = ground.travel(time) - rest.travel
+    ground, travel = system.ground, system.prescribed_motion.travel(time)
+    moved = travel - rest.travel
     if moved and (ground.wavy or ground.friction_scale_kernel is not None):
         raise InputError(f"The ground has travelled {rest.travel:g} m in the state at rest, but "
-                         f"{ground.travel(time):g} m at the start of the run, where it has other "
+                         f"{travel:g} m at the start of the run, where it has other "
                          f"heights or friction; end the path of loads at travel = "
-                         f"{ground.travel(time):g}, or start the run at another time.")
+                         f"{travel:g}, or start the run at another time.")
     q = rest.modal_coordinates
     return np.concatenate([q, np.zeros(len(q)), memory.reshape(-1)])
 

@@ -230,8 +230,13 @@ def _slip_limit(
     the difference would not approximate the derivative.
     """
     try:
-        shift = abs(system_at(value + move).ground.speed - system_at(value).ground.speed)
+        shift = np.abs(_passing(system_at(value + move)) - _passing(system_at(value))).max()
     except InputError:
         return 1.0
     scales = [law.velocity_scale for _, _, law in system.law_groups("friction")]
     return float(min(1.0, _SLIP * min(scales) / shift)) if shift > 0.0 and scales else 1.0
+
+
+def _passing(system: ContactSystem) -> Array:
+    """Speed (n,) with which the other side passes each node, as its parameter says."""
+    return np.asarray(system.sliding_factors * system.prescribed_motion.speed)

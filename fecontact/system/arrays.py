@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.types import Array, Integers
@@ -18,12 +19,14 @@ LawGroup = tuple[slice, Array, Any]
 
 def system_arrays(
     basis: ModalBasis, normal_groups: Iterable[LawGroup], friction_groups: Iterable[LawGroup],
-    ground: Ground, drive: Drive, load: Load, gap: Array,
+    ground: Ground, drive: Drive, load: Load, gap: Array, *, motion: Ground, sliding: Array,
+    on_ground: NDArray[np.bool_],
 ) -> SystemArrays:
     """Matrices, rows, parameters and addresses of the laws of a system.
 
     The groups are contact nodes that share a law: their place, each one's part of their face, and
-    the law; see :meth:`fecontact.ContactSystem.law_groups`.
+    the law; see :meth:`fecontact.ContactSystem.law_groups`. ``motion`` is what moves the other side
+    of node j, ``sliding[j]`` times; it counts as ground where ``on_ground`` is 1.
     """
     B = basis.T[0]
     stiffness = np.array(basis.stiffness_matrix)
@@ -56,22 +59,24 @@ def system_arrays(
         Ty=basis.contact_T[:, 1].copy(),
         abscissa=basis.contact_x.copy(),
         gap=np.array(np.broadcast_to(gap, n)),
+        sliding=np.array(sliding, dtype=float),
         bristle_stiffness=_bristles(friction_groups, n),
         normal_parameters=normal_parameters,
         friction_parameters=friction_parameters,
         profile_parameters=ground.profile_parameters(),
         friction_scale_parameters=ground.friction_scale_parameters(),
-        ground_motion_parameters=ground.motion_parameters(),
+        ground_motion_parameters=motion.motion_parameters(),
         drive_parameters=_rows([motion.parameters() for motion in drive.motions]),
         load_parameters=_rows([signal.parameters() for signal in signals]),
         normal=normal,
         friction=friction,
         memory=np.concatenate(memory),
+        on_ground=np.array(on_ground, dtype=np.int64),
         drive=_addresses(motion.kernel for motion in drive.motions),
         load=_addresses(signal.kernel for signal in signals),
         profile=ground.profile_kernel.address,
         friction_scale=0 if scale is None else scale.address,
-        ground_motion=ground.motion_kernel.address,
+        ground_motion=motion.motion_kernel.address,
         leans=int(ground.normal == "surface"),
     )
 

@@ -231,12 +231,29 @@ class ContactSystem(Summarised):
                         friction_force[..., nodes])
              for nodes, _, law in self.law_groups("friction")], axis=-1)
 
+    @property
+    def prescribed_motion(self) -> Ground:
+        """Ground whose motion is that of the other sides; see :attr:`sliding_factors`."""
+        return self.ground
+
+    @property
+    def sliding_factors(self) -> Array:
+        """Factor (n,) of the prescribed motion with which the other side of each node moves."""
+        return np.ones(self.basis.contact_nodes)
+
+    @property
+    def on_ground(self) -> NDArray[np.bool_]:
+        """Whether the other side of each node (n,) is the ground."""
+        return np.ones(self.basis.contact_nodes, dtype=bool)
+
     @cached_property
     def arrays(self) -> kernels.SystemArrays:
         """The system as arrays for the compiled kernels."""
         return system_arrays(
             self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
-            self.drive, self.load, np.asarray(self.gap, dtype=float))
+            self.drive, self.load, np.asarray(self.gap, dtype=float),
+            motion=self.prescribed_motion, sliding=self.sliding_factors,
+            on_ground=self.on_ground)
 
     def rhs(self, t: float, y: Array) -> Array:
         """Rate y' (2 m + n s,) of the state y = [q, q', z]."""

@@ -185,9 +185,10 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                     shifts[0], shifts[1], shifts[2], shifts[3] = node_motion(j, y, r)
                 else:
                     shifts[:] = 0.0
-                shifts[0] += r.abscissa[j] - moved_p[0]
+                shifts[0] += (r.abscissa[j] - s.sliding[j] * moved_p[0]
+                              - r.sliding[j] * moved.travel)
                 shifts[1] += r.gap[j]
-                shifts[2] -= moved_p[1]
+                shifts[2] -= s.sliding[j] * moved_p[1] + r.sliding[j] * moved.speed
                 F_p, T_p, slip_p, pressing_p = node_rates(
                     j, contact, z, F, shifts, s, laws, force, partial, (room, room_rates, memory))
                 for i in range(m):

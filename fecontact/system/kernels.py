@@ -3,13 +3,16 @@
 State y = [q, q', z] of m modes and, node by node, the internal variables of friction with memory.
 With x = Tx q and y = Ty q at the n contact nodes, per node j
 
-    xi = X_j + x_j - travel(t)      u_j = y_R(xi) - y_j - g_j      v_j = u_j'
-    F_j = normal(u_j, v_j)          R_j = friction(x_j' - V, s(xi) |F_j|, z_j)
+    xi = X_j + x_j - travel_j(t)    u_j = y_R(xi) - y_j - g_j      v_j = u_j'
+    F_j = normal(u_j, v_j)          R_j = friction(x_j' - V_j, s(xi) |F_j|, z_j)
     q'' = -K q - C q' + T^T f,      f_j = [-T_j, F_j]
     T_j = R_j + F_j y_R'(xi)
 
 where K and C hold the modes' own stiffness and damping and the springs and dashpots at B, and s is
 the variation of friction along the ground. T has no second part where contact forces stay vertical.
+Rows of nodes between two bodies are those of their relative motion along and across the face: y_R
+is zero there. The other side of node j moves on by a factor of one motion, travel_j = c_j travel
+and V_j = c_j V.
 """
 
 from typing import NamedTuple
@@ -35,8 +38,10 @@ from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_
 class SystemArrays(NamedTuple):
     """A contact system as the kernels see it: arrays, and laws by address.
 
-    ``drive_damping`` (2,) is that of relative dashpots; ``bristle_stiffness`` (2, n, s) a and b of
-    the stored ``(a + b |F|) z^2 / 2``; ``leans`` is 0 where contact forces stay vertical, else 1.
+    ``drive_damping`` (2,) is that of relative dashpots; ``sliding`` (n,) are the factors c_j, and
+    ``on_ground`` (n,) is 0 for nodes between bodies, else 1; ``bristle_stiffness`` (2, n, s) are a
+    and b of the stored ``(a + b |F|) z^2 / 2``; ``leans`` is 0 where contact forces stay vertical,
+    else 1.
     """
 
     stiffness: Array
@@ -51,6 +56,7 @@ class SystemArrays(NamedTuple):
     Ty: Array
     abscissa: Array
     gap: Array
+    sliding: Array
     bristle_stiffness: Array
     normal_parameters: Array
     friction_parameters: Array
@@ -62,6 +68,7 @@ class SystemArrays(NamedTuple):
     normal: Integers
     friction: Integers
     memory: Integers
+    on_ground: Integers
     drive: Integers
     load: Integers
     profile: int
@@ -72,8 +79,8 @@ class SystemArrays(NamedTuple):
 
 SYSTEM = types.NamedTuple(
     [matrix, matrix, matrix, vector, matrix, vector, vector, matrix, matrix, matrix, vector, vector,
-     block, matrix, matrix, vector, vector, vector, matrix, matrix,
-     integers, integers, integers, integers, integers, i8, i8, i8, i8], SystemArrays)
+     vector, block, matrix, matrix, vector, vector, vector, matrix, matrix,
+     integers, integers, integers, integers, integers, integers, i8, i8, i8, i8], SystemArrays)
 
 # Columns of the per-node results of `contact_state`.
 STATE_COLUMNS = 6
@@ -82,7 +89,7 @@ NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROU
 
 
 class GroundMotion(NamedTuple):
-    """How far the ground has travelled, and its speed."""
+    """How far the ground has travelled, and its speed; or what slides in its place."""
 
     travel: float
     speed: float
@@ -130,10 +137,12 @@ def node_motion(j, y, s):
 
 @helper
 def node_contact(j, motion, moved, s):
-    """Where node j is above the ground, which has ``moved``."""
-    place = s.abscissa[j] + motion.along - moved.travel
-    ground, slope, curvature = ground_at(s.profile)(place, s.profile_parameters)
-    slip = motion.along_rate - moved.speed
+    """Where node j is above the other side, under the prescribed motion ``moved``."""
+    place = s.abscissa[j] + motion.along - s.sliding[j] * moved.travel
+    ground, slope, curvature = 0.0, 0.0, 0.0
+    if s.on_ground[j]:
+        ground, slope, curvature = ground_at(s.profile)(place, s.profile_parameters)
+    slip = motion.along_rate - s.sliding[j] * moved.speed
     return NodeContact(place, ground - motion.height - s.gap[j],
                        slope * slip - motion.height_rate, slip, slope, curvature)
 
@@ -147,10 +156,10 @@ def memory_of(j, y, s):
 
 
 @helper
-def pressing_force(place, F, s):
+def pressing_force(j, place, F, s):
     """The force that friction sees under a normal force: |F| times the ground's variation."""
     pressing = abs(F)
-    if s.friction_scale != 0 and F != 0.0:
+    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
         pressing *= ground_at(s.friction_scale)(place, s.friction_scale_parameters)[0]
     return pressing
 
@@ -169,7 +178,7 @@ def node_forces(j, motion, moved, z, s, force, rates):
     """
     contact = node_contact(j, motion, moved, s)
     F = normal_at(s.normal[j])(contact.penetration, contact.rate, s.normal_parameters[j])[0]
-    pressing = pressing_force(contact.place, F, s)
+    pressing = pressing_force(j, contact.place, F, s)
     R = 0.0
     if s.memory[j] > 0:
         memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
@@ -196,7 +205,7 @@ def normal_gradients(j, contact, s, out):
     pressing = abs(F)
     for k in range(4):
         out[2, k] = sign * out[0, k]
-    if s.friction_scale != 0 and F != 0.0:
+    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
         scale, scale_x, _ = ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)
         for k in range(4):
             out[2, k] *= scale
@@ -439,8 +448,9 @@ def powers(t, y, s, stick_speed, out, nodes):
         z = memory_of(j, y, s)
         F, R, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
         elastic = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])[0]
-        out[BELT_NORMAL] += belt_normal_power(F, contact.slope, contact.slip, moved.speed, s)
-        out[BELT_FRICTION] -= R * moved.speed
+        speed = s.sliding[j] * moved.speed
+        out[BELT_NORMAL] += belt_normal_power(F, contact.slope, contact.slip, speed, s)
+        out[BELT_FRICTION] -= R * speed
         out[CONTACT_DAMPING] += (F - elastic) * contact.rate
         storing = storing_power(j, F, z, rates, s)
         lost = R * contact.slip - storing

@@ -128,7 +128,9 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
     """
     room_force, room_rates, memory = room
     place, slip, h = contact.place, contact.slip, laws.step
-    ground, slope = _ground_rates(s.profile, place, laws.profile, h)
+    ground, slope = 0.0, 0.0
+    if s.on_ground[j]:
+        ground, slope = _ground_rates(s.profile, place, laws.profile, h)
     F_p = -partial[0, 1] * ground - partial[0, 3] * slope * slip
     for k in range(4):
         F_p += partial[0, k] * shifts[k]
@@ -137,7 +139,7 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
             contact.penetration, contact.rate, laws.normal[k, j])[0]
     size, pressing_p = abs(F), F_p if F >= 0.0 else -F_p
     pressing = size
-    if s.friction_scale != 0:
+    if s.friction_scale != 0 and s.on_ground[j]:
         scale, scale_x, _ = ground_at(s.friction_scale)(place, s.friction_scale_parameters)
         pressing = scale * size
         pressing_p = scale * pressing_p + size * (

@@ -209,14 +209,17 @@ def _problem(
     width = max(table.shape[1] for table in tables)
     arrays = system.arrays._replace(friction_parameters=np.vstack(
         [np.pad(table, ((0, 0), (0, width - table.shape[1]))) for table in tables]))
-    cluster, rows = _clusters(arrays.Tx)
+    cluster, rows = _clusters(arrays.Tx, arrays.sliding)
+    sliding = np.zeros(len(rows))
+    sliding[cluster] = arrays.sliding
     ground = system.ground
     wave = ground.shortest_wavelength if ground.wavy else None
     problem = kinds.NonsmoothProblem(
-        arrays, _static(static_coefficient, n), cluster, rows, 1e-4 * longest,
+        arrays, _static(static_coefficient, n), cluster, rows, sliding, 1e-4 * longest,
         -1.0 if restitution is None else float(restitution), 0.0, 0,
         np.array([*ground.height_range, np.inf if wave is None else wave]),
-        int(ground.motion is None), compiled_derivative.address, compiled_change.address)
+        int(system.prescribed_motion.motion is None), compiled_derivative.address,
+        compiled_change.address)
     rubbing = np.any(rows != 0.0, axis=1)
     if restitution is not None:
         rough = _rough_nodes(groups, problem.static)
@@ -233,20 +236,26 @@ def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
     return replace(law, **steep)
 
 
-def _clusters(Tx: Array) -> tuple[Integers, Array]:
-    """Cluster (n,) of each node and row (k, m) of each cluster."""
-    scale = np.abs(Tx).max(initial=0.0)
+def _clusters(Tx: Array, sliding: Array) -> tuple[Integers, Array]:
+    """Cluster (n,) of each node and row (k, m) of each cluster.
+
+    Nodes of a cluster have one row and one factor (n,) of the prescribed motion.
+    """
+    scale, fastest = np.abs(Tx).max(initial=0.0), np.abs(sliding).max(initial=0.0)
     rows: list[Array] = []
+    factors: list[float] = []
     cluster = np.empty(len(Tx), dtype=np.int64)
     for j, row in enumerate(Tx):
         row = np.where(np.abs(row) > 1e-13 * scale, row, 0.0)
         for c, other in enumerate(rows):
-            if np.abs(row - other).max() <= 1e-11 * scale:
+            if np.abs(row - other).max() <= 1e-11 * scale and (
+                    abs(sliding[j] - factors[c]) <= 1e-11 * fastest):
                 cluster[j] = c
                 break
         else:
             cluster[j] = len(rows)
             rows.append(row)
+            factors.append(float(sliding[j]))
     return cluster, np.array(rows)
 
 
@@ -304,7 +313,9 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
     largest = np.abs(system.basis.T[:, :2]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
     depth = system.penetration_scale
-    speed = max(0.01 * system.ground.largest_speed(float(times[0]), float(times[-1])),
+    fastest = float(np.abs(arrays.sliding).max()) * system.prescribed_motion.largest_speed(
+        float(times[0]), float(times[-1]))
+    speed = max(0.01 * fastest,
                 depth / longest)
     # Velocities that drive and loads bring about in each mode, within a step where it is slow.
     springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes

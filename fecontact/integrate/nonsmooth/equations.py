@@ -1,8 +1,8 @@
 """Compiled equations of motion with set-valued friction and rigid stops.
 
-Nodes whose rows along the ground are equal have one slip velocity and form a cluster c. With the
-friction force ``R_c``, the sum over the nodes, and the relative acceleration
-``a_c = Tx_c q'' - V'``, where ``Tx`` is mass-normalised,
+Nodes whose rows along the other side are equal, and whose other sides move alike, have one slip
+velocity and form a cluster c. With the friction force ``R_c``, the sum over the nodes, and the
+relative acceleration ``a_c = Tx_c q'' - V_c'``, where ``Tx`` is mass-normalised,
 
     a_c = a0_c - sum_d W_cd R_d,    W = Tx Tx^T
 
@@ -101,10 +101,9 @@ def contact_powers(moved, s, nodes, friction, elastic, out):
     ``elastic`` says whether the normal forces come from the normal laws.
     """
     for j in range(len(nodes)):
-        force, R = nodes[j, FORCE], friction[j]
-        out[BELT_NORMAL] += belt_normal_power(force, nodes[j, SLOPE], nodes[j, SLIP], moved.speed,
-                                              s)
-        out[BELT_FRICTION] -= R * moved.speed
+        force, R, speed = nodes[j, FORCE], friction[j], s.sliding[j] * moved.speed
+        out[BELT_NORMAL] += belt_normal_power(force, nodes[j, SLOPE], nodes[j, SLIP], speed, s)
+        out[BELT_FRICTION] -= R * speed
         if elastic and force != 0.0:
             stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
             out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
@@ -132,10 +131,10 @@ def observe(moved, Y, p, nodes):
             force = normal_at(s.normal[j])(contact.penetration, contact.rate,
                                            s.normal_parameters[j])[0]
         else:
-            grip = pressing_force(contact.place, 1.0, s)
+            grip = pressing_force(j, contact.place, 1.0, s)
             if stick_limit(j, grip, p) == 0.0:
                 grip = 0.0
-        pressing = pressing_force(contact.place, force, s)
+        pressing = pressing_force(j, contact.place, force, s)
         nodes[j, FORCE], nodes[j, PRESSING] = force, pressing
         nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
@@ -223,7 +222,8 @@ def hold_contacts(t, p, status, closed, w, acceleration):
     ground = speed_rate(t, p)
     for a in range(count):
         j = w.indices[a]
-        w.right[a] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground if j < n else ground
+        w.right[a] = (w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground if j < n
+                      else p.sliding[j - n] * ground)
         for i in range(m):
             w.right[a] -= held_row(j, i, p, w) * acceleration[i]
         for b in range(count):
@@ -273,7 +273,7 @@ def hold_clusters(t, p, status, w, acceleration):
     ground = speed_rate(t, p)
     for a in range(count):
         c = w.indices[a]
-        w.right[a] = -ground
+        w.right[a] = -p.sliding[c] * ground
         for i in range(m):
             w.right[a] += p.rows[c, i] * acceleration[i]
         for b in range(count):

@@ -158,13 +158,14 @@ def _set_slip(k, sign, step, p, Y, room):
     """Put ``sign`` times the slip velocity of cluster k, raised by its rounding, into the bound."""
     s, b, values = p.system, room.bound, room.values
     size = _along(p.rows[k], s.Tx.shape[1], Y, room, b)
-    speed = ground_motion(step.t, s).speed
+    factor = p.sliding[k]
+    speed = factor * ground_motion(step.t, s).speed
     if p.steady != 0:
         for i in range(len(b)):
             b[i] -= speed
     else:
         for i in range(len(b)):
-            values[i] = -ground_motion(step.t + _PLACES[i] * step.h, s).speed
+            values[i] = -factor * ground_motion(step.t + _PLACES[i] * step.h, s).speed
             speed = max(abs(speed), abs(values[i]))
         _through(values, b)
     for i in range(len(b)):
@@ -175,15 +176,15 @@ def _set_slip(k, sign, step, p, Y, room):
 def _add_ground(j, step, p, Y, room):
     """Add the ground under node j to the bound; returns the part that resolves its waves."""
     s, b, x, values = p.system, room.bound, room.along, room.values
-    if p.relief[2] == np.inf:
+    if p.relief[2] == np.inf or not s.on_ground[j]:
         for i in range(len(b)):
-            b[i] += p.relief[0]
+            b[i] += p.relief[0] if s.on_ground[j] else 0.0
         return 1.0
     _along(s.Tx[j], 0, Y, room, x)
     low, high = np.inf, -np.inf
     for i in range(len(x)):
         travel = ground_motion(step.t + _PLACES[i] * step.h, s).travel
-        xi = s.abscissa[j] + value(x, _PLACES[i], room.nested) - travel
+        xi = s.abscissa[j] + value(x, _PLACES[i], room.nested) - s.sliding[j] * travel
         low, high = min(low, xi), max(high, xi)
         values[i] = ground_at(s.profile)(xi, s.profile_parameters)[0]
     _through(values, b)

@@ -41,11 +41,12 @@ class NonsmoothProblem(NamedTuple):
 
     ``system`` has unsmoothed friction; ``static`` (n,) is the coefficient that limits stick, below
     zero for the law's own; ``cluster`` (n,) is the cluster of each node, ``rows`` (k, m) are those
-    of the clusters; ``tick`` is the time over which the ground's speed is differentiated;
+    of the clusters and ``sliding`` (k,) their factors of the prescribed motion; ``tick`` is the
+    time over which its speed is differentiated;
     ``restitution`` is below zero for compliant contact, ``tangential`` is that along the ground,
     and ``poisson`` is not zero where it is one of impulses; ``relief`` (3,) are the lowest and the
     highest ground and its shortest wave, infinite where it is level; ``steady`` is zero if the
-    speed of the ground changes; ``derivative`` and ``change`` are the addresses of
+    prescribed speed changes; ``derivative`` and ``change`` are the addresses of
     :data:`fecontact.integrate.nonsmooth.equations.compiled_derivative` and
     :data:`fecontact.integrate.nonsmooth.rigid_stops.compiled_change`.
     """
@@ -54,6 +55,7 @@ class NonsmoothProblem(NamedTuple):
     static: Array
     cluster: Integers
     rows: Array
+    sliding: Array
     tick: float
     restitution: float
     tangential: float
@@ -64,8 +66,8 @@ class NonsmoothProblem(NamedTuple):
     change: int
 
 
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, f8, f8, f8, i8, vector, i8, i8, i8],
-                           NonsmoothProblem)
+PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, vector, f8, f8, f8, i8, vector, i8,
+                            i8, i8], NonsmoothProblem)
 
 
 class Limits(NamedTuple):

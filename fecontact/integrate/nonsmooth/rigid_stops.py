@@ -213,14 +213,15 @@ def _strike(t, touching, p, progress, w):
                     limit += conditions.slipping[other] * x[other]
             if limit > 0.0:
                 rubbed = x[n + c] * conditions.slipping[j] * x[j] / limit
-                Y[first + BELT_FRICTION] -= rubbed * speed
+                Y[first + BELT_FRICTION] -= rubbed * s.sliding[j] * speed
                 # Where normal impulses turn slip round, friction may give energy back in part.
                 worn = max(rubbed * slip, 0.0)
                 Y[first + FRICTION] += worn
                 Y[first + POWER_COUNT + j] += worn
                 Y[first + CONTACT_DAMPING] += rubbed * slip - worn
                 lost += rubbed * slip
-        Y[first + BELT_NORMAL] += belt_normal_power(x[j], w.nodes[j, SLOPE], slip, speed, s)
+        Y[first + BELT_NORMAL] += belt_normal_power(x[j], w.nodes[j, SLOPE], slip,
+                                                    s.sliding[j] * speed, s)
     if lost < -_GAIN * energy:
         progress.counts[GAINED] += 1
     return True
@@ -241,7 +242,7 @@ def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
     for j in range(n):
         conditions.given[j] = -fall[j]
     for c in range(k):
-        conditions.given[n + c] = ground
+        conditions.given[n + c] = p.sliding[c] * ground
         for i in range(p.rows.shape[1]):
             conditions.given[n + c] -= p.rows[c, i] * room.rate[i]
         if conditions.mode[c] != STICK:

@@ -131,6 +131,7 @@ def room_for(problem: NonsmoothProblem) -> Room:
 def _slips_back(j, h, p, w, tolerance, room):
     """Part of a step at which node j slips back between ends with slip of one sense; or 1."""
     s, b, speed = p.system, room.cubic, room.speed
+    factor = s.sliding[j]
     first, last = room.old[j, SLIP], w.nodes[j, SLIP]
     if not (room.old[j, FORCE] != 0.0 and w.nodes[j, FORCE] != 0.0 and first * last > 0.0
             and min(abs(first), abs(last)) > tolerance):
@@ -140,10 +141,10 @@ def _slips_back(j, h, p, w, tolerance, room):
     for i in range(s.Tx.shape[1]):
         rise += s.Tx[j, i] * room.before[i]
         fall += s.Tx[j, i] * room.accelerations[STAGES - 1, i]
-    b[0], b[3] = first + speed[0], last + speed[3]
+    b[0], b[3] = first + factor * speed[0], last + factor * speed[3]
     b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
     for i in range(4):
-        b[i] = sign * (b[i] - speed[i]) + tolerance
+        b[i] = sign * (b[i] - factor * speed[i]) + tolerance
     back = first_below(b, room.halves)
     if back == NOWHERE:
         return 1.0
@@ -373,7 +374,7 @@ def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room
         moved = ground_motion(t, p.system)
         observe(moved, Y, p, w.nodes)
         room.old[:] = w.nodes
-        quick = largest[SLIP_SIZE] + abs(moved.speed)
+        quick = largest[SLIP_SIZE] + np.abs(p.sliding).max() * abs(moved.speed)
         _prepare(step, quick, p, progress, w, room)
         finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
         solved = _solve_stages(step, finest, p, limits, progress, room)

@@ -102,7 +102,7 @@ def decide_clusters(t, p, progress, room, near, w, out):
         ground = speed_rate(t, p)
         largest = 0.0
         for c in range(clusters):
-            relative[c] = -ground
+            relative[c] = -p.sliding[c] * ground
             for i in range(m):
                 relative[c] += p.rows[c, i] * out[m + i]
             largest = max(largest, abs(relative[c]))

@@ -143,15 +143,15 @@ def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):
     n = rows // 2
     states = g.rates.shape[1]
     forces = w[2]
-    speed = given[SPEED]
     out[: 2 * m] = 0.0
     for j in range(n):
-        forces[j] = speed * g.partial[j, 1, 0] + acceleration * g.partial[j, 1, 2]
-        forces[n + j] = -speed * g.partial[j, 0, 0] - acceleration * g.partial[j, 0, 2]
-        pressing = -speed * g.partial[j, 2, 0] - acceleration * g.partial[j, 2, 2]
+        v, a = s.sliding[j] * given[SPEED], s.sliding[j] * acceleration
+        forces[j] = v * g.partial[j, 1, 0] + a * g.partial[j, 1, 2]
+        forces[n + j] = -v * g.partial[j, 0, 0] - a * g.partial[j, 0, 2]
+        pressing = -v * g.partial[j, 2, 0] - a * g.partial[j, 2, 2]
         for k in range(states):
             out[2 * m + j * states + k] = (
-                -acceleration * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
+                -a * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
                 if k < s.memory[j] else 0.0)
     for i in range(m):
         total = (rate_of_loads[i] + given[PULL_X_RATE] * s.drive_shapes[0, i]
@@ -188,7 +188,7 @@ def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):
             fall = g.partial[j, 0, 1] * -v + g.partial[j, 0, 3] * -a
             if fall < 0.0 and -force / fall < first:
                 first = -force / fall
-            slip = w[1, j] - speed
+            slip = w[1, j] - s.sliding[j] * speed
             towards = -w[2, j] if slip > 0.0 else w[2, j]
             if abs(slip) > 1.5 * slow[j] and (abs(slip) - slow[j]) < towards * first:
                 first = (abs(slip) - slow[j]) / towards

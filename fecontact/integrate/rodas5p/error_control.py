@@ -42,7 +42,7 @@ def slip_error(error, s, shapes, control, progress, room):
             slip = 0.0
             for i in range(m):
                 slip += shapes[i, j] * difference[m + i]
-            distance = abs(room.nodes[1, j] - room.given[dynamics.SPEED])
+            distance = abs(room.nodes[1, j] - s.sliding[j] * room.given[dynamics.SPEED])
             part = abs(slip) / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
                 error = part

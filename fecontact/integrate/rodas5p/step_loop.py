@@ -209,7 +209,8 @@ def _unfelt_part(step, again, smallest, problem, progress, room):
     s, shapes, control = problem.system, problem.shapes, problem.control
     if restless(step.speed, step.h, s, shapes, control, room) and again < _MOST_AGAIN:
         set_courses(s, shapes, control.ground, progress.state, room.after, room)
-        if doubtful(step.speed, step.h, control.ground, control.levels, control.slip_scale, room):
+        if doubtful(step.speed, step.h, s, control.ground, control.levels, control.slip_scale,
+                    room):
             part = first_unfelt_at(control.unfelt)(step, again, problem, progress, room)
             if part * step.h > 100.0 * smallest and part < 1.0:
                 return part

@@ -260,7 +260,7 @@ class LoadHistory(Summarised):
         for axis, name in enumerate(("motion_x", "motion_y")):
             end = given[:, m + axis]
             yield name, end, arrays.drive_stiffness[axis] * (end - q @ arrays.drive_shapes[axis])
-        yield "travel", self.travel, -self.force_against_x.sum(axis=1)
+        yield "travel", self.travel, -self.force_against_x @ arrays.sliding
         for k, values in enumerate(path.forces or ()):
             yield f"forces.{k}", q @ arrays.load_shapes[k], path.at_points(values)[: len(self)]
 

@@ -161,17 +161,18 @@ def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
             height += s.Ty[j, i] * q[i]
         contact = node_contact(j, NodeMotion(x, height, 0.0, 0.0), moved, s)
         F, pressing = normal_gradients(j, contact, s, out)
-        R = _rub(j, x - travel, pressing, sliders, pose, room, out)
+        gone = s.sliding[j] * travel
+        R = _rub(j, x - gone, pressing, sliders, pose, room, out)
         T = force_against_x(F, R, contact, s)
         node[j, FORCE], node[j, PRESSING], node[j, PENETRATION] = F, pressing, contact.penetration
-        node[j, PLACE], node[j, AGAINST], node[j, LEANING] = x - travel, T, F * contact.slope
+        node[j, PLACE], node[j, AGAINST], node[j, LEANING] = x - gone, T, F * contact.slope
         if s.leans:
             out[1, 0] += contact.slope * out[0, 0] + F * contact.curvature
             out[1, 1] += contact.slope * out[0, 1]
         # Springs round off with the displacements whose difference they feel.
         rounding = 0.0
         for e in range(sliders.stiffness.shape[1]):
-            rounding += sliders.stiffness[j, e] * (abs(x) + abs(travel) + abs(pose.left[j, e]))
+            rounding += sliders.stiffness[j, e] * (abs(x) + abs(gone) + abs(pose.left[j, e]))
         rounding = abs(T) + _SPRINGS * rounding
         for i in range(m):
             tx, ty = s.Tx[j, i], s.Ty[j, i]

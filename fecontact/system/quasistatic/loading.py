@@ -88,7 +88,7 @@ def load_history(
         slope = _slope_under_preload(system, path, given, balance, q, rtol)
         sliders = sliders_of(system, tangential_ratio, tangential_stiffness, slope)
         # Sliders begin where the nodes are.
-        place = system.arrays.Tx @ q - given[0, -1]
+        place = system.arrays.Tx @ q - system.arrays.sliding * given[0, -1]
         pose = _pose(q, sliders, np.repeat(place[:, None], sliders.limit.shape[1], axis=1))
         return _loaded(system, path, given, pose, sliders, balance, rtol, 0)
     require_kind("load_history", (LoadHistory, RestState), start=start)
@@ -198,7 +198,7 @@ def _slope_under_preload(
     stuck = np.full((len(arrays.gap), 1), max(float(np.max(slope)), float(np.mean(
         balance.face_stiffness)), 1.0))
     sliders = Sliders(stuck, np.full_like(stuck, 1e30), np.zeros_like(stuck))
-    place = (arrays.Tx @ q - given[0, -1])[:, None]
+    place = (arrays.Tx @ q - arrays.sliding * given[0, -1])[:, None]
     reached, found = _marched(system, given[[0, preload]], _pose(q, sliders, place), sliders,
                               balance.scale, max(rtol, 1e-4))
     if reached < 2:
@@ -210,5 +210,6 @@ def _slope_under_preload(
 def _penetration(system: ContactSystem, given: Array, q: Array) -> Array:
     """Penetration (n,) at a row of given loads and motions."""
     arrays = system.arrays
-    heights = system.ground.height(arrays.abscissa + arrays.Tx @ q - given[-1])
+    places = arrays.abscissa + arrays.Tx @ q - arrays.sliding * given[-1]
+    heights = np.where(arrays.on_ground, system.ground.height(places), 0.0)
     return np.asarray(heights - arrays.Ty @ q - arrays.gap)

@@ -130,7 +130,8 @@ def _works(old, new, given, s, out):
             given[1, m + axis] - given[0, m + axis])
     travelled = given[1, m + 2] - given[0, m + 2]
     for j in range(len(old.node)):
-        out[_TRAVEL] -= 0.5 * (old.node[j, AGAINST] + new.node[j, AGAINST]) * travelled
+        out[_TRAVEL] -= 0.5 * (old.node[j, AGAINST] + new.node[j, AGAINST]) * (
+            s.sliding[j] * travelled)
         if not s.leans:
             # Ground that pushes vertically lifts the node wherever it moves along.
             out[_TRAVEL] += 0.5 * (old.node[j, LEANING] + new.node[j, LEANING]) * (
