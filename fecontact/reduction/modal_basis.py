@@ -119,7 +119,7 @@ class ModalBasis(Summarised):
     quality : ReductionQuality or None
         Comparison with the body; None for a basis without one.
     groups : tuple of (str, int)
-        Names of the contact groups and their numbers of nodes, in the order of the nodes; by
+        Names of the interfaces and their numbers of nodes, in the order of the nodes; by
         default one group 'contact'.
     thickness : float or None
         Out-of-plane thickness of the body [m], which makes pressures of line loads; None where it
@@ -182,7 +182,7 @@ class ModalBasis(Summarised):
         groups = tuple((str(name), int(count)) for name, count in self.groups)
         groups = groups or (("contact", len(self.tributary)),)
         if sum(count for _, count in groups) != len(self.tributary):
-            raise InputError(f"Modal basis: the contact groups {groups} do not add up to the "
+            raise InputError(f"Modal basis: the interfaces {groups} do not add up to the "
                              f"{len(self.tributary)} contact nodes.")
         object.__setattr__(self, "groups", groups)
         points = 2 + len(self.tributary) + len(self.extra)

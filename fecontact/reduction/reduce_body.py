@@ -49,8 +49,8 @@ def modal_basis(
     modes : int
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground, its outward normal pointing to -y; each of several is a
-        contact group.
+        Boundary that touches the ground, its outward normal pointing to -y; each of several is an
+        interface of its name.
     contact_nodes : int or 'all', or one of them for each boundary
         Number of equal segments of the boundary, each with a contact node at its centre that moves
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.

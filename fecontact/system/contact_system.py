@@ -55,9 +55,9 @@ class ContactSystem(Summarised):
     Attributes
     ----------
     basis : ModalBasis
-    normal : normal law, or mapping of contact group to normal law
+    normal : normal law, or mapping of interface to normal law
         Normal force F (on the body, upwards) from penetration and its rate.
-    friction : friction law, or mapping of contact group to friction law
+    friction : friction law, or mapping of interface to friction law
         Friction force R (on the body, against the slip velocity). Required if a contact node can
         move along the ground.
     ground : Ground
@@ -74,7 +74,7 @@ class ContactSystem(Summarised):
     ------
     InputError
         Without a normal law, or a required friction law; for a part of wrong type, laws for unknown
-        contact groups, parameters or gaps that do not match the number of contact nodes, laws that
+        interfaces, parameters or gaps that do not match the number of contact nodes, laws that
         :func:`require_sound` refuses, and drives or loads in a direction in which no mode moves
         their point.
     """
@@ -120,13 +120,13 @@ class ContactSystem(Summarised):
         names = [group for group, _ in self.basis.groups]
         for group in given:
             if group not in names:
-                raise InputError(f"ContactSystem: {name} has a law for the contact group "
-                                 f"{group!r}{nearest(str(group), names)}, but the groups of "
+                raise InputError(f"ContactSystem: {name} has a law for the interface "
+                                 f"{group!r}{nearest(str(group), names)}, but the interfaces of "
                                  f"the basis are: {choices(names)}.")
         missing = [group for group in names if group not in given]
         if missing:
-            raise InputError(f"ContactSystem: {name} lacks a law for the contact "
-                             f"group{'s' * (len(missing) > 1)} {choices(missing)}.")
+            raise InputError(f"ContactSystem: {name} lacks a law for the "
+                             f"interface{'s' * (len(missing) > 1)} {choices(missing)}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes and contact nodes, laws, ground, drive and load."""
@@ -149,7 +149,7 @@ class ContactSystem(Summarised):
         """Groups of contact nodes with a common law: slice, share of each node, law.
 
         Extensive parameters are totals of the whole face for a single law, and totals of the group
-        for the law of a contact group.
+        for the law of an interface.
         """
         given, tributary = getattr(self, kind), self.basis.tributary
         if not isinstance(given, Mapping):
@@ -308,7 +308,7 @@ class ContactSystem(Summarised):
         """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
 
         Without the numbers of the basis, which :meth:`parameter` and :meth:`with_` know too.
-        Parameters of the laws of a contact group: ``contact.NAME.normal.stiffness``.
+        Parameters of the laws of an interface: ``interfaces.NAME.normal.stiffness``.
         """
         return {_outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
@@ -349,28 +349,28 @@ def _load_summary(load: Load) -> str:
 
 
 def _law_names(law: Any) -> str:
-    """Class of a law, or those of the contact groups."""
+    """Class of a law, or those of the interfaces."""
     if isinstance(law, Mapping):
         return listed([f"{type(one).__name__} ({group})" for group, one in law.items()])
     return type(law).__name__
 
 
 def _inner_name(name: str) -> str:
-    """``normal.NAME.stiffness`` for ``contact.NAME.normal.stiffness``."""
+    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness``."""
     first, _, rest = name.partition(".")
     group, _, parameter = rest.partition(".")
     kind, _, last = parameter.partition(".")
-    if first != "contact" or kind not in ("normal", "friction"):
+    if first != "interfaces" or kind not in ("normal", "friction"):
         return name
     return f"{kind}.{group}.{last}" if last else f"{kind}.{group}"
 
 
 def _outer_name(system: ContactSystem, name: str) -> str:
-    """The reverse, for laws of contact groups."""
+    """The reverse, for laws of interfaces."""
     kind, _, rest = name.partition(".")
     if kind not in ("normal", "friction") or not isinstance(getattr(system, kind), Mapping):
         return name
     group, _, last = rest.partition(".")
     if group not in getattr(system, kind):
         return name
-    return f"contact.{group}.{kind}.{last}" if last else f"contact.{group}.{kind}"
+    return f"interfaces.{group}.{kind}.{last}" if last else f"interfaces.{group}.{kind}"

@@ -16,7 +16,7 @@ def system_tables(system: ContactSystem) -> dict[str, Any]:
         given = getattr(system, part)
         if isinstance(given, Mapping):
             for group, law in given.items():
-                tables.setdefault("contact", {}).setdefault(group, {})[part] = to_table(law)
+                tables.setdefault("interfaces", {}).setdefault(group, {})[part] = to_table(law)
         else:
             tables[part] = to_table(given)
     tables["gap"] = plain(system.gap)
@@ -28,14 +28,15 @@ def system_from_tables(
 ) -> ContactSystem:
     """The contact system of a basis and tables ``normal``, ``friction``, ... , ``gap``."""
     parts = system_parts(tables, where, PART_CLASSES)
-    groups = convert(tables.get("contact", {}), Mapping[str, Mapping[str, Any]], where, "contact")
+    groups = convert(tables.get("interfaces", {}), Mapping[str, Mapping[str, Any]], where,
+                     "interfaces")
     for group, laws in groups.items():
         for part, table in laws.items():
-            require_known(part, ("normal", "friction"), f"{where}: [contact.{group}]")
+            require_known(part, ("normal", "friction"), f"{where}: [interfaces.{group}]")
             if not isinstance(parts.get(part), dict):
                 parts[part] = {}
             parts[part][group] = from_table(PART_CLASSES[part], table,
-                                            f"{where}: [contact.{group}.{part}]")
+                                            f"{where}: [interfaces.{group}.{part}]")
     gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
     return ContactSystem(basis, gap=gap, **parts)
 
