@@ -181,7 +181,7 @@ def assembled_basis(
     T += [places.modal([(1.0, side)], 3) for side in further]
     nodal += [places.nodal([(1.0, side)], 3) for side in further]
     counts = [len(contact.tributary) for contact in contacts]
-    whole = ModalBasis(
+    return ModalBasis(
         angular_frequencies=np.concatenate([one.angular_frequencies for one in bases.values()]),
         damping=places.blocks([one.damping for one in bases.values()]),
         T=np.concatenate(T).reshape(-1, 3, places.modes),
@@ -204,7 +204,6 @@ def assembled_basis(
         on_ground=np.repeat([contact.other is None for contact in contacts], counts).astype(bool),
         parts=places.parts,
     )
-    return whole
 
 
 class _Places:

@@ -9,8 +9,8 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.compiled import CompiledLaw
+from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, quantity
@@ -29,8 +29,7 @@ from fecontact.system.interfaces import (
     Interface,
     PrescribedMotion,
     Sliding,
-    SlidingRotation,
-    SlidingTranslation,
+    checked_sliding,
     motion_sources,
     prescribed_motion,
     system_fields,
@@ -46,6 +45,8 @@ NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a
                    "friction); `fecontact laws` lists them.")
 
 PARTS = ("normal", "friction", "sliding", "ground", "drive", "load")
+
+_OF_INTERFACES = ("normal", "friction", "sliding")
 
 _KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
 
@@ -69,9 +70,9 @@ class ContactSystem(Summarised):
     Attributes
     ----------
     basis : ModalBasis
-    normal : normal law, or mapping of contact group to normal law
+    normal : normal law, or mapping of interface to normal law
         Normal force F (on the body, upwards) from penetration and its rate.
-    friction : friction law, or mapping of contact group to friction law
+    friction : friction law, or mapping of interface to friction law
         Friction force R (on the body, against the slip velocity). Required if a contact node can
         move along the ground.
     ground : Ground
@@ -96,8 +97,9 @@ class ContactSystem(Summarised):
     Raises
     ------
     InputError
-        Without contact nodes, a normal law, or a required friction law; for a part of wrong type, laws for unknown
-        contact groups, parameters or gaps that do not match the number of contact nodes, laws that
+        Without contact nodes, a normal law, or a required friction law; for a part of wrong type,
+        laws for unknown interfaces, parameters or gaps that do not match the number of contact
+        nodes, speeds that cannot be combined (:attr:`prescribed_motion`), laws that
         :func:`require_sound` refuses, and drives or loads in a direction in which no mode moves
         their point.
     """
@@ -152,7 +154,8 @@ class ContactSystem(Summarised):
                     raise InputError(f"ContactSystem: {name} = {one!r} must be a "
                                      f"{law.__name__}.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
-        self._check_sliding()
+        object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
+        _ = self.prescribed_motion
         for part in (self.law_groups("normal"), self.law_groups("friction")):
             for _, share, one in part:
                 one.table(share)
@@ -164,40 +167,25 @@ class ContactSystem(Summarised):
         names = [group for group, _ in self.basis.groups]
         for group in given:
             if group not in names:
-                raise InputError(f"ContactSystem: {name} has a law for the contact group "
-                                 f"{group!r}{nearest(str(group), names)}, but the groups of "
+                raise InputError(f"ContactSystem: {name} has a law for the interface "
+                                 f"{group!r}{nearest(str(group), names)}, but the interfaces of "
                                  f"the basis are: {choices(names)}.")
         missing = [group for group in names if group not in given]
         if missing:
-            raise InputError(f"ContactSystem: {name} lacks a law for the contact "
-                             f"group{'s' * (len(missing) > 1)} {choices(missing)}.")
-
-    def _check_sliding(self) -> None:
-        names = [group for group, _ in self.basis.groups]
-        for group, one in self.sliding.items():
-            if group not in names:
-                raise InputError(f"ContactSystem: sliding names the interface {group!r}"
-                                 f"{nearest(group, names)}, but there are {choices(names)}.")
-            if not isinstance(one, SlidingTranslation | SlidingRotation):
-                raise InputError(f"ContactSystem: sliding of '{group}' = {one!r} must be a "
-                                 f"SlidingTranslation or SlidingRotation.")
-        object.__setattr__(self, "sliding", MappingProxyType(dict(self.sliding)))
-        leaning = self.basis.normals[self.basis.ground_nodes] != (0.0, 1.0)
-        if self.ground.wavy and leaning.any():
-            raise InputError("ContactSystem: waves of the ground need contact nodes whose normal "
-                             "is (0, 1), but some on the ground have others; make the ground flat.")
-        _ = self.prescribed_motion
+            raise InputError(f"ContactSystem: {name} lacks a law for the "
+                             f"interface{'s' * (len(missing) > 1)} {choices(missing)}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes and contact nodes, laws, ground, drive and load."""
-        modes, frequencies, _, nodes, *_ = self.basis.summary()
+        own = dict(self.basis.summary())
         drive, ground = self.drive, self.ground
         low, high = ground.height_range
         stiffness = [f"{quantity(value, 'N/m')} in {axis}" for axis, value in (
             ("x", drive.stiffness_x), ("y", drive.stiffness_y)) if value]
         moved = drive.frequency_hz if any(motion.largest > 0.0 for motion in drive.motions) else 0.0
         return [
-            modes, frequencies, nodes,
+            *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
+              if name in own),
             *((kind, _law_names(getattr(self, kind))) for kind in ("normal", "friction")),
             ("ground", quantity(ground.speed, "m/s")
              + (f", {quantity(high - low, 'm')} from valley to peak" if ground.wavy else "")),
@@ -209,7 +197,7 @@ class ContactSystem(Summarised):
         """Groups of contact nodes with a common law: slice, share of each node, law.
 
         Extensive parameters are totals of the whole face for a single law, and totals of the group
-        for the law of a contact group.
+        for the law of an interface.
         """
         given, tributary = getattr(self, kind), self.basis.tributary
         if not isinstance(given, Mapping):
@@ -392,7 +380,7 @@ class ContactSystem(Summarised):
         """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
 
         Without the numbers of the basis, which :meth:`parameter` and :meth:`with_` know too.
-        Parameters of the laws of a contact group: ``contact.NAME.normal.stiffness``.
+        Parameters of the laws of an interface: ``interfaces.NAME.normal.stiffness``.
         """
         return {_outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
@@ -434,28 +422,28 @@ def _load_summary(load: Load) -> str:
 
 
 def _law_names(law: Any) -> str:
-    """Class of a law, or those of the contact groups."""
+    """Class of a law, or those of the interfaces."""
     if isinstance(law, Mapping):
         return listed([f"{type(one).__name__} ({group})" for group, one in law.items()])
     return type(law).__name__
 
 
 def _inner_name(name: str) -> str:
-    """``normal.NAME.stiffness`` for ``contact.NAME.normal.stiffness``."""
+    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness``."""
     first, _, rest = name.partition(".")
     group, _, parameter = rest.partition(".")
     kind, _, last = parameter.partition(".")
-    if first != "contact" or kind not in ("normal", "friction"):
+    if first != "interfaces" or kind not in _OF_INTERFACES:
         return name
     return f"{kind}.{group}.{last}" if last else f"{kind}.{group}"
 
 
 def _outer_name(system: ContactSystem, name: str) -> str:
-    """The reverse, for laws of contact groups."""
+    """The reverse, for laws of interfaces."""
     kind, _, rest = name.partition(".")
-    if kind not in ("normal", "friction") or not isinstance(getattr(system, kind), Mapping):
+    if kind not in _OF_INTERFACES or not isinstance(getattr(system, kind), Mapping):
         return name
     group, _, last = rest.partition(".")
     if group not in getattr(system, kind):
         return name
-    return f"contact.{group}.{kind}.{last}" if last else f"contact.{group}.{kind}"
+    return f"interfaces.{group}.{kind}.{last}" if last else f"interfaces.{group}.{kind}"

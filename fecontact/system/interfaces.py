@@ -6,6 +6,7 @@ nodes, and a factor for each of them: ``V_tj(t) = factor_j V(t)``.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.compiled import CompiledLaw
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw, NormalLaw
@@ -26,7 +27,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 
 __all__ = ["Interface", "PointPairing", "PrescribedMotion", "Sliding", "SlidingRotation",
-           "SlidingTranslation", "motion_sources", "prescribed_motion", "system_fields"]
+           "SlidingTranslation", "checked_sliding", "motion_sources", "prescribed_motion", "system_fields"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,9 +171,34 @@ def motion_sources(
                                         one.along(places[nodes], tangents[nodes]), one.speed,
                                         one.motion))
     if on_ground.any():
-        sources.insert(0, MotionSource("the ground", on_ground, np.ones(np.count_nonzero(on_ground)),
-                                       ground.speed, ground.motion))
+        along = np.ones(np.count_nonzero(on_ground))
+        sources.insert(0, MotionSource("the ground", on_ground, along, ground.speed, ground.motion))
     return sources
+
+
+def checked_sliding(
+    basis: ModalBasis, ground: Ground, sliding: Mapping[str, Sliding]
+) -> Mapping[str, Sliding]:
+    """The sliding by interface, read-only.
+
+    Raises
+    ------
+    InputError
+        For unknown interfaces, values of another type, and waves of the ground below contact nodes
+        whose normal leans.
+    """
+    require_kind("ContactSystem", Mapping, sliding=sliding)
+    names = [group for group, _ in basis.groups]
+    for group, one in sliding.items():
+        if group not in names:
+            raise InputError(f"ContactSystem: sliding names the interface {group!r}"
+                             f"{nearest(group, names)}, but there are {choices(names)}.")
+        require_kind(f"Interface '{group}'", (SlidingTranslation, SlidingRotation), sliding=one)
+    leaning = basis.normals[basis.ground_nodes] != (0.0, 1.0)
+    if ground.wavy and leaning.any():
+        raise InputError("ContactSystem: waves of the ground need contact nodes whose normal is "
+                         "(0, 1), but some on the ground have others; make the ground flat.")
+    return MappingProxyType(dict(sliding))
 
 
 def prescribed_motion(
