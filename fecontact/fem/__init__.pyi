@@ -1,4 +1,5 @@
-from .pairing import Pairing, PairingReport, finer_face, pair_both_faces, pair_faces
+from .pairing import Pairing, finer_face, pair_both_faces, pair_faces
+from .pairing_report import PairingReport
 
 __all__ = [
     "Pairing",

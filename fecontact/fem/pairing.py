@@ -16,7 +16,7 @@ from fecontact.core.errors import (
     require_positive,
 )
 from fecontact.core.types import Array
-from fecontact.core.units import Summarised, count, listed, quantity
+from fecontact.core.units import Summarised
 from fecontact.fem.contact_face import check_faces_down, face_nodes, face_segments
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.face_curve import Closest, Face
@@ -28,65 +28,11 @@ from fecontact.fem.face_samples import (
     pressure_samples,
     segment_samples,
 )
+from fecontact.fem.pairing_report import SAME, PairingReport, closed_gaps, no_partner, reasons
 from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, piece_weights, whole
 
-_SAME = 1e-9  # of an edge: gaps below this are round-off
 _COUNT = "pair_faces: nodes"
 _FINER = 0.999  # ratio of spacings from which a face is finer than another
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PairingReport(Summarised):
-    """What came of the pairing of two faces.
-
-    Parameters
-    ----------
-    face, other : str
-        The face with the contact nodes and the other side, "BODY.BOUNDARY" or "ground".
-    nodes : int
-        Contact nodes.
-    left_out : (k, 2) array
-        Places of the face's displacement nodes without a partner [m].
-    reasons : tuple of str
-        Why each of them has none.
-    covered : float
-        Share of the length of the face that has a partner.
-    unevenness : float
-        Largest error of the loads that a uniform pressure puts on the nodes of the other side, over
-        the load of a node whose edges are wholly in contact: 0 where the loads are exact.
-    largest_gap, closed_overlap : float
-        Largest initial gap, and largest overlap set to zero [m].
-    largest_offset : float
-        Largest distance along the tangent between the places where opposite normal forces act [m];
-        times the force, the moment by which they do not balance.
-    """
-
-    face: str
-    other: str
-    nodes: int
-    left_out: Array
-    reasons: tuple[str, ...]
-    covered: float
-    unevenness: float
-    largest_gap: float
-    closed_overlap: float
-    largest_offset: float
-
-    def summary(self) -> list[tuple[str, str]]:
-        """Numbers of nodes, gaps, overlaps, and how evenly the other side is loaded."""
-        where = [f"({x:.4g}, {y:.4g}) m {reason}"
-                 for (x, y), reason in zip(self.left_out.tolist(), self.reasons, strict=True)]
-        return [
-            ("faces", f"{self.face} on {self.other}"),
-            ("nodes", f"{self.nodes}"),
-            ("without partner", f"{count(len(where), 'node')}: {listed(where, 3)}" if where
-             else "none"),
-            ("covered", f"{100.0 * self.covered:.4g} %"),
-            ("largest gap", quantity(self.largest_gap, "m")),
-            ("overlap closed", quantity(self.closed_overlap, "m")),
-            ("unevenness", f"{100.0 * self.unevenness:.3g} %"),
-            ("largest offset", quantity(self.largest_offset, "m")),
-        ]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -256,11 +202,11 @@ def _paired(
     partnered = np.zeros(len(face.body.nodes), dtype=bool)
     partnered[present[found.valid & ~shared]] = True
     lengths = lumped_lengths(face, runs, partnered)[present]
-    kept = lengths > _SAME * face.spacing
+    kept = lengths > SAME * face.spacing
     if not kept.any():
-        raise InputError(_no_partner(samples, found, face, other, limit))
+        raise InputError(no_partner(samples, found, face, other, limit))
     alone = samples.places[~kept]
-    reasons = _reasons(found, shared, other.label, kept)
+    why = reasons(found, shared, other.label, kept)
     if nodes == "all":
         samples = node_samples(face, present[kept])
         matrix, tributary = node_matrix(face.body, present[kept]), lengths[kept]
@@ -269,7 +215,7 @@ def _paired(
         samples, matrix = segment_samples(face, segments), _segment_matrix(face, segments)
     found = samples.closest(other, limit)
     return _described(face, other, samples, found, matrix, tributary, overlap, limit,
-                      runs, (alone, reasons))
+                      runs, (alone, why))
 
 
 def _described(
@@ -286,7 +232,7 @@ def _described(
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     tangents = np.column_stack([normals[:, 1], -normals[:, 0]])
     places = samples.mean(samples.places, size)
-    gaps, closed = _closed(hit.mean(found.gaps[found.valid], size), places, overlap,
+    gaps, closed = closed_gaps(hit.mean(found.gaps[found.valid], size), places, overlap,
                            min(face.lengths.mean(), other.lengths.mean()), face, other.label)
     at_node = _at_nodes(other, hit, found, size)
     chosen = np.unique(other.nodes)
@@ -320,7 +266,7 @@ def _on_ground(
         raise InputError(f"pair_faces: no node of '{face.label}' is within reach = {reach:g} m of "
                          f"the ground, y = 0; the lowest is {places[:, 1].min():.4g} m above it.")
     alone, places = places[~kept], places[kept]
-    gaps, closed = _closed(places[:, 1], places, overlap, float(face.lengths.mean()), face,
+    gaps, closed = closed_gaps(places[:, 1], places, overlap, float(face.lengths.mean()), face,
                            "the ground, y = 0,")
     normals, tangents = np.tile([0.0, 1.0], (len(gaps), 1)), np.tile([1.0, 0.0], (len(gaps), 1))
     report = PairingReport(
@@ -364,45 +310,3 @@ def _unevenness(other: Face, loads: Array, pressure: Samples, reach: float) -> f
     np.add.at(whole_edges, other.nodes, edge_weights(other.body, other.nodes))
     there = whole_edges > 0.0
     return float((np.abs(loads - exact)[there] / whole_edges[there]).max())
-
-
-def _no_partner(samples: Samples, found: Closest, face: Face, other: Face, limit: float) -> str:
-    names = f"pair_faces: no node of '{face.label}' has a partner on '{other.label}'"
-    wide = samples.closest(other, np.inf)
-    if wide.valid.any() and not found.valid.any():
-        gap = wide.gaps[wide.valid][np.argmin(np.abs(wide.gaps[wide.valid]))]
-        if gap < 0.0:
-            return (f"{names}: the closest lies {-gap:.4g} m behind it, so that the faces look away "
-                    f"from each other; put the bodies on the right sides of each other or give "
-                    f"other faces.")
-        return (f"{names}: the closest is {gap:.4g} m away, beyond reach = {limit:.4g} m; move the "
-                f"bodies closer or raise reach.")
-    if wide.averted.any() and not wide.valid.any():
-        return (f"{names}: their outward normals point the same way; give faces that look at each "
-                f"other.")
-    return (f"{names}: they lie beyond its ends; move the bodies opposite to each other, refine "
-            f"the mesh or give other faces.")
-
-
-def _reasons(found: Closest, shared: Array, other: str, kept: Array) -> tuple[str, ...]:
-    """Why each node that is not kept has no partner."""
-    return tuple(
-        "is on both faces" if shared[j] else f"is {found.nearest[j]:.3g} m away, out of reach"
-        if np.isfinite(found.nearest[j]) and not found.valid[j]
-        else f"looks away from {other}" if found.averted[j]
-        else f"is beyond the ends of {other}" for j in np.flatnonzero(~kept))
-
-
-def _closed(
-    gaps: Array, places: Array, overlap: float, edge: float, face: Face, other: str
-) -> tuple[Array, float]:
-    """Gaps without overlaps, and the largest of these."""
-    deepest, allowed, tiny = int(np.argmin(gaps)), overlap * edge, _SAME * edge
-    depth = -float(gaps[deepest])
-    if depth > max(allowed, tiny):
-        x, y = places[deepest]
-        raise InputError(f"pair_faces: '{face.label}' starts {depth:.4g} m inside {other} at "
-                         f"({x:.4g}, {y:.4g}) m, deeper than overlap = {overlap:g} edges, "
-                         f"{allowed:.4g} m; move the bodies apart, give faces that look at each "
-                         f"other, or raise overlap.")
-    return np.where(gaps < tiny, 0.0, gaps), depth if depth > tiny else 0.0
