@@ -1,4 +1,4 @@
-from . import analysis, bifurcation, integrate, io, laws, plot, reduction, study, sweeps
+from . import analysis, bifurcation, fem, integrate, io, laws, plot, reduction, study, sweeps
 from .core.errors import (
     AnalysisError,
     FecontactError,
@@ -33,6 +33,7 @@ from .sweeps.sweep import sweep
 from .system.contact_system import ContactSystem
 from .system.forcing_period import forcing_period
 from .system.gap import Crown
+from .system.interfaces import Interface
 from .system.quasistatic.loading import load_history
 from .system.quasistatic.path import LoadPath
 from .system.quasistatic.prestressed_modes import prestressed_modes
@@ -55,6 +56,7 @@ __all__ = [
     "FecontactError",
     "Ground",
     "InputError",
+    "Interface",
     "Load",
     "LoadPath",
     "LossFactor",
@@ -79,6 +81,7 @@ __all__ = [
     "bifurcation",
     "ensemble",
     "event",
+    "fem",
     "forcing_period",
     "generate",
     "integrate",

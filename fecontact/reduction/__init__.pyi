@@ -1,18 +1,24 @@
+from .assembled_basis import PointPairing, assembled_basis
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
-from .modal_basis import ModeShapes, ReductionQuality
+from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
+from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
 from .rotating import ModalRotation
 
 __all__ = [
     "BasisReport",
+    "BodyPart",
     "ModalRotation",
     "ModeShapes",
+    "PointPairing",
     "ReductionQuality",
+    "assembled_basis",
     "eigenfrequencies_hz",
     "mode_convergence",
     "normalisation",
+    "reduce_bodies",
     "rows_from_dofs",
 ]
