@@ -16,7 +16,7 @@ def parameters_of(whole: Any, prefix: str = "") -> dict[str, Any]:
         title = f"{prefix}{name}"
         if _members(value):
             result |= parameters_of(value, f"{title}.")
-        elif value is not None and value != ():
+        elif value is not None and not (isinstance(value, tuple) and not value):
             result[title] = value
     return result
 

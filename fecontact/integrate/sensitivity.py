@@ -239,4 +239,5 @@ def _slip_limit(
 
 def _passing(system: ContactSystem) -> Array:
     """Speed (n,) with which the other side passes each node, as its parameter says."""
-    return np.asarray(system.sliding_factors * system.prescribed_motion.speed)
+    motion = system.prescribed_motion
+    return np.asarray(motion.factors * motion.base.speed)

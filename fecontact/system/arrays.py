@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.types import Array, Integers
@@ -20,13 +19,12 @@ LawGroup = tuple[slice, Array, Any]
 def system_arrays(
     basis: ModalBasis, normal_groups: Iterable[LawGroup], friction_groups: Iterable[LawGroup],
     ground: Ground, drive: Drive, load: Load, gap: Array, *, motion: Ground, sliding: Array,
-    on_ground: NDArray[np.bool_],
 ) -> SystemArrays:
     """Matrices, rows, parameters and addresses of the laws of a system.
 
     The groups are contact nodes that share a law: their place, each one's part of their face, and
-    the law; see :meth:`fecontact.ContactSystem.law_groups`. ``motion`` is what moves the other side
-    of node j, ``sliding[j]`` times; it counts as ground where ``on_ground`` is 1.
+    the law; see :meth:`fecontact.ContactSystem.law_groups`. ``motion`` moves the other side of node
+    j, ``sliding[j]`` times.
     """
     B = basis.T[0]
     stiffness = np.array(basis.stiffness_matrix)
@@ -71,7 +69,7 @@ def system_arrays(
         normal=normal,
         friction=friction,
         memory=np.concatenate(memory),
-        on_ground=np.array(on_ground, dtype=np.int64),
+        on_ground=basis.ground_nodes.astype(np.int64),
         drive=_addresses(motion.kernel for motion in drive.motions),
         load=_addresses(signal.kernel for signal in signals),
         profile=ground.profile_kernel.address,

@@ -9,7 +9,6 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import CompiledLaw
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
@@ -220,20 +219,6 @@ class ContactSystem(Summarised):
         return prescribed_motion(self.basis, self.ground, self.sliding)
 
     @property
-    def sliding_factors(self) -> Array:
-        """Tangential velocity (n,) of each node's other side by the speed of the motion."""
-        return self.prescribed_motion.factors
-
-    @property
-    def motion_kernel(self) -> CompiledLaw:
-        """Compiled travel and speed of the motion."""
-        return self.prescribed_motion.kernel
-
-    def motion_parameters(self) -> Array:
-        """Parameters of the compiled motion."""
-        return self.prescribed_motion.parameters.copy()
-
-    @property
     def memory(self) -> int:
         """Number s of internal variables that the state holds for each contact node."""
         return int(self.arrays.memory.max())
@@ -303,29 +288,13 @@ class ContactSystem(Summarised):
                         friction_force[..., nodes])
              for nodes, _, law in self.law_groups("friction")], axis=-1)
 
-    @property
-    def prescribed_motion(self) -> Ground:
-        """Ground whose motion is that of the other sides; see :attr:`sliding_factors`."""
-        return self.ground
-
-    @property
-    def sliding_factors(self) -> Array:
-        """Factor (n,) of the prescribed motion with which the other side of each node moves."""
-        return np.ones(self.basis.contact_nodes)
-
-    @property
-    def on_ground(self) -> NDArray[np.bool_]:
-        """Whether the other side of each node (n,) is the ground."""
-        return np.ones(self.basis.contact_nodes, dtype=bool)
-
     @cached_property
     def arrays(self) -> kernels.SystemArrays:
         """The system as arrays for the compiled kernels."""
         return system_arrays(
             self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
             self.drive, self.load, np.asarray(self.gap, dtype=float),
-            motion=self.prescribed_motion, sliding=self.sliding_factors,
-            on_ground=self.on_ground)
+            motion=self.prescribed_motion.base, sliding=self.prescribed_motion.factors)
 
     def rhs(self, t: float, y: Array) -> Array:
         """Rate y' (2 m + n s,) of the state y = [q, q', z]."""

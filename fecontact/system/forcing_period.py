@@ -40,9 +40,9 @@ def common_period(system: ContactSystem) -> float | None:
             raise AnalysisError(f"{name} is not periodic; periodic orbits need a drive and loads "
                                 f"that repeat.")
         periods.append(1.0 / source.frequency_hz)
-    if ground.motion is not None:
-        raise AnalysisError("ground.motion makes the speed depend on time; periodic orbits are "
-                            "computed for constant speed.")
+    if system.prescribed_motion.base.motion is not None:
+        raise AnalysisError("A motion of the ground, or of a side that slides, makes its speed "
+                            "depend on time; periodic orbits are computed for constant speed.")
     shapes = [("ground.friction_variation", ground.friction_variation)]
     if ground.wavy:
         shapes.append(("ground.profile", ground.profile or Sine(ground.amplitude,

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
-from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
-from fecontact.laws.ground.motion import GroundMotion, constant_speed
+from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembled_basis import PointPairing, assembled_basis
 from fecontact.reduction.modal_basis import ModalBasis
@@ -140,16 +139,13 @@ class PrescribedMotion:
 
     Attributes
     ----------
-    kernel : CompiledLaw
-        Travel and speed of one function of time.
-    parameters : array
-        Its parameters.
+    base : Ground
+        Flat ground of that motion.
     factors : (n,) array
         Tangential velocity of the other side of each node by this speed.
     """
 
-    kernel: CompiledLaw
-    parameters: Array
+    base: Ground
     factors: Array
 
 
@@ -233,11 +229,10 @@ def prescribed_motion(
         for source in moving:
             factors[source.nodes] = source.along * (1.0 if varying else source.speed)
         if not varying:
-            return PrescribedMotion(constant_speed, np.ones(1), factors)
-    if lead is None or lead.motion is None:
-        speed = ground.speed if lead is None else lead.speed
-        return PrescribedMotion(constant_speed, np.array([speed], dtype=float), factors)
-    return PrescribedMotion(lead.motion.kernel, lead.motion.parameters(lead.speed), factors)
+            return PrescribedMotion(Ground(speed=1.0), factors)
+    if lead is None:
+        return PrescribedMotion(Ground(), factors)
+    return PrescribedMotion(Ground(speed=lead.speed, motion=lead.motion), factors)
 
 
 def inner_name(name: str) -> str:

@@ -99,7 +99,7 @@ def equilibrium(
                             "(ground.friction_variation); start from rest.")
     arrays = _at_mean(system)
     if not friction:
-        arrays = at_rest(arrays, system.prescribed_motion.travel(time))
+        arrays = at_rest(arrays, system.prescribed_motion.base.travel(time))
     # On level ground, and with its normal vertical, contact forces do not lean.
     slides = bool(arrays.leans and ground.wavy and arrays.Tx.any() and not standing)
     problem = Balance(arrays._replace(leans=0), time, system.penetration_scale)

@@ -24,7 +24,7 @@ _LEAST_VALUE = 1e-3
 # Arrays that prescribe functions of time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
-                      "ground_motion_parameters"})
+                      "ground_motion_parameters", "sliding"})
 
 
 class ContactField(VectorField):
@@ -45,9 +45,10 @@ class ContactField(VectorField):
     def _moves_forcing(self, varying: frozenset[str]) -> bool:
         moved = varying & _FORCING
         ground = self._family.base.ground
-        flat = not ground.wavy and ground.friction_variation is None and ground.motion is None
+        steady = self._family.base.prescribed_motion.base.motion is None
+        flat = not ground.wavy and ground.friction_variation is None and steady
         if flat and "profile_parameters" not in moved:
-            moved = moved - {"ground_motion_parameters"}
+            moved = moved - {"ground_motion_parameters", "sliding"}
         return bool(moved)
 
     def system(self, values: Array | None = None) -> ContactSystem:

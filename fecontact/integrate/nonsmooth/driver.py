@@ -218,7 +218,7 @@ def _problem(
         arrays, _static(static_coefficient, n), cluster, rows, sliding, 1e-4 * longest,
         -1.0 if restitution is None else float(restitution), 0.0, 0,
         np.array([*ground.height_range, np.inf if wave is None else wave]),
-        int(system.prescribed_motion.motion is None), compiled_derivative.address,
+        int(system.prescribed_motion.base.motion is None), compiled_derivative.address,
         compiled_change.address)
     rubbing = np.any(rows != 0.0, axis=1)
     if restitution is not None:
@@ -313,7 +313,7 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
     largest = np.abs(system.basis.T[:, :2]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
     depth = system.penetration_scale
-    fastest = float(np.abs(arrays.sliding).max()) * system.prescribed_motion.largest_speed(
+    fastest = float(np.abs(arrays.sliding).max()) * system.prescribed_motion.base.largest_speed(
         float(times[0]), float(times[-1]))
     speed = max(0.01 * fastest,
                 depth / longest)

@@ -104,7 +104,8 @@ def contact_powers(moved, s, nodes, friction, elastic, out):
         force, R, speed = nodes[j, FORCE], friction[j], s.sliding[j] * moved.speed
         out[BELT_NORMAL] += belt_normal_power(force, nodes[j, SLOPE], nodes[j, SLIP], speed, s)
         out[BELT_FRICTION] -= R * speed
-        if elastic and force != 0.0:
+        if elastic:
+            # Damping may bring the force to zero while the spring is still compressed.
             stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
             out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
         out[POWER_COUNT + j] = R * nodes[j, SLIP]

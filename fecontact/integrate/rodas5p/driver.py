@@ -148,7 +148,7 @@ def _levels(system: ContactSystem) -> Array:
 
 def _ground_bounds(system: ContactSystem, times: Array) -> Array:
     """What bounds the ground, in the order of :mod:`fecontact.integrate.courses`."""
-    ground, motion = system.ground, system.prescribed_motion
+    ground, motion = system.ground, system.prescribed_motion.base
     start, end = float(times[0]), float(times[-1])
     low, high, slope = 0.0, 0.0, 0.0
     if ground.wavy:
@@ -158,7 +158,7 @@ def _ground_bounds(system: ContactSystem, times: Array) -> Array:
             raise InputError(f"Ground: profile = {ground.profile!r} must say its height_range and "
                              f"its steepest_slope, which bound it between the places where the "
                              f"integrator meets it.") from None
-    if not system.on_ground.all():
+    if not system.basis.ground_nodes.all():
         low, high = min(low, 0.0), max(high, 0.0)
     return np.array([low, high, slope, motion.largest_speed(start, end),
                      motion.largest_acceleration(start, end)])
