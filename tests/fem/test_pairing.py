@@ -207,6 +207,31 @@ def test_faces_of_any_smooth_shape_converge_faster_than_their_chords():
     assert (rates > 2.8).all()
 
 
+def test_partners_are_the_closest_places_of_the_other_face():
+    """Two wavy faces: no place of a fine polygon along the other face is closer than the foot."""
+    def waves(amplitude, number, high, low):
+        def bend(nodes):
+            x, y = nodes.T
+            rise = amplitude * np.sin(number * x)
+            return np.column_stack([x, y + rise * (high - y if high > low else y - high)])
+        return bend
+    upper = grid(np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 5),
+                 warp=waves(0.06, 9.0, 1.0, 0.0))
+    lower = grid(np.linspace(-0.5, 2.5, 34), np.linspace(-1.0, 0.0, 5),
+                 warp=waves(0.1, 4.0, -1.0, 0.0))
+    bodies = {"upper": ElasticBody(moved(upper, 0.0, 0.2)), "lower": ElasticBody(lower)}
+    pairing = pair_faces(bodies, "upper.bottom", "lower.top")
+    assert pairing.body == "upper"
+    other = Face(bodies["lower"], "top", "lower.top")
+    s = np.tile(np.linspace(0.0, 1.0, 201), 33)
+    line = other.at(np.repeat(np.arange(33), 201), s)
+    distance = np.linalg.norm(pairing.places[:, None] - line, axis=2).min(axis=1)
+    assert pairing.gaps == pytest.approx(distance, abs=1e-6)
+    assert (pairing.gaps <= distance + 1e-15).all()
+    assert np.ptp(pairing.gaps) > 0.1
+    assert not len(pairing.report.left_out)
+
+
 def test_flat_faces_and_corners_stay_what_they_are():
     """A chamfer of 20 degrees and the straight parts beside an arc are not rounded."""
     xs = np.linspace(0.0, 1.0, 21)
