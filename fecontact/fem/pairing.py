@@ -96,7 +96,8 @@ def pair_faces(
     face, other : str
         "BODY.BOUNDARY"; ``other`` may be "ground", y = 0, and both may be of one body.
     nodes : "all" or int
-        Every displacement node, or so many segments of equal length with their mean displacement.
+        Every displacement node, or so many segments of equal length with their mean displacement,
+        whose loads are even also where the meshes do not match.
     nodes_on : "finer" or "face"
         Which face has the nodes: ``other`` if it is finer than ``face``, or ``face`` in any case.
     reach : float or None

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from meshes_for_tests import grid, rectangle
 
 from fecontact import ElasticBody, FecontactError, InputError, Mesh, MeshError
@@ -137,6 +138,34 @@ def test_uniform_pressure_through_segments_is_the_consistent_load_of_any_meshes(
         assert got == pytest.approx(wanted, abs=1e-14)
 
 
+@KINDS
+@pytest.mark.parametrize(("above", "below", "nodes"), [(6, 6, "all"), (9, 5, 8), (5, 9, 7)])
+def test_uniform_stress_passes_from_one_body_to_the_other(triangles, degree, above, below, nodes):
+    """Blocks on rollers, pressed together through compliant nodes: u_y = - p y / E - p / k."""
+    pressure, stiffness = 3.0e6, 5.0e12
+    bodies = two_blocks(above, below, triangles=triangles, degree=degree)
+    pairing = pair_faces(bodies, "pad.bottom", "disc.top", nodes=nodes)
+    parts = {pairing.body: pairing.nodes, pairing.other: -pairing.feet}
+    rows = np.zeros((len(pairing.gaps), 3 * len(pairing.gaps)))
+    j = np.arange(len(pairing.gaps))
+    rows[j, 3 * j], rows[j, 3 * j + 1] = pairing.normals.T
+    W = rows @ sp.hstack([parts["pad"], parts["disc"]]).toarray()
+    K = (sp.block_diag([bodies["pad"].stiffness, bodies["disc"].stiffness]).toarray()
+         + W.T @ (stiffness * pairing.tributary[:, None] * W))
+    load = pressure * np.concatenate([boundary_forces(bodies["pad"], "top")[:, 0],
+                                      np.zeros(2 * len(bodies["disc"].nodes))])
+    places = np.concatenate([bodies["pad"].nodes, bodies["disc"].nodes])
+    fixed = np.column_stack([places[:, 0] < 1e-9, places[:, 1] < -0.5 + 1e-9]).ravel()
+    u = np.zeros(len(load))
+    u[~fixed] = np.linalg.solve(K[np.ix_(~fixed, ~fixed)], load[~fixed])
+    E, nu = bodies["pad"].material.youngs_modulus, bodies["pad"].material.poisson_ratio
+    x, y = places.T
+    pad = np.arange(len(places)) < len(bodies["pad"].nodes)
+    exact = np.column_stack([nu * pressure * x / E,
+                             -pressure * (y + 0.5) / E - pad * pressure / stiffness])
+    assert u.reshape(-1, 2) == pytest.approx(exact, abs=1e-9 * np.abs(exact).max())
+
+
 @pytest.mark.parametrize("nodes", ["all", 31])
 def test_gap_of_a_cylinder_on_a_block(nodes):
     """The nodes of the mesh and the middles of its edges lie on the circle, and so do segments."""
@@ -209,16 +238,13 @@ def test_faces_of_any_smooth_shape_converge_faster_than_their_chords():
 
 def test_partners_are_the_closest_places_of_the_other_face():
     """Two wavy faces: no place of a fine polygon along the other face is closer than the foot."""
-    def waves(amplitude, number, high, low):
+    def waves(amplitude, number):
         def bend(nodes):
             x, y = nodes.T
-            rise = amplitude * np.sin(number * x)
-            return np.column_stack([x, y + rise * (high - y if high > low else y - high)])
+            return np.column_stack([x, y + amplitude * np.sin(number * x) * (1.0 - np.abs(y))])
         return bend
-    upper = grid(np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 5),
-                 warp=waves(0.06, 9.0, 1.0, 0.0))
-    lower = grid(np.linspace(-0.5, 2.5, 34), np.linspace(-1.0, 0.0, 5),
-                 warp=waves(0.1, 4.0, -1.0, 0.0))
+    upper = grid(np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 5), warp=waves(0.06, 9.0))
+    lower = grid(np.linspace(-0.5, 2.5, 34), np.linspace(-1.0, 0.0, 5), warp=waves(0.1, 4.0))
     bodies = {"upper": ElasticBody(moved(upper, 0.0, 0.2)), "lower": ElasticBody(lower)}
     pairing = pair_faces(bodies, "upper.bottom", "lower.top")
     assert pairing.body == "upper"
@@ -384,6 +410,21 @@ def test_nodes_on_the_ground_are_those_of_a_single_body(nodes):
     with pytest.raises(InputError, match=r"starts 0.02 m inside the ground, y = 0, at"):
         pair_faces({"pad": ElasticBody(moved(rectangle(1, 1, 4, 4), y=-0.02))}, "pad.bottom",
                    "ground")
+
+
+@pytest.mark.parametrize("columns", [6, 11])
+def test_gap_of_a_crowned_face_above_the_ground(columns):
+    radius = 2.0
+
+    def bend(nodes):
+        x, y = nodes.T
+        return np.column_stack([x, y + (1.0 - y) * (radius - np.sqrt(radius**2 - x**2))])
+    xs = np.linspace(-0.5, 0.5, columns + 1)
+    body = ElasticBody(grid(xs, np.linspace(0.0, 1.0, 4), warp=bend))
+    pairing = pair_faces({"pad": body}, "pad.bottom", "ground")
+    x = pairing.places[:, 0]
+    assert pairing.gaps == pytest.approx(radius - np.sqrt(radius**2 - x**2), abs=2e-8)
+    assert len(x) == 2 * columns + 1
 
 
 def test_faces_on_the_wrong_sides_are_refused():
