@@ -310,6 +310,26 @@ def test_nodes_beyond_the_other_face_are_left_out_and_told(degree):
     assert in_segments.places[-1, 0] == pytest.approx(1.0 - 0.055, abs=1e-6)
 
 
+@pytest.mark.parametrize("nodes", ["all", 6])
+def test_faces_in_several_parts(nodes):
+    """Two feet on one face, with the nodes on the feet or between them."""
+    pad = ElasticBody(rectangle(1.0, 0.4, 10, 2, split=((0.0, 0.2), (0.6, 1.0))))
+    for cells, carrier in ((7, "pad"), (23, "disc")):
+        bodies = {"pad": pad, "disc": two_blocks(below=cells)["disc"]}
+        pairing = pair_faces(bodies, "pad.feet", "disc.top", nodes=nodes)
+        assert pairing.body == carrier
+        x = pairing.places[:, 0]
+        assert not ((x > 0.2 + 1e-9) & (x < 0.6 - 1e-9)).any()
+        assert pairing.tributary.sum() == pytest.approx(0.6, abs=1e-6)
+        assert pairing.tributary[x < 0.4].sum() == pytest.approx(0.2, abs=1e-6)
+        if nodes != "all":
+            assert pairing.tributary == pytest.approx(np.full(6, 0.1), abs=1e-6)
+            assert pairing.report.unevenness < 1e-6
+        if carrier == "disc":
+            alone = pairing.report.left_out[:, 0]
+            assert ((alone > 0.2) & (alone < 0.6)).all()
+
+
 def test_reach_limits_the_distance_of_partners():
     wedge = grid(np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 4),
                  warp=lambda nodes: nodes + np.outer(0.3 * nodes[:, 0], [0.0, 1.0]))
