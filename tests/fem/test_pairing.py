@@ -191,6 +191,21 @@ def test_gap_of_a_cylinder_on_a_block(nodes):
     assert pairing.report.covered == pytest.approx(away / np.pi, rel=2e-3)
 
 
+@pytest.mark.parametrize("side", ["left", "right", "bottom", "top"])
+def test_segments_go_on_where_the_numbering_of_a_closed_face_ends(side):
+    """A cylinder beside each side of a block: one connected part has a partner."""
+    centre = {"left": (-1.1, 0.5), "right": (2.1, 0.5), "bottom": (0.5, -1.1),
+              "top": (0.5, 2.1)}[side]
+    bodies = {"cylinder": ElasticBody(ring(0.3, 1.0, 64, centre)),
+              "block": ElasticBody(moved(rectangle(1.0, 1.0, 4, 4)))}
+    pairing = pair_faces(bodies, "cylinder.rim", f"block.{side}", nodes=9, nodes_on="face")
+    angle = np.unwrap(np.arctan2(*(pairing.places - centre).T[::-1]))
+    # The block's side of length 1 is seen under 60 degrees, from the surface of the cylinder.
+    assert np.diff(angle) == pytest.approx(np.full(8, np.pi / 27.0), rel=2e-3)
+    assert pairing.tributary.sum() == pytest.approx(np.pi / 3.0, rel=1e-3)
+    assert pairing.gaps.min() == pytest.approx(0.1, abs=1e-3)
+
+
 def pin_in_hole(count, aspect=1.0):
     """Errors of gaps and normals of a pin that lies aside in a larger hole."""
     offset = np.array([0.003, -0.009])
