@@ -52,6 +52,16 @@ ElasticBody(mesh,fixed=None)
 ElasticBody(mesh,fixed="left")
 ElasticBody(mesh,fixed={"left":None})
 ElasticBody(mesh,fixed={None:"x"})
+pair_faces(None,"a.contact","b.top")
+pair_faces({"a":mesh},"a.contact","ground")
+pair_faces({"a":body},"contact","ground")
+pair_faces({"a":body},"a.contact","a.contact")
+pair_faces({"a":body},"a.contact","a.top")
+pair_faces({"a":body},"a.contact","ground",nodes=1j)
+pair_faces({"a":body},"a.contact","ground",reach="a")
+pair_faces({"a":body},"a.contact","ground",overlap=None)
+pair_both_faces({"a":body},"a.contact","ground")
+finer_face({"a":body},None,"a.top")
 Mesh(None,None)
 Mesh([],[])
 Mesh(np.zeros((3,2)),[[0,1,2]])
@@ -637,8 +647,8 @@ SetValued(static_coefficient=True)
 Rodas5P(keep_checkpoint=3)
 """
 
-NAMESPACES = ("laws", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps",
-              "plot", "io")
+NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study",
+              "sweeps", "plot", "io")
 
 
 @pytest.fixture(scope="module")

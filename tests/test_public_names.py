@@ -12,8 +12,8 @@ import pytest
 
 import fecontact
 
-NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps",
-              "plot", "io")
+NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study",
+              "sweeps", "plot", "io")
 PUBLIC = [("fecontact", name) for name in fecontact.__all__ if name not in NAMESPACES] + [
     (f"fecontact.{space}", name) for space in NAMESPACES
     for name in importlib.import_module(f"fecontact.{space}").__all__]

@@ -130,8 +130,8 @@ def face_segments(
     most = len(np.unique(np.concatenate([part.nodes.ravel() for part in parts])))
     if isinstance(count, bool) or not isinstance(count, int) or not len(parts) <= count <= most:
         raise InputError(f"{key} = {count!r} must be 'all' or a whole number from {len(parts)} to "
-                         f"{most}, the number of nodes on boundary '{boundary}'; refine the mesh "
-                         f"for more.")
+                         f"{most}, the number of nodes on boundary '{boundary}'; refine the "
+                         f"mesh for more.")
     segments: list[Pieces] = []
     each: list[float] = []
     totals = np.array([_lengths(body, part).sum() for part in parts])

@@ -1,26 +1,28 @@
 """A face of a body as a smooth curve through its nodes, and the places of it closest to others.
 
 Meshes are straight-sided: the chords of a circle of radius R miss it by h^2 / (8 R), easily as much
-as the gaps that matter. Where successive edges meet at a small angle and their neighbours bend the
-same way, the face is taken for a smooth curve: at each node the tangent of the circle through it
-and its two neighbours, along each edge a cubic. Everything else stays a corner.
+as the gaps that matter. Where successive edges meet at up to 30 degrees and their neighbours bend
+the same way, the face is taken for a smooth curve: at each node the tangent of the circle through
+it and its two neighbours, along each edge a cubic. Everything else stays a corner.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.contact_face import face_chains
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 
-_SHARP = np.radians(30.0)  # edges that meet at this angle or more form a corner
+_SHARP = np.radians(30.0) * (1.0 + 1e-6)  # edges that meet at more than this form a corner
+_FLAT = 1e-9  # angle [rad] below which they do not meet at any
 _ALIKE = 0.25  # of a node's curvature: with less at its neighbour, it is a kink between flats
 _NEAR = 1e-6  # of an edge: below this distance the direction to a corner has no meaning
 _STEPS = 60
-_PAIRS = 1_000_000  # places times edges that are looked at together
+_TOGETHER = 128  # successive places looked at together
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +34,14 @@ class Closest:
     where it is out of reach; ``averted`` marks places above or below the face that look away.
     """
 
-    valid: Array
+    valid: NDArray[np.bool_]
     edges: Integers
     s: Array
     places: Array
     normals: Array
     gaps: Array
     nearest: Array
-    averted: Array
+    averted: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +92,7 @@ class Face:
         return np.column_stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s),
                                                 s * (2.0 * s - 1.0)])
 
+    @cached_property
     def neighbours(self) -> tuple[Integers, Integers]:
         """The edges (k,) of the face before and after each, -1 at its ends."""
         after = _followers(self.nodes[:, [0, -1]], len(self.body.nodes))
@@ -103,10 +106,9 @@ class Face:
         the normal of the face, with a cosine of at least ``least``. A place beyond the ends of the
         face by more than ``slack`` edges has none, nor has one farther away than ``reach``.
         """
-        chunk = max(1, _PAIRS // len(self.nodes))
-        parts = [self._closest(places[k : k + chunk], looks[k : k + chunk], reach, least,
+        parts = [self._closest(places[k : k + _TOGETHER], looks[k : k + _TOGETHER], reach, least,
                                slack)
-                 for k in range(0, len(places), chunk)]
+                 for k in range(0, len(places), _TOGETHER)]
         names = Closest.__dataclass_fields__
         return Closest(**{name: np.concatenate([getattr(part, name) for part in parts])
                           for name in names})
@@ -141,21 +143,26 @@ class Face:
         """All perpendicular feet: number of place, edge, s, normal and signed distance."""
         start, end = self._ends
         first, last = self._tangents
-        before, after = self.neighbours()
-        # Slope of half the squared distance at both ends of every edge, over the tangent's length.
-        low = np.einsum("ex,nex->ne", first, start - places[:, None])
-        high = np.einsum("ex,nex->ne", last, end - places[:, None])
+        before, after = self.neighbours
         beyond = slack * self.lengths
-        place, edge = np.nonzero((low <= np.where(before < 0, beyond, 0.0))
-                                 & (high >= np.where(after < 0, -beyond, 0.0)))
-        s = self._roots(places[place], edge, low[place, edge], high[place, edge])
+        below, above = np.where(before < 0, beyond, 0.0), np.where(after < 0, -beyond, 0.0)
+        # Most edges have no foot of any of these places, which lie in a box.
+        (left, lower), (right, upper) = places.min(axis=0), places.max(axis=0)
+        box = np.array([[left, lower], [left, upper], [right, lower], [right, upper]])
+        near = np.flatnonzero((_slopes(first, start, box).min(axis=1) <= below)
+                              & (_slopes(last, end, box).max(axis=1) >= above))
+        low = _slopes(first[near], start[near], places)
+        high = _slopes(last[near], end[near], places)
+        edge, place = np.nonzero((low <= below[near, None]) & (high >= above[near, None]))
+        low, high, edge = low[edge, place], high[edge, place], near[edge]
+        s = self._roots(places[place], edge, low, high)
         at, slope, _ = self._cubic(edge, s)
         normal = _turned(_unit(slope))
         gap = np.einsum("kx,kx->k", normal, places[place] - at)
         # Between the normals on both sides of a corner, the corner itself is closest.
-        joined = np.flatnonzero(after >= 0)
-        corner = (high[:, joined] < 0.0) & (low[:, after[joined]] > 0.0)
-        at_corner, which = np.nonzero(corner)
+        joined = np.flatnonzero((after >= 0) & (last != first[after]).any(axis=1))
+        which, at_corner = np.nonzero((_slopes(last[joined], end[joined], places) < 0.0) & (
+            _slopes(first[after[joined]], start[after[joined]], places) > 0.0))
         which = joined[which]
         normals, gaps = _corner_normals(
             places[at_corner] - end[which], _turned(last[which]),
@@ -236,8 +243,9 @@ def _outline_tangents(mesh: Mesh) -> tuple[Array, Array]:
     before = _inverted(after)
     # What follows stands for the node at the end of each edge.
     turn = np.arctan2(_cross(along, along[after]), np.einsum("kx,kx->k", along, along[after]))
+    turn[np.abs(turn) < _FLAT] = 0.0
     bent = turn / np.minimum(length, length[after])
-    corner = (after < 0) | (np.abs(turn) >= _SHARP)
+    corner = (after < 0) | (np.abs(turn) > _SHARP)
     smooth = ~corner
     for other in (before, after):
         alike = np.sign(bent) * bent[other] >= _ALIKE * np.abs(bent)
@@ -251,6 +259,12 @@ def _outline_tangents(mesh: Mesh) -> tuple[Array, Array]:
     first, last = (np.where((at_start | ~smooth)[:, None], first, _mirrored(last, along)),
                    np.where((smooth | ~at_start)[:, None], last, _mirrored(first, along)))
     return first, last
+
+
+def _slopes(tangents: Array, nodes: Array, places: Array) -> Array:
+    """Slopes (k, n) of half the squared distance of n places along k tangents at nodes [m]."""
+    return np.asarray(tangents[:, :1] * (nodes[:, :1] - places[:, 0])
+                      + tangents[:, 1:] * (nodes[:, 1:] - places[:, 1]))
 
 
 def _followers(edges: Integers, count: int) -> Integers:

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.face_curve import Closest, Face
 from fecontact.fem.points import Pieces, piece_weights
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-_CUTS = 16  # parts of an edge between whose ends one end of the other face can be found
+_CUTS = 4  # parts of an edge between whose ends one end of the other face can be found
 _PARTS = 2  # of a piece, in each of which a uniform pressure is integrated
 _INSET = 1e-6  # of an edge, from its ends
 _HALVINGS = 40
@@ -38,7 +39,7 @@ class Samples:
         np.add.at(out, self.owner, self.share.reshape(-1, *[1] * (values.ndim - 1)) * values)
         return out
 
-    def only(self, which: Array) -> "Samples":
+    def only(self, which: NDArray[np.bool_]) -> "Samples":
         """Those that are marked."""
         return Samples(*(getattr(self, name)[which] for name in Samples.__dataclass_fields__))
 
@@ -126,7 +127,7 @@ def covered(face: Face, other: Face, reach: float) -> list[Pieces]:
     marks[[0, -1]] += [_INSET, -_INSET]
     count = len(face.nodes)
 
-    def has_partner(edges: Integers, s: Array) -> Array:
+    def has_partner(edges: Integers, s: Array) -> NDArray[np.bool_]:
         looks = np.repeat(face.outward(edges, s)[:, None], 2, axis=1)
         return other.closest(face.at(edges, s), looks, reach, _FACING).valid
 
@@ -149,7 +150,7 @@ def covered(face: Face, other: Face, reach: float) -> list[Pieces]:
     edges, starts, ends = begins[first], starts[first], ends[last]
     if not len(edges):
         return []
-    after = face.neighbours()[1]
+    after = face.neighbours[1]
     following = np.roll(np.arange(len(edges)), -1)
     joined = ((ends == 1.0) & (starts[following] == 0.0)
               & (after[edges] == edges[following]))
@@ -161,7 +162,7 @@ def covered(face: Face, other: Face, reach: float) -> list[Pieces]:
             for part in np.split(order, cuts) if len(part)]
 
 
-def lumped_lengths(face: Face, runs: Sequence[Pieces], kept: Array) -> Array:
+def lumped_lengths(face: Face, runs: Sequence[Pieces], kept: NDArray[np.bool_]) -> Array:
     """Integrals (N,) of the shape functions over parts of a face [m].
 
     What falls on nodes that are not ``kept`` (N,) goes to the others of the same edge.

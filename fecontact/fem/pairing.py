@@ -86,8 +86,8 @@ def pair_faces(
 ) -> Pairing:
     """Pair contact nodes on one face with the closest places on another face or the ground.
 
-    Faces whose edges meet below 30 degrees are smooth curves through their nodes. Nodes beyond the
-    ends of the other face have no partner, are left out and stand in the report.
+    Faces whose edges meet at up to 30 degrees are smooth curves through their nodes. Nodes beyond
+    the ends of the other face have no partner, are left out and stand in the report.
 
     Parameters
     ----------
@@ -96,7 +96,8 @@ def pair_faces(
     face, other : str
         "BODY.BOUNDARY"; ``other`` may be "ground", y = 0, and both may be of one body.
     nodes : "all" or int
-        Every displacement node, or so many segments of equal length with their mean displacement.
+        Every displacement node, or so many segments of equal length with their mean displacement,
+        whose loads are even also where the meshes do not match.
     nodes_on : "finer" or "face"
         Which face has the nodes: ``other`` if it is finer than ``face``, or ``face`` in any case.
     reach : float or None
@@ -163,9 +164,8 @@ def _face(bodies: Mapping[str, ElasticBody], name: str, key: str) -> Face:
     require_kind("pair_faces", str, **{key: name})
     body, dot, boundary = name.partition(".")
     if not (body and dot and boundary):
-        either = " or 'ground'" if key == "other" else ""
-        raise InputError(f"pair_faces: {key} = {name!r} must be 'BODY.BOUNDARY'{either}; bodies "
-                         f"are {choices(bodies)}.")
+        raise InputError(f"pair_faces: {key} = {name!r} must be 'BODY.BOUNDARY'; bodies are "
+                         f"{choices(bodies)}, and the other side of one pass may be 'ground'.")
     if body not in bodies:
         raise InputError(f"pair_faces: {key} = {name!r} names no body{nearest(body, bodies)}; "
                          f"bodies are {choices(bodies)}.")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
@@ -86,7 +87,9 @@ def no_partner(samples: Samples, found: Closest, face: Face, other: Face, limit:
             f"the mesh or give other faces.")
 
 
-def reasons(found: Closest, shared: Array, other: str, kept: Array) -> tuple[str, ...]:
+def reasons(
+    found: Closest, shared: NDArray[np.bool_], other: str, kept: NDArray[np.bool_]
+) -> tuple[str, ...]:
     """Why each node that is not kept has no partner."""
     return tuple(
         "is on both faces" if shared[j] else f"is {found.nearest[j]:.3g} m away, out of reach"

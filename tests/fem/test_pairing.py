@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from meshes_for_tests import grid, rectangle
 
 from fecontact import ElasticBody, FecontactError, InputError, Mesh, MeshError
@@ -137,6 +138,34 @@ def test_uniform_pressure_through_segments_is_the_consistent_load_of_any_meshes(
         assert got == pytest.approx(wanted, abs=1e-14)
 
 
+@KINDS
+@pytest.mark.parametrize(("above", "below", "nodes"), [(6, 6, "all"), (9, 5, 8), (5, 9, 7)])
+def test_uniform_stress_passes_from_one_body_to_the_other(triangles, degree, above, below, nodes):
+    """Blocks on rollers, pressed together through compliant nodes: u_y = - p y / E - p / k."""
+    pressure, stiffness = 3.0e6, 5.0e12
+    bodies = two_blocks(above, below, triangles=triangles, degree=degree)
+    pairing = pair_faces(bodies, "pad.bottom", "disc.top", nodes=nodes)
+    parts = {pairing.body: pairing.nodes, pairing.other: -pairing.feet}
+    rows = np.zeros((len(pairing.gaps), 3 * len(pairing.gaps)))
+    j = np.arange(len(pairing.gaps))
+    rows[j, 3 * j], rows[j, 3 * j + 1] = pairing.normals.T
+    W = rows @ sp.hstack([parts["pad"], parts["disc"]]).toarray()
+    K = (sp.block_diag([bodies["pad"].stiffness, bodies["disc"].stiffness]).toarray()
+         + W.T @ (stiffness * pairing.tributary[:, None] * W))
+    load = pressure * np.concatenate([boundary_forces(bodies["pad"], "top")[:, 0],
+                                      np.zeros(2 * len(bodies["disc"].nodes))])
+    places = np.concatenate([bodies["pad"].nodes, bodies["disc"].nodes])
+    fixed = np.column_stack([places[:, 0] < 1e-9, places[:, 1] < -0.5 + 1e-9]).ravel()
+    u = np.zeros(len(load))
+    u[~fixed] = np.linalg.solve(K[np.ix_(~fixed, ~fixed)], load[~fixed])
+    E, nu = bodies["pad"].material.youngs_modulus, bodies["pad"].material.poisson_ratio
+    x, y = places.T
+    pad = np.arange(len(places)) < len(bodies["pad"].nodes)
+    exact = np.column_stack([nu * pressure * x / E,
+                             -pressure * (y + 0.5) / E - pad * pressure / stiffness])
+    assert u.reshape(-1, 2) == pytest.approx(exact, abs=1e-9 * np.abs(exact).max())
+
+
 @pytest.mark.parametrize("nodes", ["all", 31])
 def test_gap_of_a_cylinder_on_a_block(nodes):
     """The nodes of the mesh and the middles of its edges lie on the circle, and so do segments."""
@@ -160,6 +189,21 @@ def test_gap_of_a_cylinder_on_a_block(nodes):
     away = 0.5 * np.pi - np.arcsin(0.1)  # beyond, the cylinder does not look at the block
     assert np.abs(np.arctan2(x, radius - pairing.gaps)).max() <= away
     assert pairing.report.covered == pytest.approx(away / np.pi, rel=2e-3)
+
+
+@pytest.mark.parametrize("side", ["left", "right", "bottom", "top"])
+def test_segments_go_on_where_the_numbering_of_a_closed_face_ends(side):
+    """A cylinder beside each side of a block: one connected part has a partner."""
+    centre = {"left": (-1.1, 0.5), "right": (2.1, 0.5), "bottom": (0.5, -1.1),
+              "top": (0.5, 2.1)}[side]
+    bodies = {"cylinder": ElasticBody(ring(0.3, 1.0, 64, centre)),
+              "block": ElasticBody(moved(rectangle(1.0, 1.0, 4, 4)))}
+    pairing = pair_faces(bodies, "cylinder.rim", f"block.{side}", nodes=9, nodes_on="face")
+    angle = np.unwrap(np.arctan2(*(pairing.places - centre).T[::-1]))
+    # The block's side of length 1 is seen under 60 degrees, from the surface of the cylinder.
+    assert np.diff(angle) == pytest.approx(np.full(8, np.pi / 27.0), rel=2e-3)
+    assert pairing.tributary.sum() == pytest.approx(np.pi / 3.0, rel=1e-3)
+    assert pairing.gaps.min() == pytest.approx(0.1, abs=1e-3)
 
 
 def pin_in_hole(count, aspect=1.0):
@@ -205,6 +249,28 @@ def test_faces_of_any_smooth_shape_converge_faster_than_their_chords():
     rates = np.log2(np.array(errors)[:-1] / errors[1:])
     assert errors[0] < 1e-3
     assert (rates > 2.8).all()
+
+
+def test_partners_are_the_closest_places_of_the_other_face():
+    """Two wavy faces: no place of a fine polygon along the other face is closer than the foot."""
+    def waves(amplitude, number):
+        def bend(nodes):
+            x, y = nodes.T
+            return np.column_stack([x, y + amplitude * np.sin(number * x) * (1.0 - np.abs(y))])
+        return bend
+    upper = grid(np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 5), warp=waves(0.06, 9.0))
+    lower = grid(np.linspace(-0.5, 2.5, 34), np.linspace(-1.0, 0.0, 5), warp=waves(0.1, 4.0))
+    bodies = {"upper": ElasticBody(moved(upper, 0.0, 0.2)), "lower": ElasticBody(lower)}
+    pairing = pair_faces(bodies, "upper.bottom", "lower.top")
+    assert pairing.body == "upper"
+    other = Face(bodies["lower"], "top", "lower.top")
+    s = np.tile(np.linspace(0.0, 1.0, 201), 33)
+    line = other.at(np.repeat(np.arange(33), 201), s)
+    distance = np.linalg.norm(pairing.places[:, None] - line, axis=2).min(axis=1)
+    assert pairing.gaps == pytest.approx(distance, abs=1e-6)
+    assert (pairing.gaps <= distance + 1e-15).all()
+    assert np.ptp(pairing.gaps) > 0.1
+    assert not len(pairing.report.left_out)
 
 
 def test_flat_faces_and_corners_stay_what_they_are():
@@ -257,6 +323,26 @@ def test_nodes_beyond_the_other_face_are_left_out_and_told(degree):
     in_segments = pair_faces(bodies, "pad.bottom", "disc.top", nodes=7)
     assert in_segments.tributary == pytest.approx(np.full(7, 0.11), abs=1e-6)
     assert in_segments.places[-1, 0] == pytest.approx(1.0 - 0.055, abs=1e-6)
+
+
+@pytest.mark.parametrize("nodes", ["all", 6])
+def test_faces_in_several_parts(nodes):
+    """Two feet on one face, with the nodes on the feet or between them."""
+    pad = ElasticBody(rectangle(1.0, 0.4, 10, 2, split=((0.0, 0.2), (0.6, 1.0))))
+    for cells, carrier in ((7, "pad"), (23, "disc")):
+        bodies = {"pad": pad, "disc": two_blocks(below=cells)["disc"]}
+        pairing = pair_faces(bodies, "pad.feet", "disc.top", nodes=nodes)
+        assert pairing.body == carrier
+        x = pairing.places[:, 0]
+        assert not ((x > 0.2 + 1e-9) & (x < 0.6 - 1e-9)).any()
+        assert pairing.tributary.sum() == pytest.approx(0.6, abs=1e-6)
+        assert pairing.tributary[x < 0.4].sum() == pytest.approx(0.2, abs=1e-6)
+        if nodes != "all":
+            assert pairing.tributary == pytest.approx(np.full(6, 0.1), abs=1e-6)
+            assert pairing.report.unevenness < 1e-6
+        if carrier == "disc":
+            alone = pairing.report.left_out[:, 0]
+            assert ((alone > 0.2) & (alone < 0.6)).all()
 
 
 def test_reach_limits_the_distance_of_partners():
@@ -359,6 +445,21 @@ def test_nodes_on_the_ground_are_those_of_a_single_body(nodes):
     with pytest.raises(InputError, match=r"starts 0.02 m inside the ground, y = 0, at"):
         pair_faces({"pad": ElasticBody(moved(rectangle(1, 1, 4, 4), y=-0.02))}, "pad.bottom",
                    "ground")
+
+
+@pytest.mark.parametrize("columns", [6, 11])
+def test_gap_of_a_crowned_face_above_the_ground(columns):
+    radius = 2.0
+
+    def bend(nodes):
+        x, y = nodes.T
+        return np.column_stack([x, y + (1.0 - y) * (radius - np.sqrt(radius**2 - x**2))])
+    xs = np.linspace(-0.5, 0.5, columns + 1)
+    body = ElasticBody(grid(xs, np.linspace(0.0, 1.0, 4), warp=bend))
+    pairing = pair_faces({"pad": body}, "pad.bottom", "ground")
+    x = pairing.places[:, 0]
+    assert pairing.gaps == pytest.approx(radius - np.sqrt(radius**2 - x**2), abs=2e-8)
+    assert len(x) == 2 * columns + 1
 
 
 def test_faces_on_the_wrong_sides_are_refused():
