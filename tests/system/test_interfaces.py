@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 
 from fecontact import (
+    AnalysisError,
     ContactSystem,
     Ground,
     InputError,
     Interface,
+    Load,
     basis_from_matrices,
     read_case,
     simulate,
+    static_equilibrium,
     write_case,
 )
 from fecontact.integrate import SetValued
@@ -230,11 +233,12 @@ def test_case_files_hold_several_bodies(tmp_path):
 
 def test_bad_input_is_named():
     a, b, law = mass(1.0), mass(2.0), LinearContact(1e5)
+    held = basis_from_matrices(np.eye(1), np.eye(1), {"p": np.eye(3, 1)})
     pairing = PointPairing("a", "p", "b", "p")
     touch = Interface("touch", pairing, law, NO_FRICTION)
     for message, arguments in (
         ("two interfaces have the name 'touch'", {"interfaces": [touch, touch]}),
-        ("there are no contact nodes", {"interfaces": []}),
+        ("there are no contact nodes", {"bodies": {"held": held}, "interfaces": []}),
         ("Interface 'touch' lacks friction", {"interfaces": [Interface("touch", pairing, law)]}),
         ("no body 'c'; the bodies are 'a', 'b'",
          {"interfaces": [Interface("touch", PointPairing("c", "p", "b", "p"), law)]}),
@@ -251,3 +255,17 @@ def test_bad_input_is_named():
             Interface("wall", PointPairing("a", "p", normals=(1, 0)), law, NO_FRICTION)])
     with pytest.raises(InputError, match="no contact nodes"):
         ContactSystem(a, law)
+
+
+def test_bodies_that_nothing_holds_are_named():
+    law, a, b = LinearContact(1e5), mass(1.0), mass(2.0)
+    touch = Interface("touch", PointPairing("a", "p"), law, NO_FRICTION)
+    with pytest.raises(InputError, match="body 'b' is free in x, y, but no interface"):
+        ContactSystem(bodies={"a": a, "b": b}, interfaces=[touch])
+    up = ContactSystem(bodies={"a": a}, interfaces=[touch], load=Load(gravity=(1.0, -9.81)))
+    with pytest.raises(AnalysisError, match="nothing holds body 'a' against a translation in x"):
+        static_equilibrium(up)
+    both = ContactSystem(bodies={"a": a, "b": b}, load=Load(gravity=(0.0, -9.81)), interfaces=[
+        Interface("touch", PointPairing("a", "p", "b", "p"), law, NO_FRICTION)])
+    with pytest.raises(AnalysisError, match="the bodies 'a', 'b' against a translation in y"):
+        static_equilibrium(both)
