@@ -99,9 +99,9 @@ def system_fields(
             raise InputError(f"ContactSystem: two interfaces have the name '{one.name}'; give "
                              f"each its own.")
         given[one.name] = one
-    _require_joined(bodies, given, links or ())
     basis = assembled_basis(bodies, {name: one.pairing for name, one in given.items()},
                             links or ())
+    _require_joined(bodies, given, links or ())
     friction, gaps, first = {}, [], 0
     for name, count in basis.groups:
         one, nodes = given[name], slice(first, first + count)
