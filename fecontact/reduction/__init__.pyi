@@ -2,7 +2,9 @@ from .assembled_basis import PointPairing, assembled_basis
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
+from .links import Bushing, Hinge, Spring, Weld, linked
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
+from .point_masses import point_masses
 from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
@@ -11,14 +13,20 @@ from .rotating import ModalRotation
 __all__ = [
     "BasisReport",
     "BodyPart",
+    "Bushing",
+    "Hinge",
     "ModalRotation",
     "ModeShapes",
     "PointPairing",
     "ReductionQuality",
+    "Spring",
+    "Weld",
     "assembled_basis",
     "eigenfrequencies_hz",
+    "linked",
     "mode_convergence",
     "normalisation",
+    "point_masses",
     "reduce_bodies",
     "rows_from_dofs",
 ]
