@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fecontact.core.tables import convert, from_table, plain, require_known, to_table
+from fecontact.laws.ground.sliding import Sliding
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
@@ -19,6 +20,8 @@ def system_tables(system: ContactSystem) -> dict[str, Any]:
                 tables.setdefault("interfaces", {}).setdefault(group, {})[part] = to_table(law)
         else:
             tables[part] = to_table(given)
+    for group, one in system.sliding.items():
+        tables.setdefault("interfaces", {}).setdefault(group, {})["sliding"] = to_table(one)
     tables["gap"] = plain(system.gap)
     return tables
 
@@ -30,15 +33,20 @@ def system_from_tables(
     parts = system_parts(tables, where, PART_CLASSES)
     groups = convert(tables.get("interfaces", {}), Mapping[str, Mapping[str, Any]], where,
                      "interfaces")
+    sliding: dict[str, Any] = {}
     for group, laws in groups.items():
         for part, table in laws.items():
-            require_known(part, ("normal", "friction"), f"{where}: [interfaces.{group}]")
+            place = f"{where}: [interfaces.{group}]"
+            require_known(part, ("normal", "friction", "sliding"), place)
+            if part == "sliding":
+                sliding[group] = convert(table, Sliding, place, part)
+                continue
             if not isinstance(parts.get(part), dict):
                 parts[part] = {}
             parts[part][group] = from_table(PART_CLASSES[part], table,
                                             f"{where}: [interfaces.{group}.{part}]")
     gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
-    return ContactSystem(basis, gap=gap, **parts)
+    return ContactSystem(basis, gap=gap, sliding=sliding, **parts)
 
 
 def system_parts(

@@ -10,7 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.reduction.modal_basis import ModeShapes
+from fecontact.reduction.mode_shapes import ModeShapes
 
 
 def frame_indices(

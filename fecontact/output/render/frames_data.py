@@ -20,7 +20,7 @@ from fecontact.output.files.frames import (
     von_mises,
 )
 from fecontact.output.plots.style import state_names
-from fecontact.reduction.modal_basis import ModeShapes
+from fecontact.reduction.mode_shapes import ModeShapes
 
 Colour = Literal["displacement", "von_mises"]
 
