@@ -10,6 +10,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
+from fecontact.fem.body_forces import along_outline
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows
 
@@ -90,46 +91,65 @@ def contact_nodes(
     InputError
         If the boundary faces up, or has fewer nodes than requested.
     """
+    check_faces_down(body, boundary)
+    return face_nodes(body, boundary, count)[0]
+
+
+def face_nodes(
+    body: ElasticBody, boundary: str, count: int | Literal["all"], key: str = "contact_nodes"
+) -> tuple[ContactNodes, Integers | list[Pieces]]:
+    """Contact nodes as :func:`contact_nodes`, on a boundary that faces in any direction.
+
+    They run with the body on their left, connected parts in the order of their abscissae. Beside
+    them stand the displacement nodes, or the pieces of edges that make up each segment. ``key``
+    names the count in messages.
+    """
     import scipy.sparse as sp
 
-    chains = _chains(body.mesh.boundary(boundary))
-    chains.sort(key=lambda chain: float(body.mesh.nodes[chain, 0].min()))
-    chains = [chain if body.mesh.nodes[chain[0, 0], 0] <= body.mesh.nodes[chain[-1, 1], 0]
-              else chain[::-1, ::-1] for chain in chains]
-    _check_faces_down(body, boundary)
-    edges = [body.edge_nodes(chain) for chain in chains]
-    nodes = np.unique(np.concatenate([e.ravel() for e in edges]))
+    chains = face_chains(body, boundary)
+    count_of_nodes = len(np.unique(np.concatenate([chain.ravel() for chain in chains])))
     if count == "all":
-        ordered = np.concatenate([_in_order(e) for e in edges])
+        ordered = np.concatenate([_in_order(chain) for chain in chains])
         tributary = np.zeros(len(body.nodes))
-        for e in edges:
-            np.add.at(tributary, e, edge_weights(body, e))
+        for chain in chains:
+            np.add.at(tributary, chain, edge_weights(body, chain))
         return ContactNodes(node_matrix(body, ordered), body.nodes[ordered], tributary[ordered],
-                            ((boundary, len(ordered)),))
+                            ((boundary, len(ordered)),)), ordered
     if isinstance(count, bool) or not isinstance(count, int) or not (
-            len(chains) <= count <= len(nodes)):
-        raise InputError(f"contact_nodes = {count!r} must be 'all' or a whole number from "
-                         f"{len(chains)} to {len(nodes)}, the number of nodes on boundary "
+            len(chains) <= count <= count_of_nodes):
+        raise InputError(f"{key} = {count!r} must be 'all' or a whole number from "
+                         f"{len(chains)} to {count_of_nodes}, the number of nodes on boundary "
                          f"'{boundary}'; refine the mesh for more.")
-    segments, each = [], []
-    totals = np.array([_lengths(body, e).sum() for e in edges])
-    for e, share in zip(edges, _shared_out(count, totals), strict=True):
-        segments += _cut(body, e, share)
-        each += [_lengths(body, e).sum() / share] * share
+    segments: list[Pieces] = []
+    each: list[float] = []
+    totals = np.array([_lengths(body, chain).sum() for chain in chains])
+    for chain, share in zip(chains, _shared_out(count, totals), strict=True):
+        segments += _cut(body, chain, share)
+        each += [_lengths(body, chain).sum() / share] * share
     rows = [patch_rows(body, segment) for segment in segments]
     return ContactNodes(
         sp.csr_array(sp.vstack([row.matrix for row in rows])),
         np.array([row.position for row in rows]),
         np.array(each),
         ((boundary, len(rows)),),
-    )
+    ), segments
 
 
-def _check_faces_down(body: ElasticBody, boundary: str) -> None:
-    outline = {(min(e), max(e)): e for e in map(tuple, body.mesh.outline.tolist())}
-    edges = np.array([outline[min(e), max(e)]
-                      for e in map(tuple, body.mesh.boundary(boundary).tolist())])
-    # The body lies on the left of its outline: a face that looks down runs to +x.
+def face_chains(body: ElasticBody, boundary: str) -> list[Integers]:
+    """Displacement nodes (k, degree + 1) of each connected part of a boundary, edge by edge.
+
+    The body lies on the left of successive edges; the parts are in the order of their smallest
+    abscissae.
+    """
+    chains = _chains(along_outline(body.mesh, body.mesh.boundary(boundary)))
+    chains.sort(key=lambda chain: float(body.mesh.nodes[chain, 0].min()))
+    return [body.edge_nodes(chain) for chain in chains]
+
+
+def check_faces_down(body: ElasticBody, boundary: str) -> None:
+    """Raise :class:`InputError` unless all edges of a boundary face the ground below."""
+    edges = along_outline(body.mesh, body.mesh.boundary(boundary))
+    # The body lies on the left of its edges: a face that looks down runs to +x.
     runs = body.mesh.nodes[edges[:, 1], 0] - body.mesh.nodes[edges[:, 0], 0]
     length = np.linalg.norm(body.mesh.nodes[edges[:, 1]] - body.mesh.nodes[edges[:, 0]], axis=1)
     if runs.sum() < 0.5 * length.sum() or (runs < -1e-9 * length).any():
@@ -139,22 +159,17 @@ def _check_faces_down(body: ElasticBody, boundary: str) -> None:
 
 
 def _chains(edges: Integers) -> list[Integers]:
-    """The edges as chains (k, 2) of successive edges, each from one end to the other."""
-    neighbours: dict[int, list[int]] = {}
-    for index, edge in enumerate(edges.tolist()):
-        for node in edge:
-            neighbours.setdefault(node, []).append(index)
-    left = set(range(len(edges)))
+    """Directed edges as chains (k, 2) of successive edges, each from one end to the other."""
+    ahead: dict[int, list[int]] = {}
+    for start, end in edges.tolist():
+        ahead.setdefault(start, []).append(end)
+    ends = set(edges[:, 1].tolist())
     chains = []
-    ends = sorted(node for node, around in neighbours.items() if len(around) == 1)
-    for start in [*ends, *sorted(neighbours)]:
+    for start in sorted(ahead, key=lambda node: (node in ends, node)):
         chain, node = [], start
-        while ahead := [index for index in neighbours[node] if index in left]:
-            left.discard(ahead[0])
-            a, b = edges[ahead[0]].tolist()
-            other = b if node == a else a
-            chain.append((node, other))
-            node = other
+        while ahead.get(node):
+            chain.append((node, ahead[node].pop(0)))
+            node = chain[-1][1]
         if chain:
             chains.append(np.array(chain))
     return chains
