@@ -33,8 +33,8 @@ def modal_basis(
     *,
     contact: str | Sequence[str] = "contact",
     contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]] = "all",
-    B: Place | None = None,
-    C: Place | None = None,
+    B: Place | Literal[False] | None = None,
+    C: Place | Literal[False] | None = None,
     points: Mapping[str, Place] | None = None,
     damping: Damping = 0.0,
     reduction: Reduction = "vibration",
@@ -59,7 +59,7 @@ def modal_basis(
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, (x, y), or a
-        :class:`~fecontact.Patch`. Default: the mesh's point of that name, else zero rows.
+        :class:`~fecontact.Patch`; False for none. Default: the mesh's point of that name, if any.
     points : mapping of name to place, optional
         Further points to observe.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
@@ -171,7 +171,8 @@ def reduce_bodies(
 ) -> dict[str, ModalBasis]:
     """Modal bases of several bodies that can carry the forces between them.
 
-    By default modes with residual vectors of forces at the nodes and feet of the pairings.
+    By default modes with residual vectors of forces at the nodes and feet of the pairings. B and C
+    are those that ``each`` gives to one body, or of the one mesh that has points of that name.
 
     Parameters
     ----------
@@ -207,15 +208,40 @@ def reduce_bodies(
                                  f"{nearest(str(name), bodies)}; the bodies are "
                                  f"{choices(bodies)}.")
     found = {}
+    ends = ends_of_bodies(bodies, {name: {**options, **each.get(name, {})} for name in bodies})
     for name, body in bodies.items():
         if name not in counts:
             raise InputError(f"reduce_bodies: modes lacks the body '{name}'.")
         rows = [one.nodes for one in pairings if one.body == name]
         rows += [one.feet for one in pairings if one.other == name]
-        given = {"contact": (), "reduction": "residual", **options, **each.get(name, {})}
+        given = {"contact": (), "reduction": "residual", **options, **each.get(name, {}),
+                 **ends[name]}
         with located(f"Body '{name}':"):
             found[name] = modal_basis(body, counts[name], interface_rows=rows, **given)
     return found
+
+
+def ends_of_bodies(
+    bodies: Mapping[str, ElasticBody], given: Mapping[str, Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """Places of B and C of each of several bodies, of which one alone can have them.
+
+    What the options ``given`` of a body name goes before the points of meshes, which count only if
+    one mesh alone has them: generated shapes all have B and C.
+    """
+    found: dict[str, dict[str, Any]] = {name: {} for name in bodies}
+    for end in ("B", "C"):
+        places = {name: given.get(name, {}).get(end) for name in bodies}
+        free = not any(place is not None and place is not False for place in places.values())
+        having = [name for name, body in bodies.items()
+                  if places[name] is None and _has(body, end)]
+        for name, place in places.items():
+            found[name][end] = place if place is not None or (free and having == [name]) else False
+    return found
+
+
+def _has(body: ElasticBody, name: str) -> bool:
+    return name in body.mesh.points or name in body.mesh.boundaries
 
 
 def _interface_rows(body: ElasticBody, given: Any) -> Any:
@@ -290,12 +316,12 @@ def loading(
     return forces[:, _deforms(system, forces)] if forces.shape[1] else forces
 
 
-def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
+def _point(body: ElasticBody, place: Place | Literal[False] | None, name: str) -> Rows:
     import scipy.sparse as sp
 
-    if place is None:
-        if name in body.mesh.points or name in body.mesh.boundaries:
-            return place_rows(body, name, name)
+    if place is None and _has(body, name):
+        return place_rows(body, name, name)
+    if place is None or place is False:
         return Rows(sp.csr_array((3, 2 * len(body.nodes))), np.zeros(2))
     return place_rows(body, place, name)
 

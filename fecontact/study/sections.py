@@ -1,7 +1,7 @@
 """Sections of a study file that are not described by a class of another module."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
@@ -21,7 +21,6 @@ from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import RigidStart
 from fecontact.integrate.solvers import Solver, solver_by_name
-from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
@@ -89,21 +88,6 @@ class BodySettings:
 
 
 @dataclass(frozen=True)
-class InterfaceSettings:
-    """``[interfaces.NAME]``: laws of the interface NAME.
-
-    Parameters
-    ----------
-    normal, friction : law, optional
-        ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``; total values refer to the
-        face of the interface.
-    """
-
-    normal: NormalLaw | None = None
-    friction: FrictionLaw | None = None
-
-
-@dataclass(frozen=True)
 class BasisSettings:
     """``[basis]``: modes and points; see
     :func:`fecontact.modal_basis`.
@@ -167,12 +151,20 @@ class BasisSettings:
                 raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
                                  f"go by number; choose a name with a letter.")
 
-    def modal_basis(self, body: ElasticBody, rotation: Rotation | None = None) -> ModalBasis:
-        """The modal basis of a body."""
+    def modal_basis(
+        self, body: ElasticBody, rotation: Rotation | None = None,
+        interface_rows: Sequence[Any] | None = None, ends: Mapping[str, Any] | None = None,
+    ) -> ModalBasis:
+        """The modal basis of a body; with the rows of its interfaces, one of several bodies.
+
+        ``ends`` has other places of B and C.
+        """
+        places = {"B": self.B, "C": self.C} if ends is None else ends
         basis = modal_basis(
-            body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
-            C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
-            damping=self.damping, loads=self.loads, rotation=rotation)
+            body, self.modes, contact=self.contact if interface_rows is None else (),
+            contact_nodes=self.contact_nodes, **places, points=self.points,
+            reduction=self.reduction, tolerance=self.tolerance, damping=self.damping,
+            loads=self.loads, rotation=rotation, interface_rows=interface_rows or ())
         if self.dashpots:
             basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
                                          for point, values in self.dashpots.items()})

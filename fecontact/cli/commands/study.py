@@ -14,8 +14,9 @@ def init(
     file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
-    shape: Annotated[Literal["beam", "pendulum", "block"], Parameter(
-        help="Beam on wavy ground, pendulum on a stop, or block on a moving belt.")] = "beam",
+    shape: Annotated[Literal["beam", "pendulum", "block", "pad"], Parameter(
+        help="Beam on wavy ground, pendulum on a stop, block on a moving belt, or pad on a block: two "
+        "bodies.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
