@@ -30,7 +30,9 @@ from fecontact.system.interfaces import (
     PrescribedMotion,
     Sliding,
     checked_sliding,
+    inner_name,
     motion_sources,
+    outer_name,
     prescribed_motion,
     system_fields,
 )
@@ -45,8 +47,6 @@ NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a
                    "friction); `fecontact laws` lists them.")
 
 PARTS = ("normal", "friction", "sliding", "ground", "drive", "load")
-
-_OF_INTERFACES = ("normal", "friction", "sliding")
 
 _KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
 
@@ -368,11 +368,11 @@ class ContactSystem(Summarised):
         if inside:
             changes["basis"] = with_basis_parameters(changes.get("basis", self.basis), inside)
         for name in changes:
-            if "." in name and _inner_name(name).partition(".")[0] not in PARTS:
+            if "." in name and inner_name(name).partition(".")[0] not in PARTS:
                 raise self._unknown(name)
         try:
             return cast("ContactSystem", with_parameters(self, {
-                _inner_name(name): value for name, value in changes.items()}))
+                inner_name(name): value for name, value in changes.items()}))
         except KeyError as error:
             raise self._unknown(error.args[0]) from None
 
@@ -382,7 +382,7 @@ class ContactSystem(Summarised):
         Without the numbers of the basis, which :meth:`parameter` and :meth:`with_` know too.
         Parameters of the laws of an interface: ``interfaces.NAME.normal.stiffness``.
         """
-        return {_outer_name(self, f"{part}.{name}"): value
+        return {outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
                 for name, value in parameters_of(getattr(self, part)).items()}
 
@@ -405,7 +405,7 @@ class ContactSystem(Summarised):
     def _unknown(self, name: str) -> InputError:
         names = (*self.parameters(), "gap", *PARTS)
         names = tuple(name for name in names if name != "sliding" or self.sliding)
-        return InputError(f"The system has no parameter '{_outer_name(self, name)}'"
+        return InputError(f"The system has no parameter '{outer_name(self, name)}'"
                           f"{nearest(name, names)}; "
                           f"its parameters are: {choices(names)}.")
 
@@ -426,24 +426,3 @@ def _law_names(law: Any) -> str:
     if isinstance(law, Mapping):
         return listed([f"{type(one).__name__} ({group})" for group, one in law.items()])
     return type(law).__name__
-
-
-def _inner_name(name: str) -> str:
-    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness``."""
-    first, _, rest = name.partition(".")
-    group, _, parameter = rest.partition(".")
-    kind, _, last = parameter.partition(".")
-    if first != "interfaces" or kind not in _OF_INTERFACES:
-        return name
-    return f"{kind}.{group}.{last}" if last else f"{kind}.{group}"
-
-
-def _outer_name(system: ContactSystem, name: str) -> str:
-    """The reverse, for laws of interfaces."""
-    kind, _, rest = name.partition(".")
-    if kind not in _OF_INTERFACES or not isinstance(getattr(system, kind), Mapping):
-        return name
-    group, _, last = rest.partition(".")
-    if group not in getattr(system, kind):
-        return name
-    return f"interfaces.{group}.{kind}.{last}" if last else f"interfaces.{group}.{kind}"

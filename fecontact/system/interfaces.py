@@ -27,7 +27,9 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 
 __all__ = ["Interface", "PointPairing", "PrescribedMotion", "Sliding", "SlidingRotation",
-           "SlidingTranslation", "checked_sliding", "motion_sources", "prescribed_motion", "system_fields"]
+           "SlidingTranslation"]
+
+_PARTS = ("normal", "friction", "sliding")
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,3 +238,24 @@ def prescribed_motion(
         speed = ground.speed if lead is None else lead.speed
         return PrescribedMotion(constant_speed, np.array([speed], dtype=float), factors)
     return PrescribedMotion(lead.motion.kernel, lead.motion.parameters(lead.speed), factors)
+
+
+def inner_name(name: str) -> str:
+    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness``."""
+    first, _, rest = name.partition(".")
+    group, _, parameter = rest.partition(".")
+    kind, _, last = parameter.partition(".")
+    if first != "interfaces" or kind not in _PARTS:
+        return name
+    return f"{kind}.{group}.{last}" if last else f"{kind}.{group}"
+
+
+def outer_name(system: Any, name: str) -> str:
+    """The reverse, for laws and sliding of the interfaces of a system."""
+    kind, _, rest = name.partition(".")
+    if kind not in _PARTS or not isinstance(getattr(system, kind), Mapping):
+        return name
+    group, _, last = rest.partition(".")
+    if group not in getattr(system, kind):
+        return name
+    return f"interfaces.{group}.{kind}.{last}" if last else f"interfaces.{group}.{kind}"
