@@ -319,6 +319,12 @@ def pairings(
     for name, one in study.interfaces.items():
         with located(f"{title}: [interfaces.{name}]:", "pair_faces"):
             assert one.face is not None
+            for face in (one.face, one.other):
+                body, _, boundary = face.partition(".")
+                if boundary and boundary not in (known := bodies[body].mesh.boundaries):
+                    raise InputError(f"the mesh of body '{body}' has no boundary '{boundary}'"
+                                     f"{nearest(boundary, known)}; its boundaries are: "
+                                     f"{choices(known)}.")
             found[name] = pair_faces(bodies, one.face, one.other, nodes=one.nodes,
                                      nodes_on=one.nodes_on, reach=one.reach, overlap=one.overlap)
     return found

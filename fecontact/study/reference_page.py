@@ -58,8 +58,8 @@ def _parts() -> Iterator[tuple[str, str]]:
         name = entry.name.removesuffix("_settings")
         if name in ("geometry", "gap", "path"):
             continue
-        if name == "interfaces":
-            name = "interfaces.NAME"
+        if name in ("bodies", "interfaces", "links"):
+            name = f"{name}.NAME"
         yield from _sections(name, _inner(hints[entry.name]), printed)
 
 
@@ -125,6 +125,8 @@ def _default(entry: Any) -> str:
         return ""
     if value is None:
         return "none"
+    if is_dataclass(value):
+        return "`{}`"
     if isinstance(value, float):
         return f"`{value:g}`"
     return f"`{json.dumps(list(value) if isinstance(value, tuple) else value)}`"
