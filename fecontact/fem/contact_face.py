@@ -12,7 +12,7 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import along_outline
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows
+from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,48 +91,54 @@ def contact_nodes(
     InputError
         If the boundary faces up, or has fewer nodes than requested.
     """
-    check_faces_down(body, boundary)
-    return face_nodes(body, boundary, count)[0]
-
-
-def face_nodes(
-    body: ElasticBody, boundary: str, count: int | Literal["all"], key: str = "contact_nodes"
-) -> tuple[ContactNodes, Integers | list[Pieces]]:
-    """Contact nodes as :func:`contact_nodes`, on a boundary that faces in any direction.
-
-    They run with the body on their left, connected parts in the order of their abscissae. Beside
-    them stand the displacement nodes, or the pieces of edges that make up each segment. ``key``
-    names the count in messages.
-    """
     import scipy.sparse as sp
 
-    chains = face_chains(body, boundary)
-    count_of_nodes = len(np.unique(np.concatenate([chain.ravel() for chain in chains])))
+    check_faces_down(body, boundary)
     if count == "all":
-        ordered = np.concatenate([_in_order(chain) for chain in chains])
+        nodes = face_nodes(body, boundary)
         tributary = np.zeros(len(body.nodes))
-        for chain in chains:
-            np.add.at(tributary, chain, edge_weights(body, chain))
-        return ContactNodes(node_matrix(body, ordered), body.nodes[ordered], tributary[ordered],
-                            ((boundary, len(ordered)),)), ordered
-    if isinstance(count, bool) or not isinstance(count, int) or not (
-            len(chains) <= count <= count_of_nodes):
-        raise InputError(f"{key} = {count!r} must be 'all' or a whole number from "
-                         f"{len(chains)} to {count_of_nodes}, the number of nodes on boundary "
-                         f"'{boundary}'; refine the mesh for more.")
-    segments: list[Pieces] = []
-    each: list[float] = []
-    totals = np.array([_lengths(body, chain).sum() for chain in chains])
-    for chain, share in zip(chains, _shared_out(count, totals), strict=True):
-        segments += _cut(body, chain, share)
-        each += [_lengths(body, chain).sum() / share] * share
+        edges = np.concatenate(face_chains(body, boundary))
+        np.add.at(tributary, edges, edge_weights(body, edges))
+        return ContactNodes(node_matrix(body, nodes), body.nodes[nodes], tributary[nodes],
+                            ((boundary, len(nodes)),))
+    segments, lengths = face_segments(body, boundary, count)
     rows = [patch_rows(body, segment) for segment in segments]
     return ContactNodes(
         sp.csr_array(sp.vstack([row.matrix for row in rows])),
         np.array([row.position for row in rows]),
-        np.array(each),
+        lengths,
         ((boundary, len(rows)),),
-    ), segments
+    )
+
+
+def face_nodes(body: ElasticBody, boundary: str) -> Integers:
+    """Displacement nodes of a boundary, in the order of :func:`face_chains`."""
+    return np.concatenate([_in_order(chain) for chain in face_chains(body, boundary)])
+
+
+def face_segments(
+    body: ElasticBody, boundary: str, count: int, runs: Sequence[Pieces] | None = None,
+    key: str = "contact_nodes",
+) -> tuple[list[Pieces], Array]:
+    """Segments of equal length of a boundary, or of the successive pieces ``runs`` of it.
+
+    Each segment is the pieces of edges that it consists of; beside them stand their lengths [m].
+    ``key`` names the count in messages.
+    """
+    parts = ([whole(chain) for chain in face_chains(body, boundary)] if runs is None
+             else list(runs))
+    most = len(np.unique(np.concatenate([part.nodes.ravel() for part in parts])))
+    if isinstance(count, bool) or not isinstance(count, int) or not len(parts) <= count <= most:
+        raise InputError(f"{key} = {count!r} must be 'all' or a whole number from {len(parts)} to "
+                         f"{most}, the number of nodes on boundary '{boundary}'; refine the mesh "
+                         f"for more.")
+    segments: list[Pieces] = []
+    each: list[float] = []
+    totals = np.array([_lengths(body, part).sum() for part in parts])
+    for part, share, total in zip(parts, _shared_out(count, totals), totals, strict=True):
+        segments += _cut(body, part, share)
+        each += [total / share] * share
+    return segments, np.array(each)
 
 
 def face_chains(body: ElasticBody, boundary: str) -> list[Integers]:
@@ -182,9 +188,9 @@ def _in_order(nodes: Integers) -> Integers:
     return along if closed else np.append(along, nodes[-1, -1])
 
 
-def _lengths(body: ElasticBody, nodes: Integers) -> Array:
-    ends = body.nodes[nodes[:, -1]] - body.nodes[nodes[:, 0]]
-    return np.asarray(np.linalg.norm(ends, axis=1))
+def _lengths(body: ElasticBody, pieces: Pieces) -> Array:
+    ends = body.nodes[pieces.nodes[:, -1]] - body.nodes[pieces.nodes[:, 0]]
+    return np.asarray((pieces.end - pieces.start) * np.linalg.norm(ends, axis=1))
 
 
 def _shared_out(count: int, totals: Array) -> list[int]:
@@ -195,8 +201,8 @@ def _shared_out(count: int, totals: Array) -> list[int]:
     return [int(share) for share in shares]
 
 
-def _cut(body: ElasticBody, nodes: Integers, count: int) -> list[Pieces]:
-    length = _lengths(body, nodes)
+def _cut(body: ElasticBody, run: Pieces, count: int) -> list[Pieces]:
+    length = _lengths(body, run)
     reached = np.concatenate([[0.0], np.cumsum(length)])
     cuts = np.linspace(0.0, reached[-1], count + 1)
     pieces = []
@@ -204,5 +210,7 @@ def _cut(body: ElasticBody, nodes: Integers, count: int) -> list[Pieces]:
         start = np.clip((low - reached[:-1]) / length, 0.0, 1.0)
         end = np.clip((high - reached[:-1]) / length, 0.0, 1.0)
         kept = end - start > 1e-12
-        pieces.append(Pieces(nodes[kept], start[kept], end[kept]))
+        part = run.end - run.start
+        pieces.append(Pieces(run.nodes[kept], (run.start + start * part)[kept],
+                             (run.start + end * part)[kept]))
     return pieces

@@ -18,7 +18,6 @@ from fecontact.fem.mesh import Mesh
 
 _SHARP = np.radians(30.0)  # edges that meet at this angle or more form a corner
 _ALIKE = 0.25  # of a node's curvature: with less at its neighbour, it is a kink between flats
-_SLACK = 1e-3  # of an edge: how far beyond the end of a face a place may lie
 _NEAR = 1e-6  # of an edge: below this distance the direction to a corner has no meaning
 _STEPS = 60
 _PAIRS = 1_000_000  # places times edges that are looked at together
@@ -89,29 +88,32 @@ class Face:
         if self.body.degree == 1:
             return np.column_stack([1.0 - s, s])
         return np.column_stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s),
-                                s * (2.0 * s - 1.0)])
+                                                s * (2.0 * s - 1.0)])
 
     def neighbours(self) -> tuple[Integers, Integers]:
         """The edges (k,) of the face before and after each, -1 at its ends."""
         after = _followers(self.nodes[:, [0, -1]], len(self.body.nodes))
         return _inverted(after), after
 
-    def closest(self, places: Array, looks: Array, reach: float, least: float) -> Closest:
+    def closest(self, places: Array, looks: Array, reach: float, least: float,
+                slack: float = 0.0) -> Closest:
         """Closest places on the face to given ones.
 
         ``looks`` (n, 2, 2) are two directions in which each place looks; one must be opposed to
         the normal of the face, with a cosine of at least ``least``. A place beyond the ends of the
-        face has none, nor has one farther away than ``reach``.
+        face by more than ``slack`` edges has none, nor has one farther away than ``reach``.
         """
         chunk = max(1, _PAIRS // len(self.nodes))
-        parts = [self._closest(places[k : k + chunk], looks[k : k + chunk], reach, least)
+        parts = [self._closest(places[k : k + chunk], looks[k : k + chunk], reach, least,
+                               slack)
                  for k in range(0, len(places), chunk)]
         names = Closest.__dataclass_fields__
         return Closest(**{name: np.concatenate([getattr(part, name) for part in parts])
                           for name in names})
 
-    def _closest(self, places: Array, looks: Array, reach: float, least: float) -> Closest:
-        place, edge, s, normal, gap = self._feet(places, looks)
+    def _closest(self, places: Array, looks: Array, reach: float, least: float,
+                 slack: float) -> Closest:
+        place, edge, s, normal, gap = self._feet(places, looks, slack)
         faced = (np.einsum("kx,kax->ka", normal, looks[place]).min(axis=1) <= -least)
         distance = np.abs(gap)
         near = distance <= reach
@@ -133,7 +135,9 @@ class Face:
         return Closest(valid, edges, at, self.at(edges, at), normals, gaps, nearest,
                        averted & ~valid)
 
-    def _feet(self, places: Array, looks: Array) -> tuple[Integers, Integers, Array, Array, Array]:
+    def _feet(
+        self, places: Array, looks: Array, slack: float
+    ) -> tuple[Integers, Integers, Array, Array, Array]:
         """All perpendicular feet: number of place, edge, s, normal and signed distance."""
         start, end = self._ends
         first, last = self._tangents
@@ -141,9 +145,9 @@ class Face:
         # Slope of half the squared distance at both ends of every edge, over the tangent's length.
         low = np.einsum("ex,nex->ne", first, start - places[:, None])
         high = np.einsum("ex,nex->ne", last, end - places[:, None])
-        slack = _SLACK * self.lengths
-        place, edge = np.nonzero((low <= np.where(before < 0, slack, 0.0))
-                                 & (high >= np.where(after < 0, -slack, 0.0)))
+        beyond = slack * self.lengths
+        place, edge = np.nonzero((low <= np.where(before < 0, beyond, 0.0))
+                                 & (high >= np.where(after < 0, -beyond, 0.0)))
         s = self._roots(places[place], edge, low[place, edge], high[place, edge])
         at, slope, _ = self._cubic(edge, s)
         normal = _turned(_unit(slope))
@@ -238,7 +242,8 @@ def _outline_tangents(mesh: Mesh) -> tuple[Array, Array]:
     for other in (before, after):
         alike = np.sign(bent) * bent[other] >= _ALIKE * np.abs(bent)
         smooth &= alike | corner[other] | (other < 0)
-    tangent = _unit(chord / length[:, None] ** 2 + (chord / length[:, None] ** 2)[after])
+    inverse = chord / length[:, None] ** 2
+    tangent = _unit(np.where(smooth[:, None], inverse + inverse[after], along))
     at_start = np.where(before < 0, False, smooth[before])
     first = np.where(at_start[:, None], tangent[before], along)
     last = np.where(smooth[:, None], tangent, along)

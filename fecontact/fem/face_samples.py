@@ -1,17 +1,21 @@
-"""Places on a face at which contact nodes, and a uniform pressure, are looked at."""
+"""Places on a face at which it looks for a partner, and the parts of it that have one."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from fecontact.core.types import Array, Integers
-from fecontact.fem.contact_face import ContactNodes, face_nodes
-from fecontact.fem.face_curve import Face
-from fecontact.fem.points import Pieces
+from fecontact.fem.face_curve import Closest, Face
+from fecontact.fem.points import Pieces, piece_weights
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-_CUTS = 4  # parts of an edge in which a uniform pressure is integrated
+_CUTS = 16  # parts of an edge between whose ends one end of the other face can be found
+_PARTS = 2  # of a piece, in each of which a uniform pressure is integrated
+_INSET = 1e-6  # of an edge, from its ends
+_HALVINGS = 40
+_FACING = 0.1  # least cosine between opposed normals: 84 degrees
+_SLACK = 1e-3  # of an edge: how far a node may lie beyond the end of the other face
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,58 +42,134 @@ class Samples:
         """Those that are marked."""
         return Samples(*(getattr(self, name)[which] for name in Samples.__dataclass_fields__))
 
-
-def sampled_nodes(
-    face: Face, nodes: Literal["all"] | int, other: Face | None
-) -> tuple[ContactNodes, Samples, Array]:
-    """Contact nodes, their samples, and which of the nodes belong to the other face as well."""
-    rows, parts = face_nodes(face.body, face.boundary, nodes, "nodes")
-    shared = np.zeros(len(rows.tributary), dtype=bool)
-    if not isinstance(parts, list):
-        if other is not None and other.body is face.body:
-            shared = np.isin(parts, other.nodes)
-        degree = face.body.degree
-        edges, local = np.divmod(np.arange(face.nodes.size), degree + 1)
-        first, last = (np.zeros(len(face.body.nodes), dtype=int) for _ in range(2))
-        last[face.nodes.ravel()] = np.arange(face.nodes.size)
-        first[face.nodes.ravel()[::-1]] = np.arange(face.nodes.size)[::-1]
-        s = local / degree
-        sides = [which[parts] for which in (first, last)]
-        looks = np.stack([face.outward(edges[side], s[side]) for side in sides], axis=1)
-        places = face.at(edges[sides[0]], s[sides[0]])
-        return rows, Samples(np.arange(len(parts)), np.ones(len(parts)), places,
-                              face.body.nodes[parts], looks), shared
-    sizes = [len(part.nodes) for part in parts]
-    owner = np.repeat(np.arange(len(parts)), sizes)
-    pieces = Pieces(*(np.concatenate([getattr(part, name) for part in parts])
-                      for name in ("nodes", "start", "end")))
-    edges, s, weights = _gauss(face, pieces)
-    owner = np.repeat(owner, len(_GAUSS))
-    share = weights / np.bincount(owner, weights)[owner]
-    return rows, _at(face, owner, share, edges, s), shared
+    def closest(self, other: Face, reach: float) -> Closest:
+        """Their partners on another face."""
+        return other.closest(self.places, self.looks, reach, _FACING, _SLACK)
 
 
-def _at(face: Face, owner: Integers, share: Array, edges: Integers, s: Array) -> Samples:
-    looks = np.repeat(face.outward(edges, s)[:, None], 2, axis=1)
-    return Samples(owner, share, face.at(edges, s), face.straight(edges, s), looks)
+def node_samples(face: Face, nodes: Integers) -> Samples:
+    """One sample at each of some displacement nodes of a face."""
+    degree = face.body.degree
+    edges, local = np.divmod(np.arange(face.nodes.size), degree + 1)
+    first, last = (np.zeros(len(face.body.nodes), dtype=int) for _ in range(2))
+    last[face.nodes.ravel()] = np.arange(face.nodes.size)
+    first[face.nodes.ravel()[::-1]] = np.arange(face.nodes.size)[::-1]
+    s = local / degree
+    sides = [which[nodes] for which in (first, last)]
+    looks = np.stack([face.outward(edges[side], s[side]) for side in sides], axis=1)
+    places = face.at(edges[sides[0]], s[sides[0]])
+    return Samples(np.arange(len(nodes)), np.ones(len(nodes)), places, face.body.nodes[nodes],
+                   looks)
 
 
-def _gauss(face: Face, pieces: Pieces) -> tuple[Integers, Array, Array]:
-    """Edges, s and lengths (k g,) of the Gauss points of pieces of edges."""
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Places on a face, by edge and s, opposite to which an edge of the other face ends."""
+
+    edges: Integers
+    s: Array
+
+
+def opposite_ends(face: Face, other: Face, reach: float) -> Marks:
+    """Where the shape functions of the other face have their kinks."""
+    ends = node_samples(other, np.unique(other.nodes[:, [0, -1]]))
+    found = ends.closest(face, reach)
+    return Marks(found.edges[found.valid], found.s[found.valid])
+
+
+def segment_samples(
+    face: Face, segments: Sequence[Pieces], marks: Marks | None = None
+) -> Samples:
+    """Gauss points of segments, whose shares of each segment sum to one."""
+    samples = pressure_samples(face, segments, marks)
+    owner = np.repeat(np.arange(len(segments)), [len(part.nodes) for part in segments])
+    owner = owner[samples.owner]
+    total = np.bincount(owner, samples.share)
+    return Samples(owner, samples.share / total[owner], samples.places, samples.straight,
+                   samples.looks)
+
+
+def pressure_samples(face: Face, runs: Sequence[Pieces], marks: Marks | None = None) -> Samples:
+    """Gauss points of pieces of a face, with the lengths that they stand for as shares [m].
+
+    Between ``marks`` they integrate the shape functions of both sides of a flat face exactly. Their
+    owners are the pieces, one after the other.
+    """
+    nodes, start, end = (np.concatenate([getattr(run, name) for run in runs])
+                         for name in ("nodes", "start", "end"))
     size = len(face.body.nodes)
     keys = face.nodes[:, 0] * size + face.nodes[:, -1]
     order = np.argsort(keys)
-    edges = order[np.searchsorted(keys[order], pieces.nodes[:, 0] * size + pieces.nodes[:, -1])]
-    half = 0.5 * (pieces.end - pieces.start)
-    s = pieces.start[:, None] + half[:, None] * (1.0 + _GAUSS)
-    weights = (face.lengths[edges] * half)[:, None] * _WEIGHTS
-    return np.repeat(edges, len(_GAUSS)), s.ravel(), weights.ravel()
+    edges = order[np.searchsorted(keys[order], nodes[:, 0] * size + nodes[:, -1])]
+    piece = np.arange(len(edges))
+    if marks is not None:
+        mark, cut = np.nonzero((marks.edges[:, None] == edges) & (start < marks.s[:, None])
+                               & (marks.s[:, None] < end))
+        piece, start = np.concatenate([piece, cut]), np.concatenate([start, marks.s[mark]])
+        order = np.lexsort((start, piece))
+        piece, start = piece[order], start[order]
+        end = np.where(np.append(piece[1:] == piece[:-1], False), np.append(start[1:], 0.0),
+                       end[piece])
+    inside = ((np.arange(_PARTS)[:, None] + 0.5 * (1.0 + _GAUSS)) / _PARTS).ravel()
+    weights = np.tile(0.5 * _WEIGHTS / _PARTS, _PARTS)
+    s = (start[:, None] + (end - start)[:, None] * inside).ravel()
+    share = (face.lengths[edges[piece]] * (end - start))[:, None] * weights
+    piece = np.repeat(piece, len(inside))
+    looks = np.repeat(face.outward(edges[piece], s)[:, None], 2, axis=1)
+    return Samples(piece, share.ravel(), face.at(edges[piece], s), face.straight(edges[piece], s),
+                   looks)
 
 
-def pressure_samples(face: Face) -> Samples:
-    """Gauss points all over a face, with the lengths that they stand for as their shares [m]."""
-    cuts = np.arange(_CUTS) / _CUTS
-    pieces = Pieces(np.repeat(face.nodes, _CUTS, axis=0), np.tile(cuts, len(face.nodes)),
-                    np.tile(cuts + 1.0 / _CUTS, len(face.nodes)))
-    edges, s, weights = _gauss(face, pieces)
-    return _at(face, np.arange(len(s)), weights, edges, s)
+def covered(face: Face, other: Face, reach: float) -> list[Pieces]:
+    """The parts of a face that have a partner on another one, as runs of successive pieces."""
+    marks = np.linspace(0.0, 1.0, _CUTS + 1)
+    marks[[0, -1]] += [_INSET, -_INSET]
+    count = len(face.nodes)
+
+    def has_partner(edges: Integers, s: Array) -> Array:
+        looks = np.repeat(face.outward(edges, s)[:, None], 2, axis=1)
+        return other.closest(face.at(edges, s), looks, reach, _FACING).valid
+
+    valid = has_partner(np.repeat(np.arange(count), len(marks)), np.tile(marks, count))
+    valid = valid.reshape(count, -1)
+    edge, step = np.nonzero(valid[:, 1:] != valid[:, :-1])
+    opens = valid[edge, step + 1]
+    inner, outer = (np.where(opens, marks[step + near], marks[step + 1 - near])
+                    for near in (1, 0))
+    for _ in range(_HALVINGS if len(edge) else 0):
+        middle = 0.5 * (inner + outer)
+        now = has_partner(edge, middle)
+        inner, outer = np.where(now, middle, inner), np.where(now, outer, middle)
+    # An edge's parts begin at its start or where it enters, and end where it leaves or at its end.
+    begins = np.concatenate([np.flatnonzero(valid[:, 0]), edge[opens]])
+    starts = np.concatenate([np.zeros(int(valid[:, 0].sum())), inner[opens]])
+    ceases = np.concatenate([np.flatnonzero(valid[:, -1]), edge[~opens]])
+    ends = np.concatenate([np.ones(int(valid[:, -1].sum())), inner[~opens]])
+    first, last = np.lexsort((starts, begins)), np.lexsort((ends, ceases))
+    edges, starts, ends = begins[first], starts[first], ends[last]
+    if not len(edges):
+        return []
+    after = face.neighbours()[1]
+    following = np.roll(np.arange(len(edges)), -1)
+    joined = ((ends == 1.0) & (starts[following] == 0.0)
+              & (after[edges] == edges[following]))
+    breaks = np.flatnonzero(~joined) + 1
+    # Round a closed face, the last run goes on with the first edge.
+    order = np.roll(np.arange(len(edges)), -breaks[0] if joined[-1] and len(breaks) else 0)
+    cuts = breaks - breaks[0] if joined[-1] and len(breaks) else breaks
+    return [Pieces(face.nodes[edges[part]], starts[part], ends[part])
+            for part in np.split(order, cuts) if len(part)]
+
+
+def lumped_lengths(face: Face, runs: Sequence[Pieces], kept: Array) -> Array:
+    """Integrals (N,) of the shape functions over parts of a face [m].
+
+    What falls on nodes that are not ``kept`` (N,) goes to the others of the same edge.
+    """
+    lengths = np.zeros(len(face.body.nodes))
+    for run in runs:
+        weights = piece_weights(face.body, run)
+        stays = kept[run.nodes]
+        lost = np.where(stays, 0.0, weights).sum(axis=1) / np.maximum(stays.sum(axis=1), 1)
+        np.add.at(lengths, run.nodes, np.where(stays, weights + lost[:, None], 0.0))
+    return lengths

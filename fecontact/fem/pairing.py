@@ -15,67 +15,25 @@ from fecontact.core.errors import (
     require_not_negative,
     require_positive,
 )
-from fecontact.core.types import Array, Integers
-from fecontact.core.units import Summarised, count, listed, quantity
-from fecontact.fem.contact_face import check_faces_down
+from fecontact.core.types import Array
+from fecontact.core.units import Summarised
+from fecontact.fem.contact_face import check_faces_down, face_nodes, face_segments
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.face_curve import Closest, Face
-from fecontact.fem.face_samples import Samples, pressure_samples, sampled_nodes
-from fecontact.fem.points import edge_weights, node_matrix
+from fecontact.fem.face_samples import (
+    Samples,
+    covered,
+    lumped_lengths,
+    node_samples,
+    opposite_ends,
+    pressure_samples,
+    segment_samples,
+)
+from fecontact.fem.pairing_report import SAME, PairingReport, closed_gaps, no_partner, reasons
+from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, whole
 
-_FACING = 0.1  # least cosine between opposed normals: 84 degrees
-_SAME = 1e-9  # of an edge: gaps below this are round-off
+_COUNT = "pair_faces: nodes"
 _FINER = 0.999  # ratio of spacings from which a face is finer than another
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PairingReport(Summarised):
-    """What came of the pairing of two faces.
-
-    Parameters
-    ----------
-    face, other : str
-        The face with the contact nodes and the other side, "BODY.BOUNDARY" or "ground".
-    nodes : int
-        Contact nodes with a partner.
-    left_out : (k, 2) array
-        Places of the nodes without a partner [m].
-    reasons : tuple of str
-        Why each of them has none.
-    unevenness : float
-        Largest error of the loads that a uniform pressure puts on the nodes of the other side, over
-        the load of a node whose edges are wholly in contact: 0 where the loads are exact.
-    largest_gap, closed_overlap : float
-        Largest initial gap, and largest overlap set to zero [m].
-    largest_offset : float
-        Largest distance along the tangent between the places where opposite normal forces act [m];
-        times the force, the moment by which they do not balance.
-    """
-
-    face: str
-    other: str
-    nodes: int
-    left_out: Array
-    reasons: tuple[str, ...]
-    unevenness: float
-    largest_gap: float
-    closed_overlap: float
-    largest_offset: float
-
-    def summary(self) -> list[tuple[str, str]]:
-        """Numbers of nodes, gaps, overlaps, and how evenly the other side is loaded."""
-        where = [f"({x:.4g}, {y:.4g}) m {reason}"
-                 for (x, y), reason in zip(self.left_out.tolist(), self.reasons, strict=True)]
-        return [
-            ("faces", f"{self.face} on {self.other}"),
-            ("nodes", f"{self.nodes}"),
-            ("without partner", f"{count(len(where), 'node')}: {listed(where, 3)}" if where
-             else "none"),
-            ("largest gap", quantity(self.largest_gap, "m")),
-            ("overlap closed", quantity(self.closed_overlap, "m")),
-            ("unevenness", f"{100.0 * self.unevenness:.3g} %"),
-            ("largest offset", quantity(self.largest_offset, "m")),
-        ]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -236,145 +194,117 @@ def _check_apart(first: Face, second: Face) -> None:
 def _paired(
     face: Face, other: Face, nodes: Literal["all"] | int, reach: float | None, overlap: float
 ) -> Pairing:
+    limit = max(face.extent, other.extent) if reach is None else float(reach)
+    present = face_nodes(face.body, face.boundary)
+    samples = node_samples(face, present)
+    found = samples.closest(other, limit)
+    shared = np.isin(present, other.nodes) & (face.body is other.body)
+    runs, marks = covered(face, other, limit), opposite_ends(face, other, limit)
+    partnered = np.zeros(len(face.body.nodes), dtype=bool)
+    partnered[present[found.valid & ~shared]] = True
+    lengths = lumped_lengths(face, runs, partnered)[present]
+    kept = lengths > SAME * face.spacing
+    if not kept.any():
+        raise InputError(no_partner(samples, found, face, other, limit))
+    alone = samples.places[~kept]
+    why = reasons(found, shared, other.label, kept)
+    if nodes == "all":
+        samples = node_samples(face, present[kept])
+        matrix, tributary = node_matrix(face.body, present[kept]), lengths[kept]
+    else:
+        segments, tributary = face_segments(face.body, face.boundary, nodes, runs, _COUNT)
+        samples, matrix = segment_samples(face, segments, marks), _segment_matrix(face, segments)
+    found = samples.closest(other, limit)
+    pressure = pressure_samples(face, runs, marks)
+    return _described(face, other, samples, found, matrix, tributary, overlap, limit, pressure,
+                      (alone, why))
+
+
+def _described(
+    face: Face, other: Face, samples: Samples, found: Closest, matrix: Any, tributary: Array,
+    overlap: float, limit: float, pressure: Samples, alone: tuple[Array, tuple[str, ...]],
+) -> Pairing:
+    """The pairing of contact nodes all of which have a partner."""
     import scipy.sparse as sp
 
-    rows, samples, shared = sampled_nodes(face, nodes, other)
-    limit = max(face.extent, other.extent) if reach is None else float(reach)
-    found = other.closest(samples.places, samples.looks, limit, _FACING)
-    size = len(rows.tributary)
+    size = len(tributary)
     hit = samples.only(found.valid)
-    covered = np.bincount(hit.owner, hit.share, size)
-    kept = (covered > 0.5 - 1e-9) & ~shared
-    _check_partners(kept, shared, found, face, other, limit)
-    total = np.where(kept, covered, 1.0)
-
-    def mean(values: Array) -> Array:
-        return (hit.mean(values[found.valid], size) / total[:, None])[kept]
-
-    normals = mean(found.normals)
+    hit = replace(hit, share=hit.share / np.bincount(hit.owner, hit.share, size)[hit.owner])
+    normals = hit.mean(found.normals[found.valid], size)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    places, feet_places = samples.mean(samples.places, size)[kept], mean(found.places)
-    gaps = mean(found.gaps[:, None])[:, 0]
-    edge = min(face.lengths.mean(), other.lengths.mean())
-    gaps, closed = _closed(gaps, places, overlap * edge, _SAME * edge, face, other.label)
-
-    columns, weights = _foot_weights(other, found)
+    tangents = np.column_stack([normals[:, 1], -normals[:, 0]])
+    places = samples.mean(samples.places, size)
+    gaps, closed = closed_gaps(hit.mean(found.gaps[found.valid], size), places, overlap,
+                           min(face.lengths.mean(), other.lengths.mean()), face, other.label)
+    at_node = _at_nodes(other, hit, found, size)
     chosen = np.unique(other.nodes)
-    W = sp.csr_array(sp.coo_array(
-        (((hit.share / total[hit.owner])[:, None] * weights).ravel(), (
-            np.repeat(hit.owner, columns.shape[1]), np.searchsorted(chosen, columns).ravel())),
-        shape=(size, len(chosen))))[np.flatnonzero(kept)]
-    feet = sp.csr_array(sp.kron(W, sp.eye_array(3)) @ node_matrix(other.body, chosen))
-    arms = samples.mean(samples.straight, size)[kept] - mean(other.straight(found.edges, found.s))
-    tributary = rows.tributary[kept]
+    feet = sp.csr_array(sp.kron(at_node[:, chosen], sp.eye_array(3))
+                        @ node_matrix(other.body, chosen))
+    arms = samples.mean(samples.straight, size) - hit.mean(
+        other.straight(found.edges, found.s)[found.valid], size)
     report = PairingReport(
-        face.label, other.label, len(tributary), samples.mean(samples.places, size)[~kept],
-        _reasons(kept, shared, samples, found, other.label),
-        _unevenness(face, other, chosen, W.T @ tributary, limit),
-        float(gaps.max()), closed,
-        float(np.abs(np.einsum("kx,kx->k", _tangents(normals), arms)).max()))
-    return Pairing(
-        _body(face), _body(other), places, normals, _tangents(normals), gaps, tributary,
-        _rows_of(rows.matrix, kept), feet, feet_places, report)
+        face.label, other.label, size, *alone, float(pressure.share.sum() / face.lengths.sum()),
+        _unevenness(other, at_node.T @ tributary, pressure, limit),
+        float(gaps.max()), closed, float(np.abs((tangents * arms).sum(axis=1)).max()))
+    return Pairing(_body(face), _body(other), places, normals, tangents, gaps, tributary, matrix,
+                   feet, hit.mean(found.places[found.valid], size), report)
 
 
 def _on_ground(
     face: Face, nodes: Literal["all"] | int, reach: float | None, overlap: float
 ) -> Pairing:
     check_faces_down(face.body, face.boundary)
-    rows, samples, _ = sampled_nodes(face, nodes, None)
-    places = samples.mean(samples.places, len(rows.tributary))
+    if nodes == "all":
+        present = face_nodes(face.body, face.boundary)
+        samples, matrix = node_samples(face, present), node_matrix(face.body, present)
+        lengths = lumped_lengths(face, [whole(face.nodes)],
+                                 np.ones(len(face.body.nodes), dtype=bool))[present]
+    else:
+        segments, lengths = face_segments(face.body, face.boundary, nodes, key=_COUNT)
+        samples, matrix = segment_samples(face, segments), _segment_matrix(face, segments)
+    places = samples.mean(samples.places, len(lengths))
     kept = places[:, 1] <= (np.inf if reach is None else reach)
     if not kept.any():
         raise InputError(f"pair_faces: no node of '{face.label}' is within reach = {reach:g} m of "
                          f"the ground, y = 0; the lowest is {places[:, 1].min():.4g} m above it.")
-    edge = float(face.lengths.mean())
-    gaps, closed = _closed(places[kept, 1], places[kept], overlap * edge, _SAME * edge, face,
-                           "the ground, y = 0")
-    feet_places = places[kept] * [1.0, 0.0]
-    normals = np.tile([0.0, 1.0], (len(gaps), 1))
-    report = PairingReport(face.label, "ground", len(gaps), places[~kept],
-                           ("is out of reach",) * int((~kept).sum()), 0.0, float(gaps.max()),
-                           closed, 0.0)
-    return Pairing(_body(face), None, places[kept], normals, _tangents(normals), gaps,
-                   rows.tributary[kept], _rows_of(rows.matrix, kept), None, feet_places, report)
+    alone, places = places[~kept], places[kept]
+    gaps, closed = closed_gaps(places[:, 1], places, overlap, float(face.lengths.mean()), face,
+                           "the ground, y = 0,")
+    normals, tangents = np.tile([0.0, 1.0], (len(gaps), 1)), np.tile([1.0, 0.0], (len(gaps), 1))
+    report = PairingReport(
+        face.label, "ground", len(gaps), alone, ("is out of reach",) * len(alone),
+        float(lengths[kept].sum() / lengths.sum()), 0.0, float(gaps.max()), closed, 0.0)
+    return Pairing(_body(face), None, places, normals, tangents, gaps, lengths[kept],
+                   matrix[np.flatnonzero(np.repeat(kept, 3))], None, places * [1.0, 0.0], report)
 
 
 def _body(face: Face) -> str:
     return face.label.partition(".")[0]
 
 
-def _tangents(normals: Array) -> Array:
-    return np.column_stack([normals[:, 1], -normals[:, 0]])
+def _segment_matrix(face: Face, segments: list[Pieces]) -> Any:
+    import scipy.sparse as sp
+
+    return sp.csr_array(sp.vstack([patch_rows(face.body, part).matrix for part in segments]))
 
 
-def _rows_of(matrix: Any, kept: Array) -> Any:
-    return matrix[np.flatnonzero(np.repeat(kept, 3))]
+def _at_nodes(other: Face, samples: Samples, found: Closest, size: int) -> Any:
+    """Weights (size, N) of all displacement nodes of the other body at the feet."""
+    import scipy.sparse as sp
+
+    nodes = other.nodes[found.edges[found.valid]]
+    weights = samples.share[:, None] * other.shape_functions(found.s[found.valid])
+    owner = np.repeat(samples.owner, nodes.shape[1])
+    return sp.csr_array(sp.coo_array((weights.ravel(), (owner, nodes.ravel())),
+                                     shape=(size, len(other.body.nodes))))
 
 
-def _foot_weights(other: Face, found: Closest) -> tuple[Integers, Array]:
-    """Displacement nodes (k, degree + 1) of the edges of the feet that exist, and their weights."""
-    return (other.nodes[found.edges[found.valid]],
-            other.shape_functions(found.s[found.valid]))
-
-
-def _check_partners(
-    kept: Array, shared: Array, found: Closest, face: Face, other: Face, limit: float
-) -> None:
-    if kept.any():
-        return
-    names = f"pair_faces: no node of '{face.label}' has a partner on '{other.label}'"
-    if np.isfinite(found.nearest).any():
-        closest = found.nearest.min()
-        if closest > limit:
-            raise InputError(f"{names}: the closest is {closest:.4g} m away, beyond reach = "
-                             f"{limit:.4g} m; move the bodies closer or raise reach.")
-        raise InputError(f"{names}, but for less than half a segment or nodes that belong to both; "
-                         f"use more nodes or other faces.")
-    if found.averted.any():
-        raise InputError(f"{names}: their outward normals point the same way; give faces that look "
-                         f"at each other.")
-    raise InputError(f"{names}: all of them lie beyond its ends; move the bodies opposite to each "
-                     f"other or give other faces.")
-
-
-def _reasons(
-    kept: Array, shared: Array, samples: Samples, found: Closest, other: str
-) -> tuple[str, ...]:
-    """Why each node that is not kept has no partner."""
-    near, averted = np.full(len(kept), np.inf), np.zeros(len(kept), dtype=bool)
-    np.minimum.at(near, samples.owner[~found.valid], found.nearest[~found.valid])
-    np.logical_or.at(averted, samples.owner, found.averted)
-    return tuple(
-        "is on both faces" if shared[j] else f"is {near[j]:.3g} m away, out of reach"
-        if np.isfinite(near[j]) else f"looks away from {other}" if averted[j]
-        else f"is beyond the ends of {other}" for j in np.flatnonzero(~kept))
-
-
-def _closed(
-    gaps: Array, places: Array, allowed: float, tiny: float, face: Face, other: str
-) -> tuple[Array, float]:
-    """Gaps without overlaps, and the largest of these."""
-    deepest = int(np.argmin(gaps))
-    if -gaps[deepest] > max(allowed, tiny):
-        x, y = places[deepest]
-        raise InputError(f"pair_faces: '{face.label}' starts {-gaps[deepest]:.4g} m inside {other} "
-                         f"at ({x:.4g}, {y:.4g}) m, more than the {allowed:.4g} m that overlap "
-                         f"closes; move the bodies apart, give faces that look at each other, or "
-                         f"raise overlap.")
-    closed = -gaps[deepest] if gaps[deepest] < -tiny else 0.0
-    return np.where(gaps < tiny, 0.0, gaps), float(closed)
-
-
-def _unevenness(
-    face: Face, other: Face, chosen: Integers, loads: Array, limit: float
-) -> float:
-    """Largest error of the nodal loads (k,) of a uniform pressure, over those of whole edges."""
-    samples = pressure_samples(face)
-    found = other.closest(samples.places, samples.looks, limit, _FACING)
-    exact, whole = np.zeros(len(chosen)), np.zeros(len(chosen))
-    columns, values = _foot_weights(other, found)
-    np.add.at(exact, np.searchsorted(chosen, columns),
-              samples.share[found.valid, None] * values)
-    np.add.at(whole, np.searchsorted(chosen, other.nodes), edge_weights(other.body, other.nodes))
-    return float((np.abs(loads - exact) / whole).max())
+def _unevenness(other: Face, loads: Array, pressure: Samples, reach: float) -> float:
+    """Largest error of the nodal loads (N,) of a uniform pressure, over those of whole edges."""
+    found = pressure.closest(other, reach)
+    hit = replace(pressure.only(found.valid), owner=np.zeros(int(found.valid.sum()), dtype=int))
+    exact = _at_nodes(other, hit, found, 1).toarray()[0]
+    whole_edges = np.zeros(len(other.body.nodes))
+    np.add.at(whole_edges, other.nodes, edge_weights(other.body, other.nodes))
+    there = whole_edges > 0.0
+    return float((np.abs(loads - exact)[there] / whole_edges[there]).max())
