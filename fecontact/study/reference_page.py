@@ -53,10 +53,10 @@ def _parts() -> Iterator[tuple[str, str]]:
     shapes = [_table(cls, f'`shape = "{name}"`: {_summary(cls)}') for name, cls in SHAPES.items()]
     yield "geometry", _section("geometry", "A shape and its dimensions, or the file of a mesh.",
                                *shapes, _table(MeshFile, f"`file`: {_summary(MeshFile)}"))
-    printed: dict[Any, str] = {}
+    printed: dict[Any, str] = {(*SHAPES.values(), MeshFile): "geometry"}
     for entry in fields(Study):
         name = entry.name.removesuffix("_settings")
-        if name in ("geometry", "gap", "path"):
+        if name in ("geometry", "gap", "path") or not _inner(hints[entry.name]):
             continue
         if name in ("bodies", "interfaces", "links"):
             name = f"{name}.NAME"

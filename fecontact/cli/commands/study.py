@@ -15,8 +15,8 @@ def init(
     /,
     *,
     shape: Annotated[Literal["beam", "pendulum", "block", "pad"], Parameter(
-        help="Beam on wavy ground, pendulum on a stop, block on a moving belt, or pad on a block: two "
-        "bodies.")] = "beam",
+        help="Beam on wavy ground, pendulum on a stop, block on a moving belt, or a pad on "
+        "a block, which are two bodies.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
@@ -80,8 +80,8 @@ def modes(
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
-    Of several bodies those of each; ``--complex`` and ``--movie`` are for all bodies together, whose
-    modes are counted through.
+    Of several bodies those of each; --complex and --movie are for all bodies together, with modes
+    that are counted through.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import convergence_of, read_study

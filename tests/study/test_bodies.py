@@ -1,0 +1,215 @@
+"""Studies of several bodies: the same systems as in Python, sweeps, commands and bad input."""
+
+import json
+
+import numpy as np
+import pytest
+
+import fecontact as fc
+
+from fecontact.cli.templates import template
+from fecontact.fem.pairing import pair_faces
+from fecontact.laws import ConstantFriction, RoughSurface
+from fecontact.reduction import reduce_bodies
+from fecontact.sweeps.case import of_basis
+
+SHORT = {"simulation.t_end": 2e-3, "simulation.outputs": 11, "output.frames": 2}
+
+
+@pytest.fixture(scope="module")
+def study():
+    return fc.Study.from_toml(template("pad")).with_(**SHORT)
+
+
+def in_python():
+    """The system of the template, written out in Python."""
+    block = fc.ElasticBody(
+        fc.generate(fc.Block(width=0.12, height=0.04, element_size=0.01)),
+        fc.Material.named("steel"), thickness=0.05, fixed={"contact": "xy"})
+    pad = fc.ElasticBody(
+        fc.generate(fc.Block(width=0.06, height=0.02, element_size=0.01)).placed((0.03, 0.04)),
+        fc.Material(5e9, 0.25, 2500.0), thickness=0.05)
+    bodies = {"block": block, "pad": pad}
+    pairing = pair_faces(bodies, "pad.contact", "block.top", nodes=6)
+    bases = reduce_bodies(bodies, [pairing], modes=4, each={
+        "block": {"damping": 0.02}, "pad": {"damping": 0.05, "B": "left", "C": "top"}})
+    return fc.ContactSystem(
+        bodies=bases,
+        interfaces=[fc.Interface("lining", pairing, RoughSurface(20e6, 10e-6, 200.0),
+                                 ConstantFriction(0.4, smoothing_slope=1e4))],
+        drive=fc.Drive(stiffness_x=2e5, damping_x=20.0, amplitude_x=1e-3, angular_frequency=62.8),
+        load=fc.Load(normal=200.0))
+
+
+def test_a_study_runs_as_the_same_system_in_python(study):
+    system = in_python()
+    assert study.system().parameters() == system.parameters()
+    run, same = study.run(), fc.simulate(system, 2e-3, outputs=11)
+    assert np.abs(run.friction_force).max() > 1.0
+    for name in ("modal_coordinates", "normal_force", "friction_force"):
+        assert (getattr(run, name) == getattr(same, name)).all(), name
+    # The pad is carried by the block alone.
+    assert study.system().basis.groups == (("lining", 6),)
+    assert run.normal_force[-1].sum() == pytest.approx(200.0, rel=0.02)
+
+
+def test_models_go_by_the_names_of_bodies(study):
+    assert list(study.meshes()) == list(study.elastic_bodies()) == ["block", "pad"]
+    pad = study.meshes()["pad"]
+    assert pad.nodes.min(axis=0).tolist() == [0.03, 0.04]
+    assert study.modal_bases()["pad"].rigid_modes == 3
+    assert study.pairings()["lining"].other == "block"
+    for name in ("mesh", "elastic_body", "modal_basis"):
+        with pytest.raises(fc.InputError, match="describes the bodies 'block', 'pad'; Study"):
+            getattr(study, name)()
+    single = fc.Study.from_toml(template("block"))
+    for name in ("meshes", "elastic_bodies", "modal_bases", "pairings"):
+        with pytest.raises(fc.InputError, match="describes a single body"):
+            getattr(single, name)()
+    assert "bodies: block, pad" in str(study)
+
+
+def test_a_study_is_restored_from_its_toml(study):
+    for one in (study, study.with_(**{
+            "interfaces.lining.sliding": {"speed": 0.1, "direction": [3.0, 0.1]},
+            "interfaces.lining.gap": {"radius": 1.0, "centre": 0.06},
+            "bodies.pad.placement.mirror": "x", "bodies.pad.placement.rotation": 180})):
+        assert fc.Study.from_toml(one.to_toml()) == one
+    assert fc.Study.from_toml(study.to_toml()).reduced.basis.T.tobytes() == (
+        study.reduced.basis.T.tobytes())
+
+
+def test_changes_reuse_what_does_not_depend_on_them(study):
+    study.system()
+    rougher = study.with_(**{"interfaces.lining.friction.friction_coefficient": 0.5})
+    assert rougher.reduced is study.reduced
+    assert rougher.system().parameter("interfaces.lining.friction.friction_coefficient") == 0.5
+    richer = study.with_(**{"bodies.pad.basis.modes": 5})
+    assert richer.meshes()["pad"] is study.meshes()["pad"]
+    assert richer.pairings()["lining"] is study.pairings()["lining"]
+    assert richer.reduced is not study.reduced
+    thick = study.with_(**{"bodies.block.body.thickness": 0.1})
+    assert thick.meshes()["pad"] is study.meshes()["pad"]
+    # Twice as thick, twice the mass: modal rows are 1 / sqrt(2) as large.
+    for name, ratio in (("block", 0.5), ("pad", 1.0)):
+        mass, before = (one.elastic_bodies()[name].mass.sum() for one in (thick, study))
+        assert mass / before == pytest.approx(1.0 / ratio, rel=1e-12)
+    wider = study.with_(**{"interfaces.lining.nodes": 3})
+    assert wider.system().basis.contact_nodes == 3
+    open_gap = study.with_(**{"interfaces.lining.gap": 1e-5})
+    assert open_gap.reduced is study.reduced
+    assert np.asarray(open_gap.system().gap) == pytest.approx(np.full(6, 1e-5), rel=1e-6)
+
+
+def test_friction_of_all_interfaces_is_that_of_the_section(study):
+    tables = study.tables(defaults=False)
+    tables["friction"] = tables["interfaces"]["lining"].pop("friction")
+    assert fc.Study.from_tables(tables).system().parameters() == study.system().parameters()
+
+
+@pytest.mark.parametrize(("name", "depends"), [
+    ("interfaces.lining.friction.friction_coefficient", False), ("interfaces.lining.gap", False),
+    ("interfaces.lining.nodes", True), ("interfaces.lining", True),
+    ("bodies.pad.body.thickness", True), ("basis.modes", True), ("ground.speed", False),
+    ("interfaces.lining.sliding.speed", False), ("links.bolt", True)])
+def test_keys_on_which_the_basis_depends(name, depends):
+    assert of_basis(name) is depends
+
+
+def test_a_sweep_over_friction_makes_one_basis(study, tmp_path):
+    cases = [0.2, 0.4, 0.6]
+    name = "interfaces.lining.friction.friction_coefficient"
+    table = fc.sweep(fc.Study.from_tables({
+        **study.tables(defaults=False),
+        "sweep": {"axes": {name: cases}, "batch": 1, "summaries": ["peak_normal_force",
+                                                                   "friction_power"]}}),
+                     folder=tmp_path / "s", workers=1)
+    assert not table.failed
+    assert len(list((tmp_path / "s" / "bases").glob("*.h5"))) == 1
+    power = table.values["friction_power"]
+    alone = fc.Study.from_tables({
+        **study.with_(**{name: 0.6}).tables(defaults=False),
+        "sweep": {"axes": {name: [0.6]}, "summaries": ["friction_power"]}})
+    assert power[2] == fc.sweep(alone, folder=tmp_path / "t", workers=1).values[
+        "friction_power"][0]
+    assert len(set(power.tolist())) == 3
+    # Stored bases hold the gaps too.
+    again = fc.sweep(fc.Study.from_tables({
+        **study.tables(defaults=False), "sweep": {"axes": {name: [0.3]}}}),
+        folder=tmp_path / "s", workers=1, overwrite=True)
+    assert not again.failed
+
+
+def test_commands_name_bodies_and_interfaces(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert execute(["init", "a.toml", "--shape", "pad"]) == 0
+    short = [token for name, value in SHORT.items() for token in (
+        "--set", f"{name}={json.dumps(value)}")]
+    assert execute(["mesh", "a.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "\nblock:" in out
+    assert "pad.contact on block.top" in out
+    assert fc.read_mesh("results/a-pad.msh").nodes.max(axis=0).tolist() == [0.09, 0.06]
+    assert execute(["modes", "a.toml"]) == 0
+    assert (tmp_path / "results" / "a-pad-modes.png").exists()
+    assert execute(["modes", "a.toml", "--converge"]) == 1
+    assert "--converge is for a single body" in capsys.readouterr().err
+    assert execute(["run", "a.toml", *short]) == 0
+    stored = fc.read_case("results/a.vtkhdf")
+    assert [part.name for part in stored.trajectory.system.basis.parts] == ["block", "pad"]
+    assert stored.trajectory.system.basis.groups == (("lining", 6),)
+    study = fc.Study.from_toml(stored.study)
+    assert study == fc.Study.read("a.toml").with_(**SHORT)
+    assert execute(["plot", "results/a.vtkhdf", "history", "--point", "pad.C"]) == 0
+    assert execute(["export", "results/a.vtkhdf", "--format", "csv"]) == 0
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"interfaces.lining.other": "blck.top"},
+     r"\[interfaces\.lining\]: other = \"blck\.top\": there is no body 'blck' "
+     r"\(did you mean 'block'\?\)"),
+    ({"interfaces.lining.face": "pad.contct"},
+     r"\[interfaces\.lining\]: the mesh of body 'pad' has no boundary 'contct' "
+     r"\(did you mean 'contact'\?\)"),
+    ({"interfaces.lining.face": "pad"}, r"face = \"pad\" must be \"BODY.BOUNDARY\"; the bodies"),
+    ({"interfaces.lining.other": "grund"}, r"other = \"grund\" must be .* or 'ground'"),
+    ({"interfaces": {"lining": {}}}, r"\[interfaces\.lining\] lacks the key 'face'"),
+    ({"interfaces.pad": {"face": "pad.top", "other": "block.left"}},
+     r"\[interfaces\.pad\]: the name 'pad' is that of \[bodies\.pad\] too"),
+    ({"interfaces": {"a.b": {"face": "pad.top", "other": "block.left"}}},
+     r"\[interfaces\.a\.b\]: the name 'a\.b' must be a text without dots"),
+    ({"bodies.third": {"geometry": {"shape": "beam"}}},
+     r"no interface and no link touches the body 'third'"),
+    ({"bodies.ground": {"geometry": {"shape": "beam"}}}, "'ground' is the name of the ground"),
+    ({"geometry": {"shape": "beam"}}, r"has \[geometry\], which is for a single body, together "
+                                      r"with \[bodies\]"),
+    ({"basis.modes": 3}, r"has \[basis\], .* give \[bodies\.NAME\.basis\]"),
+    ({"bodies.pad.basis.contact": "top"},
+     r"\[bodies\.pad\.basis\]: contact is for a single body; name the face"),
+    ({"bodies.pad.body.rotation": {"speed": 1.0}},
+     r"\[bodies\.pad\.body\]: rotation is for a single body"),
+    ({"bodies.pad": {"body": {}}}, r"\[bodies\.pad\] lacks the section \[bodies\.pad\.geometry\]"),
+    ({"bodies.pad.geometri": {}}, r"\[bodies\.pad\] has no key 'geometri'"),
+    ({"bodies.pad.geometry.widht": 1.0}, r"\[bodies\.pad\.geometry\] has no key 'widht'"),
+    ({"bodies.pad.placement.mirror": "z"}, r"\[bodies\.pad\.placement\]: mirror = \"z\" must be"),
+    ({"bodies.pad.placement.shift": [0.03, 0.02]}, r"\[interfaces\.lining\]: "),
+    ({"bodies": {}}, r"\[bodies\] must be a table of bodies"),
+    ({"bodies.pad": 3}, r"\[bodies\.pad\] must be a table of sections, not 3"),
+    ({"gap": 1e-6}, r"gap = 1e-06 is for a single body; give it in \[interfaces\.NAME\]"),
+    ({"contact": {"lining": {}}}, r"unknown section 'contact'; laws of single interfaces stand"),
+    ({"interfaces.lining.normal.stiffness": -1.0}, r"\[interfaces\.lining\.normal\]: stiffness"),
+    ({"output.points": ["pad.D"]}, r"\[output\]: There is no point 'pad\.D'"),
+])
+def test_bad_studies_of_several_bodies_are_explained(study, changes, message):
+    with pytest.raises(fc.FecontactError, match=message) as raised:
+        study.with_(**changes).run()
+    assert str(raised.value).startswith("The study")
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"interfaces.contact.face": "a.b"}, r"face = \"a\.b\" is for several bodies"),
+    ({"links.bolt": {}}, r"\[links\]"),
+])
+def test_sections_of_several_bodies_in_a_study_of_one(changes, message):
+    with pytest.raises(fc.InputError, match=message):
+        fc.Study.from_toml(template("block")).with_(**changes)
