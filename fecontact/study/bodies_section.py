@@ -192,7 +192,7 @@ class Reduced:
 def _body(table: Any, where: str) -> BodySections:
     if not isinstance(table, Mapping):
         raise InputError(f"{where} must be a table of sections, not {shown(table)}.")
-    kinds = {"geometry": None, "placement": Placement, "body": BodySettings,
+    kinds: dict[str, Any] = {"geometry": None, "placement": Placement, "body": BodySettings,
              "basis": BodyBasisSettings}
     for key in table:
         require_known(key, kinds, where)
@@ -200,10 +200,9 @@ def _body(table: Any, where: str) -> BodySections:
     if "geometry" not in table:
         raise InputError(f"{where} lacks the section {inner['geometry'].partition(': ')[2]}; give "
                          f"a shape and its dimensions, or the file of a mesh.")
-    return BodySections(
-        geometry_from_table(table["geometry"], inner["geometry"]),
-        **{name: from_table(kind, table[name], inner[name])
-           for name, kind in kinds.items() if kind is not None and name in table})
+    parts: dict[str, Any] = {name: from_table(kind, table[name], inner[name])
+                             for name, kind in kinds.items() if kind and name in table}
+    return BodySections(geometry_from_table(table["geometry"], inner["geometry"]), **parts)
 
 
 def bodies_from_tables(tables: Any, title: str) -> dict[str, BodySections]:

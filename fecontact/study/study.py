@@ -205,6 +205,9 @@ class Study(Summarised, StudyModels):
             raise InputError(f"{title} lacks the section [geometry]; give a shape and its "
                              f"dimensions, or the file of a mesh. For several bodies, give "
                              f"[bodies.NAME.geometry] to each.")
+        if tables.get("links") and "bodies" not in tables:
+            raise InputError(f"{title} has [links], which join several bodies; describe them in "
+                             f"[bodies.NAME].")
         study = cls(
             geometry_from_table(tables["geometry"], f"{title}: [geometry]")
             if "bodies" not in tables else None,
@@ -247,9 +250,10 @@ class Study(Summarised, StudyModels):
                     for name in _SECTIONS
                     if getattr(self, name) is not None
                     and not (self.bodies and name in ("body", "basis"))}
-        first = {"bodies": {name: one.table(defaults=defaults)
-                            for name, one in self.bodies.items()}} if self.bodies else {
-            "geometry": geometry_table(self.geometry, defaults=defaults)}
+        first: dict[str, Any] = {"bodies": {name: one.table(defaults=defaults)
+                            for name, one in self.bodies.items()}}
+        if self.geometry is not None:
+            first = {"geometry": geometry_table(self.geometry, defaults=defaults)}
         full = defaults and bool(self.bodies)
         interfaces = {"interfaces": {name: to_table(one, defaults=full) for name, one in
                                      self.interfaces.items()}} if self.interfaces else {}

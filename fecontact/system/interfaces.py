@@ -17,6 +17,7 @@ from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
+from fecontact.fem.pairing import Pairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
@@ -67,7 +68,7 @@ class Interface:
     def __post_init__(self) -> None:
         require_kind("Interface", str, name=self.name)
         owner = f"Interface '{self.name}'"
-        require_kind(owner, PointPairing, pairing=self.pairing)
+        require_kind(owner, (Pairing, PointPairing), pairing=self.pairing)
         require_kind(owner, NormalLaw, normal=self.normal)
         require_kind(owner, (FrictionLaw, type(None)), friction=self.friction)
         require_kind(owner, (SlidingTranslation, SlidingRotation, type(None)),

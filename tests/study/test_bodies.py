@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from sweep_study import Serial
 
 import fecontact as fc
-
+from fecontact.cli import execute
 from fecontact.cli.templates import template
 from fecontact.fem.pairing import pair_faces
 from fecontact.laws import ConstantFriction, RoughSurface
@@ -123,20 +124,20 @@ def test_a_sweep_over_friction_makes_one_basis(study, tmp_path):
         **study.tables(defaults=False),
         "sweep": {"axes": {name: cases}, "batch": 1, "summaries": ["peak_normal_force",
                                                                    "friction_power"]}}),
-                     folder=tmp_path / "s", workers=1)
+                     folder=tmp_path / "s", executor=Serial())
     assert not table.failed
     assert len(list((tmp_path / "s" / "bases").glob("*.h5"))) == 1
     power = table.values["friction_power"]
     alone = fc.Study.from_tables({
         **study.with_(**{name: 0.6}).tables(defaults=False),
         "sweep": {"axes": {name: [0.6]}, "summaries": ["friction_power"]}})
-    assert power[2] == fc.sweep(alone, folder=tmp_path / "t", workers=1).values[
+    assert power[2] == fc.sweep(alone, folder=tmp_path / "t", executor=Serial()).values[
         "friction_power"][0]
     assert len(set(power.tolist())) == 3
     # Stored bases hold the gaps too.
     again = fc.sweep(fc.Study.from_tables({
         **study.tables(defaults=False), "sweep": {"axes": {name: [0.3]}}}),
-        folder=tmp_path / "s", workers=1, overwrite=True)
+        folder=tmp_path / "s", executor=Serial(), overwrite=True)
     assert not again.failed
 
 

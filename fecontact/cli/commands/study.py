@@ -42,10 +42,9 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
 
     described = read_study(study, set_)
     with output_folder(output or described.results) as folder:
-        several = {name: (one.geometry, described.meshes()[name])
-                   for name, one in described.bodies.items()}
-        for name, (geometry, made) in (several or {
-                "": (described.geometry, described.mesh())}).items():
+        several = described.meshes() if described.bodies else {}
+        for name, made in (several or {"": described.mesh()}).items():
+            geometry = described.bodies[name].geometry if name else described.geometry
             if name:
                 echo(f"\n{name}:")
             show(mesh_table(made))
