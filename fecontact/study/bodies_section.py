@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 
+from fecontact.core.docstrings import inherit_documentation
 from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.tables import from_table, located, require_known, shown, to_table
 from fecontact.core.types import Array
@@ -18,7 +19,7 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembled_basis import assembled_basis
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.reduce_body import ends_of_bodies
+from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
     Geometry,
     geometry_from_table,
@@ -64,11 +65,16 @@ class Placement:
 class BodyBasisSettings(BasisSettings):
     """``[bodies.NAME.basis]``: as ``[basis]``, but for one of several bodies.
 
-    Places are those of the placed body. ``contact`` and ``contact_nodes`` cannot be given:
-    interfaces name the faces.
+    Places are those of the placed body.
 
     Parameters
     ----------
+    contact, contact_nodes : str, int
+        Not for several bodies, of which interfaces name the faces.
+    B, C : place, optional
+        Excitation and load point, which one body alone can have: name of a point or boundary,
+        [x, y], or a patch ``{at = name or [x, y], radius = r}``. By default the points of these
+        names of the only mesh that has them.
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Static shapes added to the vibration modes; by default those of forces at the interfaces.
     """
@@ -82,6 +88,9 @@ class BodyBasisSettings(BasisSettings):
             if getattr(self, key) != getattr(usual, key):
                 raise InputError(f"BodyBasisSettings: {key} is for a single body; name the face in "
                                  f"[interfaces.NAME] instead.")
+
+
+inherit_documentation(BodyBasisSettings)
 
 
 @dataclass(frozen=True)
@@ -334,14 +343,14 @@ def body_bases(
 ) -> dict[str, ModalBasis]:
     """Modal bases of all bodies, with the forces at their interfaces; see ``reduce_bodies``."""
     found = {}
-    ends = ends_of_bodies(bodies, {name: {"B": one.basis.B, "C": one.basis.C}
-                                   for name, one in study.bodies.items()})
+    with located(f"{title}: [bodies]:"):
+        bases = reduce_bodies(
+            bodies, list(faces.values()),
+            modes={name: one.basis.modes for name, one in study.bodies.items()},
+            each={name: one.basis.options for name, one in study.bodies.items()})
     for name, one in study.bodies.items():
-        rows = [pairing.nodes for pairing in faces.values() if pairing.body == name]
-        rows += [pairing.feet for pairing in faces.values() if pairing.other == name]
         with located(f"{title}: [bodies.{name}.basis]:"):
-            found[name] = one.basis.modal_basis(bodies[name], interface_rows=rows,
-                                                ends=ends[name])
+            found[name] = one.basis.finished(bases[name])
     return found
 
 

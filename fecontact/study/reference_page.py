@@ -66,6 +66,8 @@ def _parts() -> Iterator[tuple[str, str]]:
 def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:
     """A section, described by one of several classes, and its subsections."""
     known = tuple(classes)
+    if printed.get(known) == name:  # a key that several of the classes have
+        return
     if known in printed:
         yield name, _section(name, f"As `[{printed[known]}]`.")
         return

@@ -1,7 +1,7 @@
 """Sections of a study file that are not described by a class of another module."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
@@ -151,20 +151,20 @@ class BasisSettings:
                 raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
                                  f"go by number; choose a name with a letter.")
 
-    def modal_basis(
-        self, body: ElasticBody, rotation: Rotation | None = None,
-        interface_rows: Sequence[Any] | None = None, ends: Mapping[str, Any] | None = None,
-    ) -> ModalBasis:
-        """The modal basis of a body; with the rows of its interfaces, one of several bodies.
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of :func:`fecontact.modal_basis` that concern neither contact nor modes."""
+        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads")
+        return {name: getattr(self, name) for name in names}
 
-        ``ends`` has other places of B and C.
-        """
-        places = {"B": self.B, "C": self.C} if ends is None else ends
-        basis = modal_basis(
-            body, self.modes, contact=self.contact if interface_rows is None else (),
-            contact_nodes=self.contact_nodes, **places, points=self.points,
-            reduction=self.reduction, tolerance=self.tolerance, damping=self.damping,
-            loads=self.loads, rotation=rotation, interface_rows=interface_rows or ())
+    def modal_basis(self, body: ElasticBody, rotation: Rotation | None = None) -> ModalBasis:
+        """The modal basis of a body."""
+        return self.finished(modal_basis(
+            body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes,
+            rotation=rotation, **self.options))
+
+    def finished(self, basis: ModalBasis) -> ModalBasis:
+        """A basis with the dashpots of these settings and the modes that they select."""
         if self.dashpots:
             basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
                                          for point, values in self.dashpots.items()})
