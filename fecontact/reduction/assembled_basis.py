@@ -15,6 +15,7 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array, ArrayLike
+from fecontact.fem.pairing import Pairing
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
 
@@ -129,7 +130,7 @@ class _Contact:
 
 def assembled_basis(
     bases: Mapping[str, ModalBasis],
-    pairings: Mapping[str, Any],
+    pairings: Mapping[str, Pairing | PointPairing],
     links: Sequence[Any] = (),
 ) -> ModalBasis:
     """One basis of several bodies, for a contact system of all of them.
@@ -290,7 +291,7 @@ class _Places:
             elements=together(elements) if alike else None)
 
 
-def _contact(bases: Mapping[str, ModalBasis], pairing: Any) -> _Contact:
+def _contact(bases: Mapping[str, ModalBasis], pairing: Pairing | PointPairing) -> _Contact:
     for name in (pairing.body, pairing.other):
         if name is not None and name not in bases:
             raise InputError(f"there is no body '{name}'{nearest(str(name), bases)}; the bodies "

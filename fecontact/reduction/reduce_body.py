@@ -14,6 +14,7 @@ from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import body_elements, linear_cells, stress_of
+from fecontact.fem.pairing import Pairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
@@ -41,7 +42,7 @@ def modal_basis(
     tolerance: float = 0.1,
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
-    interface_rows: Sequence[Any] = (),
+    pairings: Any = (),
 ) -> ModalBasis:
     """Mass-normalised modes, and T at B, C and the contact nodes.
 
@@ -75,9 +76,8 @@ def modal_basis(
         under pressure and shear, further points under forces.
     rotation : Rotation, optional
         The body rotates; displacements are those in its frame, modes those at rest.
-    interface_rows : sequence of sparse (3 k, 2 N) arrays
-        Displacements x, y and rotation of further places at which forces act, such as the nodes and
-        feet of a pairing: see :func:`fecontact.reduction.reduce_bodies`.
+    pairings : sequence of sparse (3 k, 2 N) arrays
+        Nodes or feet of pairings, for forces at interfaces; see :func:`.reduce_bodies`.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def modal_basis(
     completing = loading(body, system, loads, points)
     # Forces act at B, C, the contact nodes and interfaces in x and y; there are no moments.
     at_points = sp.csr_array(restriction[np.arange(restriction.shape[0]) % 3 < 2])
-    at_interfaces = [_interface_rows(body, rows) for rows in interface_rows]
+    at_interfaces = [_interface_rows(body, rows) for rows in pairings]
     flexibility = Flexibility(system, sp.csr_array(
         sp.vstack([at_points, *at_interfaces]) @ body.expansion))
     row = np.arange(len(flexibility.rows.indptr) - 1)
@@ -163,7 +163,7 @@ def modal_basis(
 
 def reduce_bodies(
     bodies: Mapping[str, ElasticBody],
-    pairings: Sequence[Any] = (),
+    pairings: Sequence[Pairing] = (),
     *,
     modes: int | Mapping[str, int] = 20,
     each: Mapping[str, Mapping[str, Any]] | None = None,
@@ -217,7 +217,7 @@ def reduce_bodies(
         given = {"contact": (), "reduction": "residual", **options, **each.get(name, {}),
                  **ends[name]}
         with located(f"Body '{name}':"):
-            found[name] = modal_basis(body, counts[name], interface_rows=rows, **given)
+            found[name] = modal_basis(body, counts[name], pairings=rows, **given)
     return found
 
 
@@ -250,7 +250,7 @@ def _interface_rows(body: ElasticBody, given: Any) -> Any:
 
     rows = sp.csr_array(given)
     if rows.shape[1] != 2 * len(body.nodes) or rows.shape[0] % 3:
-        raise InputError(f"modal_basis: interface_rows of shape {rows.shape} must be (3 k, "
+        raise InputError(f"modal_basis: pairings of shape {rows.shape} must be (3 k, "
                          f"{2 * len(body.nodes)}), displacements x, y and rotation of k places "
                          f"from the nodes of this body; pair the faces of the same bodies.")
     return rows[np.arange(rows.shape[0]) % 3 < 2]

@@ -59,7 +59,7 @@ class Interface:
     """
 
     name: str
-    pairing: Any
+    pairing: Pairing | PointPairing
     normal: NormalLaw
     friction: FrictionLaw | None = None
     sliding: Sliding | None = None
