@@ -54,7 +54,8 @@ def _parts() -> Iterator[tuple[str, str]]:
     yield "geometry", _section("geometry", "A shape and its dimensions, or the file of a mesh.",
                                *shapes, _table(MeshFile, f"`file`: {_summary(MeshFile)}"))
     printed: dict[Any, str] = {(*SHAPES.values(), MeshFile): "geometry"}
-    for entry in fields(Study):
+    # Interfaces refer to sections of a single body.
+    for entry in sorted(fields(Study), key=lambda entry: entry.name == "interfaces"):
         name = entry.name.removesuffix("_settings")
         if name in ("geometry", "gap", "path") or not _inner(hints[entry.name]):
             continue
