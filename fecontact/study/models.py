@@ -97,10 +97,10 @@ class StudyModels:
         return dict(self._bases)
 
     @property
-    def thickness(self) -> float:
-        """Thickness of the bodies [m]; NaN if they differ."""
+    def thickness(self) -> float | None:
+        """Thickness of the body, or of all bodies [m]; None if they differ."""
         found = {one.body.thickness for one in self.bodies.values()} or {self.body.thickness}
-        return found.pop() if len(found) == 1 else float("nan")
+        return found.pop() if len(found) == 1 else None
 
     def _require_one(self, name: str, instead: str) -> None:
         if self.bodies:

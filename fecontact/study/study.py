@@ -364,10 +364,13 @@ class Study(Summarised, StudyModels):
         if (law := wanted.law_if_any) is None:
             raise InputError(f"{title}: [wear] lacks the key 'coefficient', in m^3/J for law = "
                              f"'energy' and in m^2/N for 'archard'.")
+        if (thickness := self.thickness) is None:
+            raise InputError(f"{title}: [wear] needs bodies of one thickness; give the same to all "
+                             f"in [bodies.NAME.body].")
         system = self.system()
         with located(f"{title}: [wear]:", "wear_history:"):
             return wear_history(
-                system, law, self.thickness, acceleration=wanted.acceleration,
+                system, law, thickness, acceleration=wanted.acceleration,
                 blocks=wanted.blocks, periods=wanted.periods, settling=wanted.settling,
                 period=wanted.period, initial=self.initial(), outputs=wanted.outputs,
                 solver=settings.chosen_solver(), rtol=settings.rtol, progress=progress)

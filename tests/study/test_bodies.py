@@ -72,7 +72,7 @@ def test_models_go_by_the_names_of_bodies(study):
 
 def test_a_study_is_restored_from_its_toml(study):
     for one in (study, study.with_(**{
-            "interfaces.lining.sliding": {"speed": 0.1, "direction": [3.0, 0.1]},
+            "interfaces.lining.sliding": {"speed": 0.1, "direction": [1.0, 3.0]},
             "interfaces.lining.gap": {"radius": 1.0, "centre": 0.06},
             "bodies.pad.placement.mirror": "x", "bodies.pad.placement.rotation": 180})):
         assert fc.Study.from_toml(one.to_toml()) == one
