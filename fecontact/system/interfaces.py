@@ -24,6 +24,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion, constant_speed
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembled_basis import PointPairing, assembled_basis
+from fecontact.reduction.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 
@@ -77,7 +78,7 @@ class Interface:
 
 def system_fields(
     bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-    links: Sequence[Any] | None,
+    links: Sequence[Link] | None,
 ) -> dict[str, Any]:
     """Basis, laws, gap and sliding of a contact system of several bodies.
 
