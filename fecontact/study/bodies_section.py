@@ -1,6 +1,6 @@
 """Sections of several bodies: ``[bodies.NAME]``, ``[interfaces.NAME]`` and ``[links.NAME]``."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
@@ -18,6 +18,7 @@ from fecontact.fem.pairing import Pairing, pair_faces
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembled_basis import assembled_basis
+from fecontact.reduction.links import Bushing, Hinge, Link, Spring, Weld
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
@@ -30,6 +31,8 @@ from fecontact.study.sections import BasisSettings, BodySettings
 from fecontact.system.gap import Crown
 
 Gap = float | tuple[float, ...] | Crown
+
+LINKS: Mapping[str, type] = {"spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld}
 
 # Keys of an interface on which the modal bases of its bodies depend.
 PAIRING_KEYS = ("face", "other", "nodes", "nodes_on", "reach", "overlap")
@@ -182,7 +185,7 @@ class Bodies(Protocol):
         """Where they may touch."""
 
     @property
-    def links(self) -> Mapping[str, Any]:
+    def links(self) -> Mapping[str, Link]:
         """What joins them."""
 
     @property
@@ -239,7 +242,7 @@ def check_bodies(study: Bodies, title: str) -> None:
                         f"bodies, described in [bodies.NAME]; the interfaces of a single body are "
                         f"the boundaries that [basis] names as contact.")
         if study.links:
-            raise InputError(f"{title}: [links] is for several bodies; describe them in "
+            raise InputError(f"{title} has [links], which join several bodies; describe them in "
                              f"[bodies.NAME].")
         return
     _check_names(study, title)
@@ -259,8 +262,15 @@ def check_bodies(study: Bodies, title: str) -> None:
                                  f"{ground}; the bodies are: {choices(study.bodies)}.")
             touched.add(_known_body(body, study.bodies, f"{where}: {key} = {shown(face)}"))
     for name, link in study.links.items():
-        for body in link_bodies(link):
-            touched.add(_known_body(body, study.bodies, f"{title}: [links.{name}]"))
+        for key, point in (("first", link.first), ("second", link.second)):
+            if point is None:
+                continue
+            where = f"{title}: [links.{name}]: {key} = {shown(point)}"
+            body, dot, _ = point.partition(".")
+            if not dot:
+                raise InputError(f"{where} must be \"BODY.POINT\"; the bodies are: "
+                                 f"{choices(study.bodies)}.")
+            touched.add(_known_body(body, study.bodies, where))
     loose = [name for name in study.bodies if name not in touched]
     if loose:
         raise InputError(f"{title}: no interface and no link touches the "
@@ -291,9 +301,27 @@ def _known_body(body: str, bodies: Mapping[str, Any], where: str) -> str:
     return body
 
 
-def link_bodies(link: Any) -> Iterator[str]:
-    """Names of the bodies that a link joins."""
-    yield from ()
+def links_from_tables(tables: Any, title: str) -> dict[str, Link]:
+    """All links from ``[links]``; the key ``kind`` names the class of each."""
+    if not isinstance(tables, Mapping):
+        raise InputError(f"{title}: [links] must be a table of links, [links.NAME], not "
+                         f"{shown(tables)}.")
+    found: dict[str, Link] = {}
+    for name, table in tables.items():
+        where = f"{title}: [links.{name}]"
+        kind = table.get("kind") if isinstance(table, Mapping) else None
+        if not isinstance(kind, str) or kind not in LINKS:
+            raise InputError(f"{where}: kind = {shown(kind)} must be one of {choices(LINKS)}"
+                             f"{nearest(str(kind), LINKS)}.")
+        found[name] = from_table(LINKS[kind], {key: value for key, value in table.items()
+                                               if key != "kind"}, where)
+    return found
+
+
+def link_table(link: Link, *, defaults: bool = True) -> dict[str, Any]:
+    """Table of a link; the inverse of :func:`links_from_tables`."""
+    kind = {cls: name for name, cls in LINKS.items()}[type(link)]
+    return {"kind": kind, **to_table(link, defaults=defaults)}
 
 
 def body_meshes(study: Bodies, title: str) -> dict[str, Mesh]:
@@ -345,7 +373,7 @@ def body_bases(
     found = {}
     with located(f"{title}: [bodies]:"):
         bases = reduce_bodies(
-            bodies, list(faces.values()),
+            bodies, list(faces.values()), list(study.links.values()),
             modes={name: one.basis.modes for name, one in study.bodies.items()},
             each={name: one.basis.options for name, one in study.bodies.items()})
     for name, one in study.bodies.items():
@@ -355,7 +383,7 @@ def body_bases(
 
 
 def reduced_bodies(
-    bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing], links: Mapping[str, Any],
+    bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing], links: Mapping[str, Link],
     title: str,
 ) -> Reduced:
     """The assembled basis, and the gaps of the geometry."""

@@ -10,6 +10,7 @@ from fecontact.core.tables import located
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing
+from fecontact.reduction.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import (
     BodySections,
@@ -34,8 +35,8 @@ _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
         name: (one.geometry, one.placement, one.body) for name, one in study.bodies.items()},
     "_pairings": lambda study: (_MADE_FROM["_bodies"](study), {
         name: one.pairing_keys for name, one in study.interfaces.items()}),
-    "_bases": lambda study: (study.bodies, _MADE_FROM["_pairings"](study)),
-    "_reduced": lambda study: (study.geometry, study.body, study.basis, study.links,
+    "_bases": lambda study: (study.bodies, study.links, _MADE_FROM["_pairings"](study)),
+    "_reduced": lambda study: (study.geometry, study.body, study.basis,
                                _MADE_FROM["_bases"](study)),
 }
 
@@ -48,7 +49,7 @@ class StudyModels:
     basis: BasisSettings
     bodies: Mapping[str, BodySections]
     interfaces: Mapping[str, InterfaceSettings]
-    links: Mapping[str, Any]
+    links: Mapping[str, Link]
     path: Path | None
 
     @property

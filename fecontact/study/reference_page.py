@@ -10,6 +10,7 @@ from fecontact.core.docstrings import documented, summary
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import described
 from fecontact.laws.registry import is_kind, law_names
+from fecontact.study.bodies_section import LINKS
 from fecontact.study.geometry_section import SHAPES, MeshFile
 from fecontact.study.study import Study
 from fecontact.system.gap import Crown
@@ -57,11 +58,14 @@ def _parts() -> Iterator[tuple[str, str]]:
     # Interfaces refer to sections of a single body.
     for entry in sorted(fields(Study), key=lambda entry: entry.name == "interfaces"):
         name = entry.name.removesuffix("_settings")
-        if name in ("geometry", "gap", "path") or not _inner(hints[entry.name]):
+        if name in ("geometry", "gap", "path", "links"):
             continue
-        if name in ("bodies", "interfaces", "links"):
+        if name in ("bodies", "interfaces"):
             name = f"{name}.NAME"
         yield from _sections(name, _inner(hints[entry.name]), printed)
+    kinds = [_table(cls, f'`kind = "{name}"`: {_summary(cls)}') for name, cls in LINKS.items()]
+    yield "links.NAME", _section("links.NAME", "What joins bodies at points and does not open.",
+                                 *kinds)
 
 
 def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:

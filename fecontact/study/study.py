@@ -29,6 +29,7 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES, with_folder
+from fecontact.reduction.links import Link
 from fecontact.study.assembly import contact_system
 from fecontact.study.bodies_section import (
     BodySections,
@@ -36,6 +37,8 @@ from fecontact.study.bodies_section import (
     InterfaceSettings,
     bodies_from_tables,
     check_bodies,
+    link_table,
+    links_from_tables,
 )
 from fecontact.study.geometry_section import Geometry, geometry_from_table, geometry_table
 from fecontact.study.models import StudyModels
@@ -102,8 +105,8 @@ class Study(Summarised, StudyModels):
     bodies : mapping of name to BodySections
         ``[bodies.NAME.geometry]``, ...: several bodies, in place of ``[geometry]``, ``[body]`` and
         ``[basis]``.
-    links : mapping of name to link
-        ``[links.NAME]``: what joins bodies and does not open.
+    links : mapping of name to Spring, Bushing, Hinge or Weld
+        ``[links.NAME]``: what joins bodies at points and does not open; ``kind = "weld"``.
     path : Path or None
         The study file; paths of other files are relative to it.
     """
@@ -126,7 +129,7 @@ class Study(Summarised, StudyModels):
     preload: PreloadSettings | None = None
     sweep: SweepSettings | None = None
     bodies: Mapping[str, BodySections] = field(default_factory=dict)
-    links: Mapping[str, Any] = field(default_factory=dict)
+    links: Mapping[str, Link] = field(default_factory=dict)
     path: Path | None = field(default=None, compare=False)
 
     def summary(self) -> list[tuple[str, str]]:
@@ -205,13 +208,11 @@ class Study(Summarised, StudyModels):
             raise InputError(f"{title} lacks the section [geometry]; give a shape and its "
                              f"dimensions, or the file of a mesh. For several bodies, give "
                              f"[bodies.NAME.geometry] to each.")
-        if tables.get("links") and "bodies" not in tables:
-            raise InputError(f"{title} has [links], which join several bodies; describe them in "
-                             f"[bodies.NAME].")
         study = cls(
             geometry_from_table(tables["geometry"], f"{title}: [geometry]")
             if "bodies" not in tables else None,
             bodies=bodies_from_tables(tables["bodies"], title) if "bodies" in tables else {},
+            links=links_from_tables(tables.get("links", {}), title),
             gap=_gap(tables.get("gap", 0.0), title),
             interfaces=convert(tables.get("interfaces", {}), Mapping[str, InterfaceSettings], title,
                                "interfaces"),
@@ -254,6 +255,9 @@ class Study(Summarised, StudyModels):
                             for name, one in self.bodies.items()}}
         if self.geometry is not None:
             first = {"geometry": geometry_table(self.geometry, defaults=defaults)}
+        if self.links:
+            first["links"] = {name: link_table(one, defaults=defaults)
+                              for name, one in self.links.items()}
         full = defaults and bool(self.bodies)
         interfaces = {"interfaces": {name: to_table(one, defaults=full) for name, one in
                                      self.interfaces.items()}} if self.interfaces else {}

@@ -11,7 +11,7 @@ from fecontact.cli import execute
 from fecontact.cli.templates import template
 from fecontact.fem.pairing import pair_faces
 from fecontact.laws import ConstantFriction, RoughSurface
-from fecontact.reduction import reduce_bodies
+from fecontact.reduction import Spring, reduce_bodies
 from fecontact.sweeps.case import of_basis
 
 SHORT = {"simulation.t_end": 2e-3, "simulation.outputs": 11, "output.frames": 2}
@@ -22,7 +22,7 @@ def study():
     return fc.Study.from_toml(template("pad")).with_(**SHORT)
 
 
-def in_python():
+def in_python(points=None, links=()):
     """The system of the template, written out in Python."""
     block = fc.ElasticBody(
         fc.generate(fc.Block(width=0.12, height=0.04, element_size=0.01)),
@@ -32,12 +32,14 @@ def in_python():
         fc.Material(5e9, 0.25, 2500.0), thickness=0.05)
     bodies = {"block": block, "pad": pad}
     pairing = pair_faces(bodies, "pad.contact", "block.top", nodes=6)
-    bases = reduce_bodies(bodies, [pairing], modes=4, each={
-        "block": {"damping": 0.02}, "pad": {"damping": 0.05, "B": "left", "C": "top"}})
+    bases = reduce_bodies(bodies, [pairing], links, modes=4, each={
+        "block": {"damping": 0.02}, "pad": {"damping": 0.05, "B": "left", "C": "top",
+                                                "points": points or {}}})
     return fc.ContactSystem(
         bodies=bases,
         interfaces=[fc.Interface("lining", pairing, RoughSurface(20e6, 10e-6, 200.0),
                                  ConstantFriction(0.4, smoothing_slope=1e4))],
+        links=links or None,
         drive=fc.Drive(stiffness_x=2e5, damping_x=20.0, amplitude_x=1e-3, angular_frequency=62.8),
         load=fc.Load(normal=200.0))
 
@@ -100,6 +102,53 @@ def test_changes_reuse_what_does_not_depend_on_them(study):
     open_gap = study.with_(**{"interfaces.lining.gap": 1e-5})
     assert open_gap.reduced is study.reduced
     assert np.asarray(open_gap.system().gap) == pytest.approx(np.full(6, 1e-5), rel=1e-6)
+
+
+def test_one_of_several_bodies_on_the_ground_runs_as_a_single_one():
+    single = fc.Study.from_toml(template("block")).with_(**{"simulation.t_end": 0.05,
+                                                            "simulation.outputs": 51})
+    tables = single.tables(defaults=False)
+    basis = tables.pop("basis")
+    nodes = basis.pop("contact_nodes")
+    tables["bodies"] = {"block": {"geometry": tables.pop("geometry"), "body": tables.pop("body"),
+                                  "basis": {**basis, "reduction": "vibration"}}}
+    tables["interfaces"] = {"belt": {"face": "block.contact", "nodes": nodes}}
+    one, other = single.run(), fc.Study.from_tables(tables).run()
+    assert np.abs(one.friction_force).max() > 1.0
+    for name in ("normal_force", "friction_force"):
+        assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-4, abs=1e-4), name
+    assert other.modal_coordinates == pytest.approx(one.modal_coordinates, rel=1e-5, abs=1e-9)
+
+
+def test_links_join_points_of_bodies(study):
+    bolt = {"kind": "spring", "first": "pad.P", "direction": [0.0, 1.0], "stiffness": 1e4,
+            "preload": 30.0}
+    linked = study.with_(**{"bodies.pad.basis.points": {"P": [0.06, 0.06]}, "links.bolt": bolt})
+    system = in_python({"P": (0.06, 0.06)}, [Spring("pad.P", direction=(0.0, 1.0), stiffness=1e4,
+                                                    preload=30.0)])
+    assert (linked.system().basis.T == system.basis.T).all()
+    assert (linked.system().basis.link_load == system.basis.link_load).all()
+    assert linked.reduced.basis.link_load.any()
+    assert fc.Study.from_toml(linked.to_toml()) == linked
+    # The soft spring pulls the pad down: its preload and the load press on the block together.
+    looser = linked.with_(**{"links.bolt.preload": 0.0})
+    assert looser.pairings()["lining"] is linked.pairings()["lining"]
+    forces = [one.run().normal_force[-1].sum() for one in (linked, looser)]
+    assert forces[0] - forces[1] == pytest.approx(30.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("bolt", "message"), [
+    ({"kind": "wled", "first": "pad.B"},
+     r"\[links\.bolt\]: kind = \"wled\" must be one of .* \(did you mean 'weld'\?\)"),
+    ({"kind": "weld", "first": "pd.B"}, r"first = \"pd\.B\": there is no body 'pd'"),
+    ({"kind": "weld", "first": "B"}, r"first = \"B\" must be \"BODY\.POINT\""),
+    ({"kind": "weld", "first": "pad.Q"}, "Body 'pad': Point Q: the mesh has no point or boundary"),
+    ({"kind": "weld"}, r"\[links\.bolt\] lacks the key 'first'"),
+    ({"kind": "spring", "first": "pad.B"}, r"\[links\.bolt\]: a spring to the base needs"),
+])
+def test_bad_links_are_explained(study, bolt, message):
+    with pytest.raises(fc.FecontactError, match=message):
+        study.with_(**{"links.bolt": bolt}).system()
 
 
 def test_friction_of_all_interfaces_is_that_of_the_section(study):
@@ -209,7 +258,7 @@ def test_bad_studies_of_several_bodies_are_explained(study, changes, message):
 
 @pytest.mark.parametrize(("changes", "message"), [
     ({"interfaces.contact.face": "a.b"}, r"face = \"a\.b\" is for several bodies"),
-    ({"links.bolt": {}}, r"\[links\]"),
+    ({"links.bolt": {"kind": "weld", "first": "a.P"}}, r"has \[links\], which join several"),
 ])
 def test_sections_of_several_bodies_in_a_study_of_one(changes, message):
     with pytest.raises(fc.InputError, match=message):
