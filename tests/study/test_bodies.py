@@ -157,6 +157,70 @@ def test_friction_of_all_interfaces_is_that_of_the_section(study):
     assert fc.Study.from_tables(tables).system().parameters() == study.system().parameters()
 
 
+PARTS = """*NODE
+1,0,0
+2,100,0
+3,100,50
+4,0,50
+5,20,50
+6,80,50
+7,80,90
+8,20,90
+*ELEMENT, TYPE=CPS4, ELSET=lower
+1,1,2,3,4
+*ELEMENT, TYPE=CPS4, ELSET=upper
+2,5,6,7,8
+*NSET, NSET=table
+1,2
+*SURFACE, NAME=rim
+1,S3
+*SURFACE, NAME=lining
+2,S1
+"""
+
+
+def test_bodies_are_parts_of_one_file(tmp_path):
+    (tmp_path / "two.inp").write_text(PARTS)
+    path = tmp_path / "two.toml"
+    path.write_text("""
+[bodies.disc.geometry]
+file = "two.inp"
+part = "lower"
+scale = 1e-3
+[bodies.disc.body]
+fixed = { table = "xy" }
+[bodies.pad.geometry]
+file = "two.inp"
+part = "upper"
+scale = 1e-3
+[bodies.disc.basis]
+modes = 4
+[bodies.pad.basis]
+modes = 3
+[interfaces.shoe]
+face = "pad.lining"
+other = "disc.rim"
+[normal]
+law = "linear"
+stiffness = 1e8
+[load]
+gravity = [0.0, -9.81]
+""")
+    study = fc.Study.read(path)
+    assert {name: mesh.nodes.max(axis=0).tolist() for name, mesh in study.meshes().items()} == {
+        "disc": [0.1, 0.05], "pad": [0.08, 0.09]}
+    system = study.system()
+    rest = np.concatenate([fc.static_equilibrium(system), np.zeros(system.basis.modes)])
+    pushed = system.contact_history(np.zeros(1), rest[None])[0, :, 0].sum()
+    assert pushed == pytest.approx(0.06 * 0.04 * 1.0 * 7850.0 * 9.81, rel=0.02)
+    # Where the study is stored with a run, files stay relative to it.
+    assert fc.Study.from_toml(study.to_toml()).bodies["pad"].geometry.file == "two.inp"
+    assert execute(["mesh", str(path)]) == 0
+    with pytest.raises(fc.MeshError, match=r"\[bodies\.pad\.geometry\]: .*two\.inp: The file has "
+                                           r"no part 'uper' \(did you mean 'upper'\?\)"):
+        study.with_(**{"bodies.pad.geometry.part": "uper"}).meshes()
+
+
 @pytest.mark.parametrize(("name", "depends"), [
     ("interfaces.lining.friction.friction_coefficient", False), ("interfaces.lining.gap", False),
     ("interfaces.lining.nodes", True), ("interfaces.lining", True),
