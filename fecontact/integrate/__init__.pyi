@@ -1,6 +1,6 @@
 from .ensemble import Ensemble, strobe
 from .events import ContactEvents, Crossing, Events
-from .initial_state import initial_state
+from .initial_state import PointStart, initial_state
 from .sensitivity import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
 from .solvers import CVODE, Rodas5P, Scipy, SetValued
@@ -14,6 +14,7 @@ __all__ = [
     "Energies",
     "Ensemble",
     "Events",
+    "PointStart",
     "Rodas5P",
     "Scipy",
     "Sensitivity",

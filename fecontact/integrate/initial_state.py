@@ -1,12 +1,13 @@
 """Initial states of runs."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from fecontact.core.checks import as_floats, is_numeric
+from fecontact.core.checks import as_floats, is_numeric, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
@@ -48,8 +49,45 @@ class RigidStart:
             object.__setattr__(self, name, tuple(values.tolist()))
 
 
-Initial = TypeAliasType("Initial", Literal["rest", "sliding"] | RigidStart | Trajectory
-                        | LoadHistory | RestState | Array)
+@dataclass(frozen=True)
+class PointStart:
+    """Initial displacements and velocities of points, in physical coordinates.
+
+    Of all motions with these values the one of least mass: the smallest sum of squares of the modal
+    coordinates. All coordinates of point masses follow from those of the masses; what is not given
+    stays where least mass leaves it, for masses that no spring joins at rest.
+
+    Parameters
+    ----------
+    displacements : mapping of point to (x, y)
+        Points by name, as ``body.point`` of several bodies, or contact nodes by number [m]. None
+        for a component that is not prescribed.
+    velocities : mapping of point to (x, y)
+        Likewise [m/s].
+
+    Raises
+    ------
+    InputError
+        If values are not two numbers or None.
+    """
+
+    displacements: Mapping[str | int, tuple[float | None, float | None]] = field(
+        default_factory=dict)
+    velocities: Mapping[str | int, tuple[float | None, float | None]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("displacements", "velocities"):
+            require_kind("PointStart", Mapping, **{name: getattr(self, name)})
+            for point, given in getattr(self, name).items():
+                known = [value for value in given if value is not None] if isinstance(
+                    given, list | tuple) and len(given) == 2 else [np.nan]
+                if not is_numeric(known) or not np.isfinite(as_floats(known, name)).all():
+                    raise InputError(f"PointStart: {name} of {point!r} = {shown(given)} must be "
+                                     f"two finite numbers (x, y), or None for one of them.")
+
+
+Initial = TypeAliasType("Initial", Literal["rest", "sliding"] | RigidStart | PointStart
+                        | Trajectory | LoadHistory | RestState | Array)
 
 
 def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array:
@@ -59,9 +97,9 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     ----------
     system : ContactSystem
         The system.
-    initial : 'rest', 'sliding', RigidStart, Trajectory, LoadHistory, RestState or array
+    initial : 'rest', 'sliding', RigidStart, PointStart, Trajectory, LoadHistory, RestState or array
         Normal equilibrium where the body stands, all forces of the ground along x left to
-        friction; steady sliding; a rigid-body displacement and velocity; the end of another run;
+        friction; steady sliding; rigid motion; motion of points; the end of another run;
         rest under friction after quasi-static loading; or a state (2 m + n s,). Internal variables
         of friction with memory are zero, in steady sliding their steady values. What friction does
         not hold on waves begins to slide down their slopes:
@@ -94,6 +132,10 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
         return np.concatenate([_rigid(system.basis, initial.displacement, "displacement"),
                                _rigid(system.basis, initial.velocity, "velocity"),
                                np.zeros(system.size - 2 * m)])
+    if isinstance(initial, PointStart):
+        return np.concatenate([_of_points(system.basis, initial.displacements, "displacements"),
+                               _of_points(system.basis, initial.velocities, "velocities"),
+                               np.zeros(system.size - 2 * m)])
     if isinstance(initial, LoadHistory | RestState):
         return _rest_under_friction(system, initial, time)
     given = initial.states[-1] if isinstance(initial, Trajectory) else initial
@@ -124,6 +166,22 @@ def _rest_under_friction(
                          f"{ground.travel(time):g}, or start the run at another time.")
     q = rest.modal_coordinates
     return np.concatenate([q, np.zeros(len(q)), memory.reshape(-1)])
+
+
+def _of_points(
+    basis: ModalBasis, given: Mapping[str | int, tuple[float | None, float | None]], what: str
+) -> Array:
+    """Modal coordinates (m,) of least norm with given motions of points."""
+    found = [(basis.T[basis.point_index(point), axis], value) for point, values in given.items()
+             for axis, value in enumerate(values) if value is not None]
+    if not found:
+        return np.zeros(basis.modes)
+    rows, values = np.array([row for row, _ in found]), np.array([value for _, value in found])
+    q = np.asarray(np.linalg.lstsq(rows, values, rcond=None)[0])
+    if np.abs(rows @ q - values).max() > 1e-9 * np.abs(values).max():
+        raise InputError(f"PointStart: {what} = {shown(dict(given))} are not a motion that the "
+                         f"modes can make; leave out what they hold, or keep more modes.")
+    return q
 
 
 def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> Array:

@@ -4,6 +4,7 @@ from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
 from .links import Bushing, Hinge, Spring, Weld, linked
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
+from .point_masses import point_masses
 from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
@@ -25,6 +26,7 @@ __all__ = [
     "linked",
     "mode_convergence",
     "normalisation",
+    "point_masses",
     "reduce_bodies",
     "rows_from_dofs",
 ]

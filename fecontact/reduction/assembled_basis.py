@@ -267,11 +267,11 @@ class _Places:
                  if (shapes := self.bases[part.name].mode_shapes) is not None]
         if not given:
             return None
-        shapes, stress = np.zeros((self.nodes, 2, self.modes)), np.zeros(
-            (self.nodes, 4, self.modes))
+        moved = np.zeros((self.nodes, 2, self.modes))
+        stress = np.zeros((self.nodes, 4, self.modes))
         for part, one in given:
             nodes = slice(part.nodes[0], sum(part.nodes))
-            shapes[nodes, :, self.columns(part.name)] = one.shapes
+            moved[nodes, :, self.columns(part.name)] = one.shapes
             stress[nodes, :, self.columns(part.name)] = one.stress
         elements = [one.cells if one.elements is None else one.elements for _, one in given]
         alike = len({array.shape[1] for array in elements}) == 1
@@ -288,7 +288,7 @@ class _Places:
 
         return ModeShapes(
             nodes=np.concatenate([one.nodes for _, one in given]), cells=together(cells),
-            outline=together([one.outline for _, one in given]), shapes=shapes, stress=stress,
+            outline=together([one.outline for _, one in given]), shapes=moved, stress=stress,
             restriction=sp.csr_array(sp.vstack(list(restriction))),
             elements=together(elements) if alike else None)
 
@@ -308,7 +308,7 @@ def _contact(bases: Mapping[str, ModalBasis], pairing: Pairing | PointPairing) -
         places = pairing.places
         side = _faces(bases[body], body, pairing.nodes)
         feet = None if other is None else _faces(bases[other], other, pairing.feet)
-    return _Contact(places, pairing.normals, pairing.tributary, side, feet)
+    return _Contact(places, np.asarray(pairing.normals), np.asarray(pairing.tributary), side, feet)
 
 
 def _points(basis: ModalBasis, name: str, points: Any) -> _Side:

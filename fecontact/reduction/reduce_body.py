@@ -54,8 +54,7 @@ def modal_basis(
     modes : int
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground, its outward normal pointing to -y; each of several is an
-        interface of its name. None, ``()``, for a body that touches others only.
+        Boundary that touches the ground, facing -y; each of several is an interface. Or none, ().
     contact_nodes : int or 'all', or one of them for each boundary
         Number of equal segments of the boundary, each with a contact node at its centre that moves
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.
@@ -67,18 +66,17 @@ def modal_basis(
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
         See :func:`fecontact.reduction.damping.modal_damping`; the last ratio holds on.
     reduction : 'vibration', 'residual' or 'craig-bampton'
-        Vibration modes alone; vibration modes and residual vectors of forces at B, C and the
-        contact nodes, for exact static deflections there; or fixed-interface and constraint modes.
+        Vibration modes alone; with residual vectors of forces at B, C and contact nodes, for exact
+        static deflections there; or fixed-interface and constraint modes.
     tolerance : float
         For 'residual': largest fraction of its static compliance that may be missing at any of
         these points, in x or y, or for one of the loads. Zero keeps all residual vectors.
     loads : sequence of 'gravity' or place
-        Further loads whose static response is added, if not for 'vibration': 'gravity', boundaries
-        under pressure and shear, further points under forces.
+        Adds static responses, if not for 'vibration': 'gravity', loads on boundaries, at points.
     rotation : Rotation, optional
         The body rotates; displacements are those in its frame, modes those at rest.
     rows : sequence of sparse (k, 2 N) arrays
-        Further motions on which forces act, as those of pairings; see :func:`.reduce_bodies`.
+        Further motions on which forces act; see :func:`.reduce_bodies`.
 
     Raises
     ------

@@ -17,6 +17,7 @@ from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
+from fecontact.core.units import listed
 from fecontact.fem.pairing import Pairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
@@ -100,6 +101,7 @@ def system_fields(
         given[one.name] = one
     basis = assembled_basis(bodies, {name: one.pairing for name, one in given.items()},
                             links or ())
+    _require_joined(bodies, given, links or ())
     friction, gaps, first = {}, [], 0
     for name, count in basis.groups:
         one, nodes = given[name], slice(first, first + count)
@@ -118,6 +120,21 @@ def system_fields(
         "gap": np.concatenate([np.zeros(0), *gaps]),
         "sliding": {name: one.sliding for name, one in given.items() if one.sliding is not None},
     }
+
+
+def _require_joined(
+    bodies: Mapping[str, ModalBasis], interfaces: Mapping[str, Interface], links: Sequence[Link]
+) -> None:
+    """Raise InputError for a free body that neither interfaces nor links nor a drive touch."""
+    ends = [end for one in interfaces.values() for end in (one.pairing.body, one.pairing.other)]
+    ends += [(end or "").partition(".")[0] for one in links for end in (one.first, one.second)]
+    for name, basis in bodies.items():
+        if basis.rigid_modes and name not in ends and not basis.T[0].any():
+            free = np.abs(basis.T[:, :, basis.angular_frequencies == 0.0]).max(axis=(0, 2))
+            ways = [way for way, moved in zip(("x", "y", "rotation"), free, strict=True) if moved]
+            raise InputError(f"ContactSystem: body '{name}' is free in {listed(ways)}, but no "
+                             f"interface and no link touches it; join it to another body, support "
+                             f"it, or leave it out.")
 
 
 @dataclass(frozen=True, eq=False)

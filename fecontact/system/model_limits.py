@@ -1,4 +1,4 @@
-"""Limits of the model: small displacements, shallow penetration.
+"""Limits of the model: small displacements, shallow penetration, bodies that nothing holds.
 
 They reveal wrong units and unsupported loads.
 """
@@ -8,9 +8,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fecontact.core.errors import ModelWarning
+from fecontact.core.errors import ModelWarning, choices
 from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
 
@@ -97,3 +98,40 @@ def _too_deep(system: ContactSystem, times: Array, states: Array) -> str | None:
     return (f"contact node {node} is {worst * worst_height:.2g} m deep in the ground, "
             f"{worst:.2g} times its roughness height of {worst_height:.2g} m; above {DEEPEST:g} "
             f"times the asperities are crushed, so check load, stiffness and units.")
+
+
+def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
+    """What moves along modal coordinates (m,), and how: 'the body', 'a rotation'."""
+    if not basis.parts:
+        x, y, turn = np.abs(basis.contact_T @ direction).max(axis=0)
+        size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
+        named = _named(x, y, turn * size)
+        return "the body", {"x": "a translation along the ground (x)", "y":
+                            "a translation away from the ground (y)"}.get(named, named)
+    found = {}
+    for part in basis.parts:
+        first, count = part.nodes
+        if count and basis.mode_shapes is not None:
+            moved, turn = basis.mode_shapes.shapes[first : first + count] @ direction, 0.0
+        else:
+            points = [basis.point_index(name) for name in basis.extra
+                      if name.startswith(f"{part.name}.")]
+            rows = basis.T[points] @ direction
+            moved, turn = rows[:, :2], float(np.abs(rows[:, 2]).max(initial=0.0))
+        if not len(moved):
+            continue
+        x, y = np.abs(moved.mean(axis=0))
+        # In a rotation displacements differ between the places, or there are none.
+        apart = float(np.ptp(moved, axis=0).max())
+        found[part.name] = (x, y, turn if turn > 1e9 * np.abs(moved).max() else apart)
+    largest = max(max(motion) for motion in found.values())
+    who = [name for name, motion in found.items() if max(motion) > 0.01 * largest]
+    named = _named(*found[max(who, key=lambda name: max(found[name]))])
+    bodies = f"body '{who[0]}'" if len(who) == 1 else f"the bodies {choices(who)}"
+    return bodies, {"x": "a translation in x", "y": "a translation in y"}.get(named, named)
+
+
+def _named(x: float, y: float, turn: float) -> str:
+    if turn > 0.1 * max(x, y):
+        return "a rotation"
+    return "x" if x > 10.0 * y else "y" if y > 10.0 * x else "a translation"

@@ -13,7 +13,7 @@ from fecontact.laws.signatures import friction_law, signal
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.jacobian import jacobian
-from fecontact.system.model_limits import limits_exceeded, warn_of_limits
+from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
 from fecontact.system.steady_memory import settled
 
 # Largest out-of-balance fraction of the load, regardless of the rounding of other forces.
@@ -419,23 +419,11 @@ def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
     kind = "steady sliding" if friction else "static equilibrium"
     direction = problem.loose(problem.guess(1.0))
     if direction is not None:
-        return (f"There is no {kind}: nothing holds the body against "
-                f"{_named(system, direction)}; give it a spring at B (drive.stiffness_x, "
-                f"drive.stiffness_y) or a support.")
+        body, motion = named_motion(system.basis, direction)
+        remedy = ("a spring at B (drive.stiffness_x, drive.stiffness_y) or a support"
+                  if not system.basis.parts else "a support, an interface or a link")
+        return f"There is no {kind}: nothing holds {body} against {motion}; give it {remedy}."
     load = system.load
     more = " and the further loads" if load != Load(load.normal) else ""
     return (f"There is no {kind}: under load.normal = {load.normal:g} N{more} the body lifts off "
             f"or tips over; check the sign and place of the load, and the length of the contact.")
-
-
-def _named(system: ContactSystem, direction: Array) -> str:
-    basis = system.basis
-    x, y, turn = np.abs(basis.contact_T @ direction).max(axis=0)
-    size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
-    if turn * size > 0.1 * max(x, y):
-        return "a rotation"
-    if x > 10.0 * y:
-        return "a translation along the ground (x)"
-    if y > 10.0 * x:
-        return "a translation away from the ground (y)"
-    return "a translation"

@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 
 from fecontact import (
+    AnalysisError,
     ContactSystem,
     Ground,
     InputError,
     Interface,
+    Load,
     basis_from_matrices,
     read_case,
     simulate,
+    static_equilibrium,
     write_case,
 )
-from fecontact.integrate import SetValued
+from fecontact.integrate import PointStart, SetValued, initial_state
 from fecontact.laws import (
     ConstantFriction,
     HarmonicSpeed,
@@ -24,17 +27,14 @@ from fecontact.laws import (
     SlidingTranslation,
     SpeedRamp,
 )
-from fecontact.reduction import PointPairing
+from fecontact.reduction import PointPairing, point_masses
 
 NO_FRICTION = ConstantFriction(0.0)
 
 
-def mass(m, **points):
-    """A free mass with x and y, a contact node and named points at its place."""
-    rows = np.eye(3, 2)
-    return basis_from_matrices(m * np.eye(2), np.zeros((2, 2)),
-                               {"p": rows, **dict.fromkeys(points, rows)},
-                               translations=np.eye(2))
+def mass(m):
+    """A free mass with x and y, at its point p."""
+    return point_masses({"p": m}, components="xy")
 
 
 def column(upwards, damping=0.02):
@@ -61,20 +61,10 @@ def velocities(run, point):
     return run.modal_velocities @ basis.T[basis.point_index(point), 1]
 
 
-def started(system, **speeds):
-    """State of given velocities in y of masses with x and y."""
-    basis = system.basis
-    rows = np.array([basis.T[basis.point_index(f"{name}.p"), 1] for name in speeds])
-    state = np.zeros(system.size)
-    state[basis.modes : 2 * basis.modes] = np.linalg.lstsq(rows, np.array(list(speeds.values())),
-                                                           rcond=None)[0]
-    return state
-
-
 @pytest.mark.parametrize("solver", [None, SetValued(scheme="stepping")])
 def test_two_masses_with_a_hertz_spring_exchange_velocities(solver):
     system = collision(mass(1.0), mass(2.0), PowerContact(1e9))
-    run = simulate(system, 5e-3, initial=started(system, a=-1.0), rtol=1e-9,
+    run = simulate(system, 5e-3, initial=PointStart(velocities={"a.p": (0.0, -1.0)}), rtol=1e-9,
                    **({} if solver is None else {"solver": solver}))
     assert velocities(run, "a.p")[-1] == pytest.approx(1.0 / 3.0, rel=1e-6)
     assert velocities(run, "b.p")[-1] == pytest.approx(-2.0 / 3.0, rel=1e-6)
@@ -84,7 +74,7 @@ def test_two_masses_with_a_hertz_spring_exchange_velocities(solver):
 
 def test_rigid_stop_between_two_masses_has_the_restitution_asked_for():
     system = collision(mass(1.0), mass(2.0), LinearContact(1e6))
-    run = simulate(system, 5e-3, initial=started(system, a=-1.0),
+    run = simulate(system, 5e-3, initial=PointStart(velocities={"a.p": (0.0, -1.0)}),
                    solver=SetValued(restitution=0.5))
     # v_a' = v_a - (1 + e) m_b / (m_a + m_b) (v_a - v_b)
     assert velocities(run, "a.p")[-1] == pytest.approx(0.0, abs=1e-12)
@@ -104,9 +94,7 @@ def test_mirror_contact_is_that_of_one_body_on_a_rigid_plane(solver):
         bodies={"up": column(True)},
         interfaces=[Interface("plane", PointPairing("up", ["left", "right"], gaps=1e-4), twice)])
     w = alone.basis.modes
-    start = np.zeros(alone.size)
-    start[w:] = np.linalg.solve(np.array(
-        [alone.basis.T[alone.basis.point_index("up.top"), 1], *np.eye(4)[1:]]), [-0.5, 0, 0, 0])
+    start = initial_state(alone, PointStart(velocities={"up.top": (0.0, -0.5)}), 0.0)
     both = np.concatenate([start[:w], start[:w], start[w:], start[w:]])
     run = simulate(alone, 0.02, initial=start, rtol=1e-10, **options)
     two = simulate(pair, 0.02, initial=both, rtol=1e-10, **options)
@@ -230,11 +218,12 @@ def test_case_files_hold_several_bodies(tmp_path):
 
 def test_bad_input_is_named():
     a, b, law = mass(1.0), mass(2.0), LinearContact(1e5)
+    held = basis_from_matrices(np.eye(1), np.eye(1), {"p": np.eye(3, 1)})
     pairing = PointPairing("a", "p", "b", "p")
     touch = Interface("touch", pairing, law, NO_FRICTION)
     for message, arguments in (
         ("two interfaces have the name 'touch'", {"interfaces": [touch, touch]}),
-        ("there are no contact nodes", {"interfaces": []}),
+        ("there are no contact nodes", {"bodies": {"held": held}, "interfaces": []}),
         ("Interface 'touch' lacks friction", {"interfaces": [Interface("touch", pairing, law)]}),
         ("no body 'c'; the bodies are 'a', 'b'",
          {"interfaces": [Interface("touch", PointPairing("c", "p", "b", "p"), law)]}),
@@ -251,3 +240,17 @@ def test_bad_input_is_named():
             Interface("wall", PointPairing("a", "p", normals=(1, 0)), law, NO_FRICTION)])
     with pytest.raises(InputError, match="no contact nodes"):
         ContactSystem(a, law)
+
+
+def test_bodies_that_nothing_holds_are_named():
+    law, a, b = LinearContact(1e5), mass(1.0), mass(2.0)
+    touch = Interface("touch", PointPairing("a", "p"), law, NO_FRICTION)
+    with pytest.raises(InputError, match="body 'b' is free in x, y, but no interface"):
+        ContactSystem(bodies={"a": a, "b": b}, interfaces=[touch])
+    up = ContactSystem(bodies={"a": a}, interfaces=[touch], load=Load(gravity=(1.0, -9.81)))
+    with pytest.raises(AnalysisError, match="nothing holds body 'a' against a translation in x"):
+        static_equilibrium(up)
+    both = ContactSystem(bodies={"a": a, "b": b}, load=Load(gravity=(0.0, -9.81)), interfaces=[
+        Interface("touch", PointPairing("a", "p", "b", "p"), law, NO_FRICTION)])
+    with pytest.raises(AnalysisError, match="the bodies 'a', 'b' against a translation in y"):
+        static_equilibrium(both)

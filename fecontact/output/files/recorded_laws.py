@@ -78,7 +78,7 @@ class RecordedSystem(ContactSystem):
     states: int = 0
     needs: str = ""
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
 
     @property
