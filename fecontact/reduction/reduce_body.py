@@ -35,8 +35,8 @@ def modal_basis(
     *,
     contact: str | Sequence[str] = "contact",
     contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]] = "all",
-    B: Place | Literal[False] | None = None,
-    C: Place | Literal[False] | None = None,
+    B: Place | None = None,
+    C: Place | None = None,
     points: Mapping[str, Place] | None = None,
     damping: Damping = 0.0,
     reduction: Reduction = "vibration",
@@ -60,7 +60,7 @@ def modal_basis(
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, (x, y), or a
-        :class:`~fecontact.Patch`; False for none. Default: the mesh's point of that name, if any.
+        :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.
     points : mapping of name to place, optional
         Further points to observe.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
@@ -237,12 +237,16 @@ def ends_of_bodies(
     found: dict[str, dict[str, Any]] = {name: {} for name in bodies}
     for end in ("B", "C"):
         places = {name: given.get(name, {}).get(end) for name in bodies}
-        free = not any(place is not None and place is not False for place in places.values())
+        free = not any(place is not None and not _nowhere(place) for place in places.values())
         having = [name for name, body in bodies.items()
                   if places[name] is None and _has(body, end)]
         for name, place in places.items():
-            found[name][end] = place if place is not None or (free and having == [name]) else False
+            found[name][end] = place if place is not None or (free and having == [name]) else ""
     return found
+
+
+def _nowhere(place: Place) -> bool:
+    return isinstance(place, str) and not place
 
 
 def _has(body: ElasticBody, name: str) -> bool:
@@ -335,12 +339,12 @@ def loading(
     return forces[:, _deforms(system, forces)] if forces.shape[1] else forces
 
 
-def _point(body: ElasticBody, place: Place | Literal[False] | None, name: str) -> Rows:
+def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
     import scipy.sparse as sp
 
     if place is None and _has(body, name):
         return place_rows(body, name, name)
-    if place is None or place is False:
+    if place is None or _nowhere(place):
         return Rows(sp.csr_array((3, 2 * len(body.nodes))), np.zeros(2))
     return place_rows(body, place, name)
 

@@ -164,7 +164,7 @@ class InterfaceSettings:
     nodes_on: Literal["finer", "face"] = "finer"
     reach: Annotated[float | None, Unit("m")] = None
     overlap: float = 0.01
-    gap: Gap = 0.0
+    gap: Annotated[Gap, Unit("m")] = 0.0
     sliding: SlidingTranslation | SlidingRotation | None = None
 
     @property

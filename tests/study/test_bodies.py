@@ -11,7 +11,7 @@ from fecontact.cli import execute
 from fecontact.cli.templates import template
 from fecontact.fem.pairing import pair_faces
 from fecontact.laws import ConstantFriction, RoughSurface
-from fecontact.reduction import Spring, reduce_bodies
+from fecontact.reduction import Spring, assembled_basis, reduce_bodies
 from fecontact.sweeps.case import of_basis
 
 SHORT = {"simulation.t_end": 2e-3, "simulation.outputs": 11, "output.frames": 2}
@@ -327,3 +327,22 @@ def test_bad_studies_of_several_bodies_are_explained(study, changes, message):
 def test_sections_of_several_bodies_in_a_study_of_one(changes, message):
     with pytest.raises(fc.InputError, match=message):
         fc.Study.from_toml(template("block")).with_(**changes)
+
+
+def test_load_and_drive_points_are_those_of_one_body():
+    mesh = fc.generate(fc.Block(width=0.1, height=0.05, element_size=0.025))
+    bodies = {"a": fc.ElasticBody(mesh), "b": fc.ElasticBody(mesh.placed((0.0, 0.05)))}
+    face = pair_faces(bodies, "b.contact", "a.top")
+
+    def points(**each):
+        basis = assembled_basis(reduce_bodies(bodies, [face], modes=3, each=each), {"i": face})
+        return [bool(basis.T[k].any()) for k in (0, 1)], basis.extra, basis.positions[0].tolist()
+
+    # Both meshes have points B and C, so that neither counts unless it is asked for.
+    assert points()[:2] == ([False, False], ())
+    assert points(b={"B": "B"})[:2] == ([True, False], ("b.B",))
+    assert points(b={"B": "B"})[2] == [0.0, 0.075]
+    assert points(a={"C": "top"}, b={"B": "left"})[:2] == ([True, True], ("a.C", "b.B"))
+    alone = fc.modal_basis(bodies["a"], 3, B="", C="top")
+    assert not alone.T[0].any()
+    assert alone.T[1].any()
