@@ -181,6 +181,9 @@ def convergence_of(study: "Study") -> "ModeConvergence":
     """Convergence of frequencies and contact compliance with mesh refinement and modes."""
     from fecontact.reduction.convergence import mode_convergence
 
+    if study.bodies:
+        raise InputError("--converge is for a single body; refine the meshes of several bodies by "
+                         "element_size and compare their modes.")
     settings = replace(study.basis, select=None)
     body = study.elastic_body()
     return mode_convergence(

@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
-from fecontact.core.errors import MeshError, choices, nearest
+from fecontact.core.errors import InputError, MeshError, choices, nearest
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
 
@@ -153,6 +154,40 @@ class Mesh(Summarised):
         return Mesh(np.concatenate(nodes), cells,
                     {name: halves(group) for name, group in self.boundaries.items()}, self.points)
 
+    def placed(
+        self,
+        shift: tuple[float, float] = (0.0, 0.0),
+        rotation: float = 0.0,
+        mirror: Literal["x", "y"] | None = None,
+    ) -> "Mesh":
+        """The mesh mirrored, then turned about the origin, then shifted, with all named groups.
+
+        Parameters
+        ----------
+        shift : (float, float)
+            Displacement along x and y [m].
+        rotation : float
+            Angle [degrees], counter-clockwise; multiples of 90 are exact.
+        mirror : 'x' or 'y', optional
+            The coordinate that changes its sign; cells stay counter-clockwise.
+
+        Raises
+        ------
+        InputError
+            For an unknown mirror, or a shift or rotation that is not finite.
+        """
+        if mirror not in (None, "x", "y"):
+            raise InputError(f"Mesh: mirror = {mirror!r} must be 'x' or 'y', the coordinate that "
+                             f"changes its sign.")
+        by, angle = as_floats(shift, "Mesh: shift"), as_floats(rotation, "Mesh: rotation")
+        if by.shape != (2,) or not np.isfinite(by).all():
+            raise InputError(f"Mesh: shift = {shift!r} must be two finite numbers in m.")
+        if angle.shape or not np.isfinite(angle):
+            raise InputError(f"Mesh: rotation = {rotation!r} must be a finite angle in degrees.")
+        signs = [-1.0 if mirror == axis else 1.0 for axis in ("x", "y")]
+        turned = self.nodes * signs @ _turn(float(angle)).T + by
+        return Mesh(turned, self.cells, self.boundaries, self.points)
+
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""
         x, y = self.nodes.T
@@ -183,6 +218,15 @@ class Mesh(Summarised):
                 f"its boundaries are: {choices(self.boundaries)}."
             )
         return self.boundaries[name]
+
+
+def _turn(degrees: float) -> Array:
+    """Matrix (2, 2) of a rotation, without rounding at multiples of 90 degrees."""
+    quarters, rest = divmod(degrees, 90.0)
+    c, s = np.cos(np.radians(rest)), np.sin(np.radians(rest))
+    for _ in range(int(quarters % 4.0)):
+        c, s = -s, c
+    return np.array([[c, -s], [s, c]])
 
 
 def _edges(name: str, edges: ArrayLike) -> Integers:

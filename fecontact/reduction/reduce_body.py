@@ -60,7 +60,7 @@ def modal_basis(
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, (x, y), or a
-        :class:`~fecontact.Patch`. Default: the mesh's point of that name, else zero rows.
+        :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.
     points : mapping of name to place, optional
         Further points to observe.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
@@ -172,7 +172,8 @@ def reduce_bodies(
     """Modal bases of several bodies that can carry the forces between them.
 
     By default modes with residual vectors of forces at the nodes and feet of the pairings, and of
-    forces and moments at the points of the links.
+    forces and moments at the points of the links. B and C are those that ``each`` gives to one
+    body, or of the one mesh that has points of that name.
 
     Parameters
     ----------
@@ -210,18 +211,46 @@ def reduce_bodies(
                                  f"{nearest(str(name), bodies)}; the bodies are "
                                  f"{choices(bodies)}.")
     found = {}
+    ends = ends_of_bodies(bodies, {name: {**options, **each.get(name, {})} for name in bodies})
     for name, body in bodies.items():
         if name not in counts:
             raise InputError(f"reduce_bodies: modes lacks the body '{name}'.")
         rows = [one.nodes for one in pairings if one.body == name]
         rows += [one.feet for one in pairings if one.other == name]
         given: dict[str, Any] = {"contact": (), "reduction": "residual", **options,
-                                 **each.get(name, {})}
+                                 **each.get(name, {}), **ends[name]}
         with located(f"Body '{name}':"):
             given["points"], joints = _joints(name, body, given, links)
             rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + joints
             found[name] = modal_basis(body, counts[name], rows=rows, **given)
     return found
+
+
+def ends_of_bodies(
+    bodies: Mapping[str, ElasticBody], given: Mapping[str, Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """Places of B and C of each of several bodies, of which one alone can have them.
+
+    What the options ``given`` of a body name goes before the points of meshes, which count only if
+    one mesh alone has them: generated shapes all have B and C.
+    """
+    found: dict[str, dict[str, Any]] = {name: {} for name in bodies}
+    for end in ("B", "C"):
+        places = {name: given.get(name, {}).get(end) for name in bodies}
+        free = not any(place is not None and not _nowhere(place) for place in places.values())
+        having = [name for name, body in bodies.items()
+                  if places[name] is None and _has(body, end)]
+        for name, place in places.items():
+            found[name][end] = place if place is not None or (free and having == [name]) else ""
+    return found
+
+
+def _nowhere(place: Place) -> bool:
+    return isinstance(place, str) and not place
+
+
+def _has(body: ElasticBody, name: str) -> bool:
+    return name in body.mesh.points or name in body.mesh.boundaries
 
 
 def _given_rows(body: ElasticBody, given: Any) -> Any:
@@ -314,9 +343,9 @@ def loading(
 def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
     import scipy.sparse as sp
 
-    if place is None:
-        if name in body.mesh.points or name in body.mesh.boundaries:
-            return place_rows(body, name, name)
+    if place is None and _has(body, name):
+        return place_rows(body, name, name)
+    if place is None or _nowhere(place):
         return Rows(sp.csr_array((3, 2 * len(body.nodes))), np.zeros(2))
     return place_rows(body, place, name)
 

@@ -6,19 +6,18 @@ from typing import Any, Protocol
 import numpy as np
 
 from fecontact.core.errors import InputError, choices, nearest
-from fecontact.core.tables import located
+from fecontact.core.tables import located, plain, shown
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.study.sections import InterfaceSettings
+from fecontact.study.bodies_section import InterfaceSettings, Reduced
 from fecontact.system.contact_system import (
     NO_FRICTION_LAW,
     NO_NORMAL_LAW,
     ContactSystem,
-    needs_friction,
 )
 from fecontact.system.gap import Crown, gap_values
 
@@ -50,23 +49,28 @@ class Described(Protocol):
 LAWS = ("normal", "friction")
 
 
-def contact_system(study: Described, basis: ModalBasis, title: str) -> ContactSystem:
+def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSystem:
     """Contact system of a study on a modal basis; ``title`` names the study in messages.
+
+    That of several bodies equals ``ContactSystem(bodies=, interfaces=, links=, ...)``.
 
     Raises
     ------
     InputError
         For laws, loads or a gap that do not fit the basis; the message names the section.
     """
+    basis, several = reduced.basis, reduced.gaps is not None
     groups = dict(basis.groups)
+    if not basis.contact_nodes:
+        raise InputError(f"{title}: there are no contact nodes; name a boundary as contact in "
+                         f"[basis], or of several bodies a face in [interfaces.NAME].")
     for name in study.interfaces:
         if name not in groups:
             raise InputError(f"{title}: [interfaces.{name}]: the basis has no interface '{name}'"
                              f"{nearest(name, groups)}; its interfaces are: {choices(groups)}.")
     if study.normal is None and len(_own(study, "normal")) < len(groups):
         raise InputError(NO_NORMAL_LAW.format(f"{title} lacks the section [normal]"))
-    if study.friction is None and len(_own(study, "friction")) < len(groups) and (
-            needs_friction(basis)):
+    if study.friction is None and _rubs(study, basis):
         raise InputError(NO_FRICTION_LAW.format(f"{title} lacks the section [friction]"))
     for section, law, count in _laws(study, groups):
         with located(f"{title}: [{section}]:", type(law).__name__):
@@ -79,16 +83,46 @@ def contact_system(study: Described, basis: ModalBasis, title: str) -> ContactSy
     for load in study.load.boundaries:
         with located(f"{title}: [load.boundaries]:"):
             basis.boundary_row(load.boundary)
-    with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
-        gap = gap_values(study.gap, basis.contact_x)
+    if several:
+        gap = _gaps(study, reduced, title)
+    else:
+        with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
+            gap = gap_values(study.gap, basis.contact_x)
     parts: dict[str, Any] = {part: getattr(study, part) for part in PART_CLASSES}
     for part in LAWS:
         own = _own(study, part)
-        if own:
+        if own or several:
             usual = parts[part] or ConstantFriction(0.0)
             parts[part] = dict.fromkeys(groups, usual) | own
+    parts["sliding"] = {name: one.sliding for name, one in study.interfaces.items()
+                        if one.sliding is not None}
     with located(f"{title}:", "ContactSystem"):
         return ContactSystem(basis, gap=gap, **parts)
+
+
+def _rubs(study: Described, basis: ModalBasis) -> bool:
+    """Whether a node of an interface without own friction law can move along its other side."""
+    own, first = _own(study, "friction"), 0
+    for name, count in basis.groups:
+        if name not in own and basis.contact_T[first : first + count, 0].any():
+            return True
+        first += count
+    return False
+
+
+def _gaps(study: Described, reduced: Reduced, title: str) -> Any:
+    """Gaps of the geometry and those added to single interfaces."""
+    if study.gap != 0.0:
+        raise InputError(f"{title}: gap = {shown(plain(study.gap))} is for a single body; give it "
+                         f"in [interfaces.NAME].")
+    gaps, first = np.array(reduced.gaps), 0
+    for name, count in reduced.basis.groups:
+        nodes = slice(first, first + count)
+        first += count
+        with located(f"{title}: [interfaces.{name}]:", "Crown"):
+            gaps[nodes] += np.asarray(gap_values(study.interfaces[name].gap,
+                                                 reduced.basis.contact_x[nodes]))
+    return gaps
 
 
 def _own(study: Described, part: str) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from fecontact.core.errors import InputError, choices, nearest, require_positive
-from fecontact.core.tables import from_table, shown, to_table
+from fecontact.core.tables import from_table, located, shown, to_table
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.shapes import Beam, Block, Pendulum
 
@@ -27,6 +27,8 @@ class MeshFile:
         Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1] [m].
     points : mapping of name to name or place
         Points to name: a group of the file, or the node nearest to [x, y] [m].
+    part : str, optional
+        One of several bodies in the file: the name of a group of its cells.
     """
 
     file: str
@@ -34,6 +36,8 @@ class MeshFile:
     boundaries: Mapping[str, str | tuple[float, float, float, float]] = field(
         default_factory=dict)
     points: Mapping[str, str | tuple[float, float]] = field(default_factory=dict)
+
+    part: str | None = None
 
     def __post_init__(self) -> None:
         require_positive("MeshFile", scale=self.scale)
@@ -43,7 +47,8 @@ class MeshFile:
         from fecontact.fem.mesh_files import read_mesh
 
         return read_mesh(folder / self.file, scale=self.scale,
-                         boundaries=self.boundaries or None, points=self.points or None)
+                         boundaries=self.boundaries or None, points=self.points or None,
+                         part=self.part)
 
 
 Geometry = Beam | Pendulum | Block | MeshFile
@@ -62,6 +67,16 @@ def geometry_from_table(table: Any, where: str) -> Geometry:
                          f"{nearest(str(shape), SHAPES)}.")
     dimensions = {key: value for key, value in table.items() if key != "shape"}
     return cast(Geometry, from_table(SHAPES[shape], dimensions, where))
+
+
+def geometry_mesh(geometry: Geometry, folder: Path, where: str) -> Mesh:
+    """The mesh of a geometry; ``folder`` is that of the study file, ``where`` begins messages."""
+    from fecontact.fem.generate import generate
+
+    with located(where, type(geometry).__name__):
+        if isinstance(geometry, MeshFile):
+            return geometry.mesh(folder)
+        return generate(geometry)
 
 
 def geometry_table(geometry: Geometry, *, defaults: bool = True) -> dict[str, Any]:

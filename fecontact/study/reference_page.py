@@ -10,6 +10,7 @@ from fecontact.core.docstrings import documented, summary
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import described
 from fecontact.laws.registry import is_kind, law_names
+from fecontact.study.bodies_section import LINKS
 from fecontact.study.geometry_section import SHAPES, MeshFile
 from fecontact.study.study import Study
 from fecontact.system.gap import Crown
@@ -53,19 +54,25 @@ def _parts() -> Iterator[tuple[str, str]]:
     shapes = [_table(cls, f'`shape = "{name}"`: {_summary(cls)}') for name, cls in SHAPES.items()]
     yield "geometry", _section("geometry", "A shape and its dimensions, or the file of a mesh.",
                                *shapes, _table(MeshFile, f"`file`: {_summary(MeshFile)}"))
-    printed: dict[Any, str] = {}
-    for entry in fields(Study):
+    printed: dict[Any, str] = {(*SHAPES.values(), MeshFile): "geometry"}
+    # Interfaces refer to sections of a single body.
+    for entry in sorted(fields(Study), key=lambda entry: entry.name == "interfaces"):
         name = entry.name.removesuffix("_settings")
-        if name in ("geometry", "gap", "path"):
+        if name in ("geometry", "gap", "path", "links"):
             continue
-        if name == "interfaces":
-            name = "interfaces.NAME"
+        if name in ("bodies", "interfaces"):
+            name = f"{name}.NAME"
         yield from _sections(name, _inner(hints[entry.name]), printed)
+    kinds = [_table(cls, f'`kind = "{name}"`: {_summary(cls)}') for name, cls in LINKS.items()]
+    yield "links.NAME", _section("links.NAME", "What joins bodies at points and does not open.",
+                                 *kinds)
 
 
 def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:
     """A section, described by one of several classes, and its subsections."""
     known = tuple(classes)
+    if printed.get(known) == name:  # a key that several of the classes have
+        return
     if known in printed:
         yield name, _section(name, f"As `[{printed[known]}]`.")
         return
@@ -125,6 +132,8 @@ def _default(entry: Any) -> str:
         return ""
     if value is None:
         return "none"
+    if is_dataclass(value):
+        return "`{}`"
     if isinstance(value, float):
         return f"`{value:g}`"
     return f"`{json.dumps(list(value) if isinstance(value, tuple) else value)}`"

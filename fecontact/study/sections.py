@@ -21,7 +21,6 @@ from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import RigidStart
 from fecontact.integrate.solvers import Solver, solver_by_name
-from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
@@ -89,21 +88,6 @@ class BodySettings:
 
 
 @dataclass(frozen=True)
-class InterfaceSettings:
-    """``[interfaces.NAME]``: laws of the interface NAME.
-
-    Parameters
-    ----------
-    normal, friction : law, optional
-        ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``; total values refer to the
-        face of the interface.
-    """
-
-    normal: NormalLaw | None = None
-    friction: FrictionLaw | None = None
-
-
-@dataclass(frozen=True)
 class BasisSettings:
     """``[basis]``: modes and points; see
     :func:`fecontact.modal_basis`.
@@ -167,12 +151,20 @@ class BasisSettings:
                 raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
                                  f"go by number; choose a name with a letter.")
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of :func:`fecontact.modal_basis` that concern neither contact nor modes."""
+        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads")
+        return {name: getattr(self, name) for name in names}
+
     def modal_basis(self, body: ElasticBody, rotation: Rotation | None = None) -> ModalBasis:
         """The modal basis of a body."""
-        basis = modal_basis(
-            body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes, B=self.B,
-            C=self.C, points=self.points, reduction=self.reduction, tolerance=self.tolerance,
-            damping=self.damping, loads=self.loads, rotation=rotation)
+        return self.finished(modal_basis(
+            body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes,
+            rotation=rotation, **self.options))
+
+    def finished(self, basis: ModalBasis) -> ModalBasis:
+        """A basis with the dashpots of these settings and the modes that they select."""
         if self.dashpots:
             basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
                                          for point, values in self.dashpots.items()})

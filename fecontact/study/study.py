@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +19,6 @@ from fecontact.core.tables import (
     to_table,
 )
 from fecontact.core.units import Summarised, listed, quantity
-from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.mesh import Mesh
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
@@ -32,14 +29,23 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES, with_folder
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.links import Link
 from fecontact.study.assembly import contact_system
-from fecontact.study.geometry_section import Geometry, MeshFile, geometry_from_table, geometry_table
+from fecontact.study.bodies_section import (
+    BodySections,
+    Gap,
+    InterfaceSettings,
+    bodies_from_tables,
+    check_bodies,
+    link_table,
+    links_from_tables,
+)
+from fecontact.study.geometry_section import Geometry, geometry_from_table, geometry_table
+from fecontact.study.models import StudyModels
 from fecontact.study.preload_section import PreloadSettings
 from fecontact.study.sections import (
     BasisSettings,
     BodySettings,
-    InterfaceSettings,
     OutputSettings,
     RenderSettings,
     SimulationSettings,
@@ -50,20 +56,15 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import Crown
 from fecontact.system.quasistatic.history import LoadHistory
 
-Gap = float | tuple[float, ...] | Crown
-
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
     "simulation": SimulationSettings, "wear": WearSettings, "branch": BranchSettings,
     "output": OutputSettings, "render": RenderSettings,
 }
-# Cached objects of a study, and the sections on which each depends.
-_MADE_FROM = {"_mesh": ("geometry",), "_body": ("geometry", "body"),
-              "_basis": ("geometry", "body", "basis")}
 
 
 @dataclass(frozen=True, repr=False)
-class Study(Summarised):
+class Study(Summarised, StudyModels):
     """A study: geometry, body, modes, laws, run and output, as in its TOML file.
 
     Each attribute is a section of the file, the fields of its class are the keys of the section.
@@ -72,7 +73,7 @@ class Study(Summarised):
     ----------
     geometry : Beam, Pendulum, Block or MeshFile
         ``[geometry]``: a shape and its dimensions, ``shape = "beam"``, or a mesh,
-        ``file = "part.msh"``.
+        ``file = "part.msh"``; None for several bodies.
     body : BodySettings
         ``[body]``
     basis : BasisSettings
@@ -83,7 +84,7 @@ class Study(Summarised):
         :class:`~fecontact.ContactSystem`.
     interfaces : mapping of interface to InterfaceSettings
         ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``: laws of single interfaces;
-        all others use ``[normal]`` and ``[friction]``.
+        all others use ``[normal]`` and ``[friction]``. Of several bodies also their faces.
     gap : float, (n,) tuple or Crown
         Initial distance of the contact nodes from flat ground [m], or ``{radius, centre}`` for a
         face in the shape of an arc; written above all sections.
@@ -101,11 +102,16 @@ class Study(Summarised):
         ``[render]``
     sweep : SweepSettings or None
         ``[sweep]``: many cases of this study; see :func:`fecontact.sweep`.
+    bodies : mapping of name to BodySections
+        ``[bodies.NAME.geometry]``, ...: several bodies, in place of ``[geometry]``, ``[body]`` and
+        ``[basis]``.
+    links : mapping of name to Spring, Bushing, Hinge or Weld
+        ``[links.NAME]``: what joins bodies at points and does not open; ``kind = "weld"``.
     path : Path or None
         The study file; paths of other files are relative to it.
     """
 
-    geometry: Geometry
+    geometry: Geometry | None = None
     body: BodySettings = field(default_factory=BodySettings)
     basis: BasisSettings = field(default_factory=BasisSettings)
     normal: NormalLaw | None = None
@@ -122,6 +128,8 @@ class Study(Summarised):
     render: RenderSettings = field(default_factory=RenderSettings)
     preload: PreloadSettings | None = None
     sweep: SweepSettings | None = None
+    bodies: Mapping[str, BodySections] = field(default_factory=dict)
+    links: Mapping[str, Link] = field(default_factory=dict)
     path: Path | None = field(default=None, compare=False)
 
     def summary(self) -> list[tuple[str, str]]:
@@ -131,9 +139,11 @@ class Study(Summarised):
         laws = [type(law).__name__ for law in (self.normal, self.friction) if law is not None]
         return [
             ("file", "none" if self.path is None else self.path.name),
-            ("geometry", type(self.geometry).__name__),
-            ("modes", f"{self.basis.modes}"),
-            ("contact nodes", f"{self.basis.contact_nodes}"),
+            *([("bodies", listed(list(self.bodies))), ("interfaces", listed(list(self.interfaces))),
+               ("modes", listed([f"{one.basis.modes}" for one in self.bodies.values()]))]
+              if self.bodies else
+              [("geometry", type(self.geometry).__name__), ("modes", f"{self.basis.modes}"),
+               ("contact nodes", f"{self.basis.contact_nodes}")]),
             ("laws", ", ".join([*laws, *groups]) or "none"),
             ("ground", quantity(self.ground.speed, "m/s")),
             ("t_end", "none" if end is None else quantity(end, "s", 5)),
@@ -178,18 +188,31 @@ class Study(Summarised):
         if not isinstance(tables, Mapping):
             raise InputError(f"{title} must be a table of sections, not {shown(tables)}.")
         require_readable(tables, title)
-        tables = {name: table if name == "geometry" else with_folder(table, folder)
+        tables = {name: table if name in ("geometry", "bodies") else with_folder(table, folder)
                   for name, table in tables.items()}
         for name in tables:
-            if name not in (valid := ("gap", "geometry", "interfaces", "preload", "sweep",
-                                           *_SECTIONS)):
+            if name == "contact":
+                raise InputError(f"{title} has an unknown section 'contact'; laws of single "
+                                 f"interfaces stand in [interfaces.NAME.normal] and "
+                                 f"[interfaces.NAME.friction].")
+            if name not in (valid := ("gap", "geometry", "bodies", "interfaces", "links",
+                                      "preload", "sweep", *_SECTIONS)):
                 raise InputError(f"{title} has an unknown section or key '{name}'"
                                  f"{nearest(name, valid)}; there are: {choices(valid)}.")
-        if "geometry" not in tables:
+        if "bodies" in tables:
+            for name in ("geometry", "body", "basis"):
+                if tables.get(name):
+                    raise InputError(f"{title} has [{name}], which is for a single body, together "
+                                     f"with [bodies]; give [bodies.NAME.{name}] to each body.")
+        elif "geometry" not in tables:
             raise InputError(f"{title} lacks the section [geometry]; give a shape and its "
-                             f"dimensions, or the file of a mesh.")
-        return cls(
-            geometry_from_table(tables["geometry"], f"{title}: [geometry]"),
+                             f"dimensions, or the file of a mesh. For several bodies, give "
+                             f"[bodies.NAME.geometry] to each.")
+        study = cls(
+            geometry_from_table(tables["geometry"], f"{title}: [geometry]")
+            if "bodies" not in tables else None,
+            bodies=bodies_from_tables(tables["bodies"], title) if "bodies" in tables else {},
+            links=links_from_tables(tables.get("links", {}), title),
             gap=_gap(tables.get("gap", 0.0), title),
             interfaces=convert(tables.get("interfaces", {}), Mapping[str, InterfaceSettings], title,
                                "interfaces"),
@@ -201,16 +224,13 @@ class Study(Summarised):
             **{name: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items() if name in tables or name != "normal"},
         )
+        check_bodies(study, title)
+        return study
 
     @property
     def name(self) -> str:
         """Name of the file without its ending."""
         return "study" if self.path is None else self.path.stem
-
-    @property
-    def folder(self) -> Path:
-        """Folder of the study file, to which other paths are relative."""
-        return Path() if self.path is None else self.path.parent
 
     @property
     def results(self) -> Path:
@@ -229,14 +249,22 @@ class Study(Summarised):
         """All sections as tables for TOML, with or without values equal to the defaults."""
         sections = {name: to_table(getattr(self, name), defaults=defaults)
                     for name in _SECTIONS
-                    if getattr(self, name) is not None}
-        interfaces = {"interfaces": plain(self.interfaces)} if self.interfaces else {}
+                    if getattr(self, name) is not None
+                    and not (self.bodies and name in ("body", "basis"))}
+        first: dict[str, Any] = {"bodies": {name: one.table(defaults=defaults)
+                            for name, one in self.bodies.items()}}
+        if self.geometry is not None:
+            first = {"geometry": geometry_table(self.geometry, defaults=defaults)}
+        if self.links:
+            first["links"] = {name: link_table(one, defaults=defaults)
+                              for name, one in self.links.items()}
+        full = defaults and bool(self.bodies)
+        interfaces = {"interfaces": {name: to_table(one, defaults=full) for name, one in
+                                     self.interfaces.items()}} if self.interfaces else {}
         for name in ("preload", "sweep"):
             if getattr(self, name) is not None:
                 sections[name] = to_table(getattr(self, name), defaults=defaults)
-        return {"gap": plain(self.gap),
-                "geometry": geometry_table(self.geometry, defaults=defaults),
-                **interfaces,
+        return {"gap": plain(self.gap), **first, **interfaces,
                 **{name: table for name, table in sections.items() if table or defaults}}
 
     def to_toml(self) -> str:
@@ -277,23 +305,8 @@ class Study(Summarised):
             place = _number(key, table, name, _title(self.path)) if isinstance(table, list) else key
             table[place] = plain(value)
         study = self.from_tables(tables, self.path)
-        for made, needed in _MADE_FROM.items():
-            if made in vars(self) and all(getattr(study, section) == getattr(self, section)
-                                          for section in needed):
-                vars(study)[made] = vars(self)[made]
+        study.reuse(self)
         return study
-
-    def mesh(self) -> Mesh:
-        """The mesh, generated or read; cached, as are body, modal basis and system."""
-        return self._mesh
-
-    def elastic_body(self) -> ElasticBody:
-        """The elastic body."""
-        return self._body
-
-    def modal_basis(self) -> ModalBasis:
-        """The modal basis."""
-        return self._basis
 
     def system(self) -> ContactSystem:
         """The contact system.
@@ -303,7 +316,7 @@ class Study(Summarised):
         FecontactError
             With file and section in front of the message, as for the other methods.
         """
-        return contact_system(self, self.modal_basis(), _title(self.path))
+        return contact_system(self, self.reduced, _title(self.path))
 
     def load_history(self) -> LoadHistory:
         """Load the system along the path of ``[preload]``; see :func:`fecontact.load_history`."""
@@ -355,34 +368,16 @@ class Study(Summarised):
         if (law := wanted.law_if_any) is None:
             raise InputError(f"{title}: [wear] lacks the key 'coefficient', in m^3/J for law = "
                              f"'energy' and in m^2/N for 'archard'.")
+        if (thickness := self.thickness) is None:
+            raise InputError(f"{title}: [wear] needs bodies of one thickness; give the same to all "
+                             f"in [bodies.NAME.body].")
         system = self.system()
         with located(f"{title}: [wear]:", "wear_history:"):
             return wear_history(
-                system, law, self.body.thickness, acceleration=wanted.acceleration,
+                system, law, thickness, acceleration=wanted.acceleration,
                 blocks=wanted.blocks, periods=wanted.periods, settling=wanted.settling,
                 period=wanted.period, initial=self.initial(), outputs=wanted.outputs,
                 solver=settings.chosen_solver(), rtol=settings.rtol, progress=progress)
-
-    @cached_property
-    def _mesh(self) -> Mesh:
-        from fecontact.fem.generate import generate
-
-        with located(f"{_title(self.path)}: [geometry]:", type(self.geometry).__name__):
-            if isinstance(self.geometry, MeshFile):
-                return self.geometry.mesh(self.folder)
-            return generate(self.geometry)
-
-    @cached_property
-    def _body(self) -> ElasticBody:
-        mesh = self.mesh()
-        with located(f"{_title(self.path)}: [body]:", "ElasticBody"):
-            return self.body.elastic_body(mesh)
-
-    @cached_property
-    def _basis(self) -> ModalBasis:
-        body = self.elastic_body()
-        with located(f"{_title(self.path)}: [basis]:"):
-            return self.basis.modal_basis(body, self.body.rotation)
 
 
 def _number(text: str, items: list[Any], name: str, title: str) -> int:

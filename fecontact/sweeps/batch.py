@@ -15,13 +15,14 @@ from typing import Any, cast
 from fecontact.core.dotted_parameters import with_parameters
 from fecontact.core.errors import AnalysisError, FecontactError, ModelWarning
 from fecontact.core.files.atomic_write import unwritable
+from fecontact.core.files.stored import array, member
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.registry import PART_CLASSES
-from fecontact.output.files.hdf5 import read_basis
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.output.files.hdf5 import new_file, open_file, store_basis, stored_basis
+from fecontact.study.bodies_section import Reduced
 from fecontact.study.study import Study
 from fecontact.study.sweep_section import Strobing
-from fecontact.sweeps.case import Row, SweepCase
+from fecontact.sweeps.case import Row, SweepCase, of_basis
 from fecontact.sweeps.strobed import strobed_rows
 from fecontact.sweeps.summaries import functions_for, summarise
 
@@ -95,20 +96,40 @@ def make_basis(batch: Batch) -> bytes | str:
     path = None if batch.path is None else Path(batch.path)
     try:
         study = Study.from_tables(batch.study, path).with_(**batch.cases[0].basis_changes)
-        return packed(study.modal_basis(), shapes=True)
+        return packed(study.reduced, shapes=True)
     except FecontactError as error:
         return str(error)
 
 
-def packed(basis: ModalBasis, *, shapes: bool) -> bytes:
+def packed(reduced: Reduced, *, shapes: bool) -> bytes:
     """Serialise a modal basis; shapes over the body are included only on request."""
-    return pickle.dumps(basis if shapes else replace(basis, mode_shapes=None, quality=None))
+    basis = reduced.basis
+    if not shapes:
+        basis = replace(basis, mode_shapes=None, quality=None,
+                        parts=tuple(replace(part, nodes=(0, 0)) for part in basis.parts))
+    return pickle.dumps(replace(reduced, basis=basis))
+
+
+def write_reduced(path: Path, reduced: Reduced) -> None:
+    """Write a modal basis, and the gaps between several bodies, to an HDF5 file."""
+    with new_file(path) as file:
+        store_basis(file.create_group("basis"), reduced.basis)
+        if reduced.gaps is not None:
+            file.create_dataset("gaps", data=reduced.gaps)
+
+
+def read_reduced(path: Path) -> Reduced:
+    """Read what :func:`write_reduced` wrote; InputError for a damaged file."""
+    with open_file(path, "basis") as file:
+        basis = stored_basis(member(file, "basis"))
+        return Reduced(basis, array(file, "gaps", (basis.contact_nodes,))
+                       if "gaps" in file else None)
 
 
 def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functions]) -> Row:
     try:
         trajectory, study = _run(batch, base, case)
-        known = study.wear.law_if_any, study.body.thickness
+        known = study.wear.law_if_any, study.thickness
         if known not in summaries:
             summaries[known] = functions_for(
                 batch.summaries, study.folder, wear=known[0], thickness=known[1])
@@ -159,12 +180,11 @@ def changed(study: Study, changes: Mapping[str, Any]) -> Study:
 
 
 def _present(study: Study, name: str) -> Any:
-    first, *rest = name.split(".")
-    if first not in PART_CLASSES:
+    if of_basis(name) or name.partition(".")[0] not in ("interfaces", *PART_CLASSES):
         return None
     value: Any = study
-    for part in (first, *rest):
-        value = getattr(value, part, None)
+    for part in name.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else getattr(value, part, None)
     return value
 
 
@@ -172,28 +192,28 @@ def prepared(batch: Batch, base: Study, case: SweepCase) -> Study:
     """Study of a case, with its modal basis."""
     study = changed(base, case.changes)
     # with_ cannot be used: the basis may come from another process.
-    vars(study)["_basis"] = _basis(batch, study, case.basis)
+    vars(study)["_reduced"] = _reduced(batch, study, case.basis)
     return study
 
 
-_bases: OrderedDict[tuple[str, bool], ModalBasis] = OrderedDict()
+_bases: OrderedDict[tuple[str, bool], Reduced] = OrderedDict()
 
 
-def _basis(batch: Batch, study: Study, key: str) -> ModalBasis:
+def _reduced(batch: Batch, study: Study, key: str) -> Reduced:
     """Basis of a key: cached in this process, sent with the batch, read from a file or computed."""
     at_places = any(isinstance(force.point, tuple) for force in study.load.forces)
     mark = key, batch.frames > 0 or at_places
-    basis = _bases.get(mark)
-    if basis is None:
+    found = _bases.get(mark)
+    if found is None:
         given = batch.bases.get(key)
         if isinstance(given, str):
             raise AnalysisError(given)
-        basis = (study.modal_basis() if given is None else read_basis(given)
+        found = (study.reduced if given is None else read_reduced(given)
                  if isinstance(given, Path) else pickle.loads(given))
-        _bases[mark] = basis
+        _bases[mark] = found
         while len(_bases) > _BASES_KEPT:
             _bases.popitem(last=False)
-    return basis
+    return found
 
 
 def case_file(folder: Path, key: str) -> Path:

@@ -4,7 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NotRequired, TypedDict
 
-BASIS_SECTIONS = ("geometry", "body", "basis")
+from fecontact.study.bodies_section import PAIRING_KEYS
+
+_BASIS_SECTIONS = ("geometry", "body", "basis", "bodies", "links")
+
+
+def of_basis(name: str) -> bool:
+    """Whether the modal basis may depend on a dotted key of the study."""
+    first, _, rest = name.partition(".")
+    if first != "interfaces":
+        return first in _BASIS_SECTIONS
+    key = rest.partition(".")[2].partition(".")[0]
+    return not key or key in PAIRING_KEYS
 
 
 class Row(TypedDict):
@@ -29,4 +40,4 @@ class SweepCase:
     def basis_changes(self) -> dict[str, Any]:
         """Changes that affect the modal basis."""
         return {name: value for name, value in self.changes.items()
-                if name.partition(".")[0] in BASIS_SECTIONS}
+                if of_basis(name)}

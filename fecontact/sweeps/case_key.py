@@ -10,7 +10,7 @@ from fecontact import __version__
 from fecontact.core.errors import InputError
 from fecontact.core.tables import shown
 from fecontact.study.study import Study
-from fecontact.sweeps.case import BASIS_SECTIONS
+from fecontact.sweeps.case import of_basis
 
 _DIGITS = 24  # of a hash: 96 bits
 _NOT_OF_THE_RUN = ("output", "render", "sweep")
@@ -48,7 +48,7 @@ def case_keys(
                 # This case will fail; hash the values as given.
                 resolved = base | dict(zip(names, row, strict=True))
         body = {name: value for name, value in resolved.items()
-                if name.partition(".")[0] in BASIS_SECTIONS}
+                if of_basis(name)}
         text = json.dumps(body, sort_keys=True)
         if text not in seen:
             seen[text] = digest({"basis": body})

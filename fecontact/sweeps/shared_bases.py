@@ -7,10 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fecontact.core.errors import AnalysisError
-from fecontact.output.files.hdf5 import read_basis
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.study.bodies_section import Reduced
 from fecontact.study.study import Study
-from fecontact.sweeps.batch import Batch, make_basis, packed, run_batch
+from fecontact.sweeps.batch import Batch, make_basis, packed, read_reduced, run_batch
 from fecontact.sweeps.dispatch import Job, LostError
 from fecontact.sweeps.store import Store
 
@@ -44,9 +43,9 @@ class Bases:
         jobs = []
         for key, batch in self.makers.items():
             if self.store.basis_file(key).exists():
-                self._put(key, read_basis(self.store.basis_file(key)), batch)
+                self._put(key, read_reduced(self.store.basis_file(key)), batch)
             elif self.only:
-                self._put(key, self.study.with_(**batch.cases[0].basis_changes).modal_basis(),
+                self._put(key, self.study.with_(**batch.cases[0].basis_changes).reduced,
                           batch)
             else:
                 jobs.append(Job(make_basis, batch))
@@ -61,7 +60,7 @@ class Bases:
             self.ready[key] = str(result)
         return self._released()
 
-    def _put(self, key: str, basis: ModalBasis, batch: Batch) -> None:
+    def _put(self, key: str, basis: Reduced, batch: Batch) -> None:
         try:
             self.store.keep_basis(key, basis)
         except OSError as error:

@@ -16,9 +16,8 @@ from typing import Any
 from fecontact.core.files.atomic_write import clear_leftovers, replaced
 from fecontact.core.files.locks import locked
 from fecontact.core.files.stored import DamagedError, from_json, reading
-from fecontact.output.files.hdf5 import write_basis
-from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.sweeps.batch import case_file
+from fecontact.study.bodies_section import Reduced
+from fecontact.sweeps.batch import case_file, write_reduced
 from fecontact.sweeps.case import Row
 
 _SUFFIXES = {"shards": ".json", "cases": ".vtkhdf", "bases": ".h5"}
@@ -88,12 +87,12 @@ class Store:
         """Path of the file of a modal basis."""
         return self.folder / "bases" / f"{key}.h5"
 
-    def keep_basis(self, key: str, basis: ModalBasis) -> None:
-        """Store a modal basis unless it exists."""
+    def keep_basis(self, key: str, reduced: Reduced) -> None:
+        """Store a modal basis, and the gaps between several bodies, unless it exists."""
         path = self.basis_file(key)
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_basis(path, basis)
+            write_reduced(path, reduced)
 
     def kept(self, what: str) -> list[Path]:
         """Files in ``shards``, ``cases`` or ``bases`` whose names show that a sweep wrote them."""

@@ -26,7 +26,7 @@ from fecontact.system.kernels import POWERS
 Point = str | int
 # Where a study gives what some summaries need.
 _GIVEN = {"wear": "a wear law; give its coefficient in [wear]",
-          "thickness": "the thickness of the body; give it in [body]"}
+          "thickness": "the thickness of the body, the same for several; give it in [body]"}
 
 
 @dataclass(frozen=True)

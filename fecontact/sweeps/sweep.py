@@ -100,7 +100,7 @@ def sweep(
         raise InputError(f"[sweep]: t_start = {wanted.t_start:g} must lie before the end of the "
                          f"run, t_end = {base.t_end:g}.")
     functions_for(wanted.summaries, base.folder, wear=base.wear.law_if_any,
-                  thickness=base.body.thickness)
+                  thickness=base.thickness)
     work = _Work.of(base, wanted, plan(wanted))
     place = Path(folder) if folder is not None else base.results / f"{base.name}-sweep"
     store = Store(place, files=wanted.keep != "none")

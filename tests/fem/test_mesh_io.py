@@ -629,7 +629,9 @@ def nodes_and(cells: str) -> str:
         ("a.inp", "*NODE, SYSTEM=C\n1,0,0\n", "cylindrical or spherical coordinates"),
         ("a.inp", "*SYSTEM\n0,0,0,1,1,0\n*NODE\n1,0,0\n", r"local coordinate system \(\*SYSTEM"),
         ("a.inp", "*INCLUDE, INPUT=b.inp\n", r"includes another one \(\*INCLUDE\)"),
-        ("a.inp", "*PART\n*NODE\n1,0,0\n*PART\n", "holds 2 parts; export the elastic body alone"),
+        ("a.inp", "*PART, NAME=a\n*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n"
+         "*PART, NAME=b\n*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n",
+         "holds 2 parts; choose one by part: 'a', 'b'"),
         ("a.inp", "*INSTANCE\n 0, 0.5, 0\n", r"displaces its part in \*INSTANCE"),
         ("a.inp", "*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n*NSET, NSET=N\nM\n",
          "refers to a set 'M' that it does not hold"),

@@ -14,8 +14,9 @@ def init(
     file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
-    shape: Annotated[Literal["beam", "pendulum", "block"], Parameter(
-        help="Beam on wavy ground, pendulum on a stop, or block on a moving belt.")] = "beam",
+    shape: Annotated[Literal["beam", "pendulum", "block", "pad"], Parameter(
+        help="Beam on wavy ground, pendulum on a stop, block on a moving belt, or a pad on "
+        "a block, which are two bodies.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
@@ -33,22 +34,32 @@ def init(
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
-    """Generate or read the mesh of a study; print its size and groups."""
+    """Generate or read the mesh of a study, or those of its bodies; print size and groups."""
     from fecontact.cli.run_files import read_study
-    from fecontact.cli.tables import mesh_table
+    from fecontact.cli.tables import mesh_table, table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.fem.mesh_files import write_mesh
 
     described = read_study(study, set_)
     with output_folder(output or described.results) as folder:
-        made = described.mesh()
-        show(mesh_table(made))
-        target, source = folder / f"{described.name}.msh", getattr(described.geometry, "file", None)
-        if source is not None and target.exists() and target.samefile(described.folder / source):
-            raise InputError(f"{target} is the mesh that the study names; choose another folder "
-                             f"for what is read of it.")
-        write_mesh(made, target)
-        echo_written(target)
+        several = described.meshes() if described.bodies else {}
+        for name, made in (several or {"": described.mesh()}).items():
+            geometry = described.bodies[name].geometry if name else described.geometry
+            if name:
+                echo(f"\n{name}:")
+            show(mesh_table(made))
+            target = folder / f"{described.name}{'-' * bool(name)}{name}.msh"
+            source = getattr(geometry, "file", None)
+            if source is not None and target.exists() and (
+                    target.samefile(described.folder / source)):
+                raise InputError(f"{target} is the mesh that the study names; choose another "
+                                 f"folder for what is read of it.")
+            write_mesh(made, target)
+            echo_written(target)
+        if several:
+            for name, pairing in described.pairings().items():
+                echo(f"\n{name}:")
+                show(table("", "", rows=pairing.summary()))
 
 
 def modes(
@@ -66,7 +77,11 @@ def modes(
     movie: Annotated[int | None, Parameter(help=(
         "Draw the mode of this number as a movie; with --complex, the complex mode."))] = None,
 ) -> None:
-    """Print frequency, damping, kind and effective mass of the modes; plot their shapes."""
+    """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
+
+    Of several bodies those of each; --complex and --movie are for all bodies together, with modes
+    that are counted through.
+    """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import convergence_of, read_study
     from fecontact.cli.tables import complex_table
@@ -78,11 +93,15 @@ def modes(
 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
-            basis = described.modal_basis()
-        echo(str(BasisReport(basis)))
-        picture = folder / f"{described.name}-modes.png"
-        plot_modes(basis, path=picture)
-        echo_written(picture)
+            basis = described.reduced.basis
+            bases = described.modal_bases() if described.bodies else {"": basis}
+        for name, one in bases.items():
+            if name:
+                echo(f"\n{name}:")
+            echo(str(BasisReport(one)))
+            picture = folder / f"{described.name}{'-' * bool(name)}{name}-modes.png"
+            plot_modes(one, path=picture)
+            echo_written(picture)
         sliding = None
         if complex_:
             from fecontact.analysis.complex_modes import complex_modes

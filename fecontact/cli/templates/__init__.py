@@ -3,9 +3,9 @@
 from importlib.resources import files
 
 TEMPLATES = {"beam": "beam_on_wavy_ground", "pendulum": "pendulum_on_stop",
-             "block": "block_on_belt"}
+             "block": "block_on_belt", "pad": "pad_on_block"}
 
 
 def template(shape: str) -> str:
-    """Text of the template for a shape: beam, pendulum or block."""
+    """Text of the template for a shape: beam, pendulum, block, or pad for two bodies."""
     return files(__name__).joinpath(f"{TEMPLATES[shape]}.toml").read_text(encoding="utf-8")

@@ -31,6 +31,7 @@ def read_mesh(
     scale: float = 1.0,
     boundaries: Mapping[str, str | Box] | None = None,
     points: Mapping[str, str | tuple[float, float]] | None = None,
+    part: str | None = None,
 ) -> Mesh:
     """Read a plane mesh with named boundaries and points from a file.
 
@@ -52,6 +53,10 @@ def read_mesh(
     points : mapping of name to name or (x, y)
         Points by new name: a group of the file (also a boundary), or the node nearest to a place
         [m] in the body.
+    part : str, optional
+        One of several bodies in the file: a physical surface (Gmsh), an element set or part
+        (Abaqus), a group of cells (MED), a property number (Nastran); all cells by default.
+        Groups of the file keep what lies on this body.
 
     Raises
     ------
@@ -60,7 +65,7 @@ def read_mesh(
         point is given in another form.
     MeshError
         If the file is not a plane mesh of first-order elements of one kind, or has no such group,
-        edges or node.
+        part, edges or node.
     """
     path = as_path(path, "a mesh")
     if not (isinstance(scale, Real) and 0.0 < scale < np.inf):
@@ -70,7 +75,7 @@ def read_mesh(
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     try:
-        mesh, groups = plane_mesh(_read(reader, path, format_name), scale)
+        mesh, groups = plane_mesh(_read(reader, path, format_name).part(part), scale)
         return Mesh(mesh.nodes, mesh.cells,
                     named_boundaries(mesh, groups, boundaries or {}),
                     named_points(mesh, groups, points or {}))
@@ -235,15 +240,21 @@ def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
         raise MeshError("The file gives nodes in local coordinate systems; export them in the "
                         "basic one.")
     edges: dict[str, list[Integers]] = {}
+    parts: dict[str, list[tuple[str, Integers]]] = {}
     references = found.cell_data.get("nastran:ref", [])
     for block, numbers in zip(found.cells, references, strict=False):
         if block.type in ("line", "line3") and len(numbers) == len(block.data):
             for number in np.unique(numbers):
                 edges.setdefault(str(number), []).append(block.data[numbers == number, :2])
+        elif block.dim >= 2 and len(numbers) == len(block.data):
+            for number in np.unique(numbers):
+                parts.setdefault(str(number), []).append((block.type,
+                                                          block.data[numbers == number]))
     return RawMesh(
         found.points,
         [(block.type, block.data) for block in found.cells if block.dim >= 2],
-        edges={name: np.concatenate(parts) for name, parts in edges.items()},
+        edges={name: np.concatenate(rows) for name, rows in edges.items()},
+        parts=parts,
     )
 
 

@@ -1,4 +1,4 @@
-"""Abaqus input files: one part with plane elements, its sets and surfaces.
+"""Abaqus input files: parts with plane elements, their sets and surfaces.
 
 Unlike meshio this reads plane-strain and reduced-integration elements, several blocks of nodes,
 sets named on *ELEMENT, and surfaces.
@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fecontact.core.errors import MeshError
+from fecontact.core.types import Integers
 from fecontact.fem.mesh_files.raw import NODES, RawMesh
 
 _PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
@@ -28,9 +29,11 @@ def read_inp(path: Path) -> RawMesh:
     Raises
     ------
     MeshError
-        If the file holds several parts, a displaced part, or an unknown line.
+        If the file holds a displaced part, or an unknown line.
     """
     part = _Part()
+    parts = {"": part}
+    in_part: dict[str | None, str] = {}
     for keyword, options, rows in _blocks(path.read_text(encoding="utf-8", errors="replace")):
         match keyword:
             case "NODE":
@@ -38,28 +41,52 @@ def read_inp(path: Path) -> RawMesh:
             case "ELEMENT":
                 part.add_elements(options, rows)
             case "NSET":
-                part.add_set(part.node_sets, options["NSET"], options, rows)
+                one = parts.get(in_part.get(options.get("INSTANCE"), "no instance"), part)
+                one.add_set(one.node_sets, options["NSET"], options, rows)
             case "ELSET":
-                part.add_set(part.element_sets, options["ELSET"], options, rows)
+                one = parts.get(in_part.get(options.get("INSTANCE"), "no instance"), part)
+                one.add_set(one.element_sets, options["ELSET"], options, rows)
             case "SURFACE" if options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
-                part.surfaces.setdefault(options["NAME"], []).extend(rows)
+                for one in parts.values() if part.in_assembly else (part,):
+                    one.add_surface(options["NAME"], rows, len(parts) > 2)
             case "SYSTEM" if rows:
                 raise MeshError("The file gives nodes in a local coordinate system (*SYSTEM); "
                                 "export them in the global one.")
             case "PART":
-                part.count += 1
+                part = parts[options["NAME"]] = _Part()
             case "ASSEMBLY":
-                part.in_assembly = True
+                for one in parts.values():
+                    one.in_assembly = True
             case "INSTANCE" if any(float(word or 0) for row in rows for word in row):
                 raise MeshError("The file displaces its part in *INSTANCE; export the part itself.")
+            case "INSTANCE":
+                in_part[options.get("NAME")] = options.get("PART", "")
             case "INCLUDE":
                 raise MeshError("The file includes another one (*INCLUDE), which is not read; put "
                                 "everything into one file.")
-    if part.count > 1:
-        raise MeshError(f"The file holds {part.count} parts; export the elastic body alone.")
-    if not part.nodes or not part.elements:
+    found = {name: one for name, one in parts.items() if one.nodes and one.elements}
+    if not found:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
-    return part.raw_mesh()
+    return _joined({name: one.raw_mesh() for name, one in found.items()})
+
+
+def _joined(parts: dict[str, RawMesh]) -> RawMesh:
+    """Several parts, each with its own numbers, in one mesh with equally named groups joined."""
+    if len(parts) == 1:
+        return next(iter(parts.values()))
+    joined = RawMesh(np.concatenate([raw.points for raw in parts.values()]), [],
+                     sets_are_boundaries=True, separate=True)
+    first = 0
+    for name, raw in parts.items():
+        cells = [(kind, block + first) for kind, block in raw.cells]
+        joined.cells += cells
+        joined.parts[name] = cells
+        for groups, all_groups in ((raw.edges, joined.edges), (raw.nodes, joined.nodes)):
+            for title, group in groups.items():
+                earlier = [all_groups[title]] if title in all_groups else []
+                all_groups[title] = np.concatenate([*earlier, group + first])
+        first += len(raw.points)
+    return joined
 
 
 def _blocks(text: str) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
@@ -93,7 +120,6 @@ class _Part:
     element_sets: dict[str, list[int | str]] = field(default_factory=dict)
     surfaces: dict[str, list[list[str]]] = field(default_factory=dict)
     in_assembly: bool = False
-    count: int = 0
 
     def add_nodes(self, options: dict[str, str], rows: list[list[str]]) -> None:
         if self.in_assembly:
@@ -142,6 +168,12 @@ class _Part:
             else:
                 members.extend(int(word) if word.isdigit() else word for word in words)
 
+    def add_surface(self, name: str, rows: list[list[str]], several: bool) -> None:
+        """Add rows ``set or element, side``; of several parts, only sets that this one has."""
+        known = {title.upper() for title in self.element_sets}
+        self.surfaces.setdefault(name, []).extend(
+            row for row in rows if not (several and self.in_assembly) or row[0].upper() in known)
+
     def resolve(self, sets: dict[str, list[int | str]], name: str) -> list[int]:
         """The numbers in a set; names in it refer to sets defined before."""
         by_name = {key.upper(): key for key in sets}
@@ -183,6 +215,15 @@ class _Part:
         for kind, nodes in self.elements.values():
             if not kind.startswith("line"):
                 blocks.setdefault(kind, []).append([index[number] for number in nodes])
+        parts: dict[str, list[tuple[str, Integers]]] = {}
+        for name in self.element_sets:
+            held: dict[str, list[list[int]]] = {}
+            for number in self.resolve(self.element_sets, name):
+                kind, nodes = self.elements.get(number, ("line", []))
+                if not kind.startswith(("line", "solid")):
+                    held.setdefault(kind, []).append([index[node] for node in nodes])
+            if held:
+                parts[name] = [(kind, np.array(rows)) for kind, rows in held.items()]
         edges = {name: found for name, rows in self.surfaces.items()
                  if (found := self.surface(rows))}
         for name in self.element_sets:
@@ -201,6 +242,7 @@ class _Part:
                                    if number in index], np.int64)
                    for name in self.node_sets},
             sets_are_boundaries=True,
+            parts=parts,
         )
 
 

@@ -182,12 +182,15 @@ def _raw_mesh(
     tags, points = tags[order], points[order]
     cells: list[tuple[str, Integers]] = []
     groups: tuple[dict[str, list[Integers]], dict[str, list[Integers]]] = ({}, {})
+    bodies: dict[str, list[tuple[str, Integers]]] = {}
     for kind, block, physical in blocks:
         index = np.searchsorted(tags, block)
         if (tags[np.minimum(index, len(tags) - 1)] != block).any():
             raise MeshError("The elements name nodes that the file does not hold.")
         if kind not in ("vertex", "line", "line3"):
             cells.append((kind, index))
+            for number in physical:
+                bodies.setdefault(names.get((2, number), str(number)), []).append((kind, index))
             continue
         dimension = 0 if kind == "vertex" else 1
         for number in physical:
@@ -200,6 +203,7 @@ def _raw_mesh(
         points, cells,
         edges={name: np.concatenate(parts) for name, parts in groups[1].items()},
         nodes={name: np.concatenate(parts).ravel() for name, parts in groups[0].items()},
+        parts=bodies,
     )
 
 

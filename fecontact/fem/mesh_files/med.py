@@ -65,6 +65,7 @@ def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
     nodes: dict[str, list[Integers]] = {}
     edges: dict[str, list[Integers]] = {}
     cells: list[tuple[str, Integers]] = []
+    parts: dict[str, list[tuple[str, Integers]]] = {}
 
     def collect(into: dict[str, list[Integers]], names: dict[int, list[str]], stored: Any,
                 members: Integers) -> None:
@@ -89,9 +90,14 @@ def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
             collect(edges, of_cells, stored, members[:, :2])
         else:
             cells.append((kind, members))
+            found: dict[str, list[Integers]] = {}
+            collect(found, of_cells, stored, members)
+            for name, rows in found.items():
+                parts.setdefault(name, []).append((kind, np.concatenate(rows)))
     return RawMesh(
         points, cells,
-        edges={name: np.concatenate(parts) for name, parts in edges.items()},
-        nodes={name: np.concatenate(parts) for name, parts in nodes.items()},
+        edges={name: np.concatenate(rows) for name, rows in edges.items()},
+        nodes={name: np.concatenate(rows) for name, rows in nodes.items()},
         sets_are_boundaries=True,
+        parts=parts,
     )

@@ -1,11 +1,11 @@
 """Contents of a mesh file as read, and their conversion to a plane first-order mesh."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.errors import MeshError
+from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
 
@@ -37,6 +37,10 @@ class RawMesh:
         Groups of nodes.
     sets_are_boundaries : bool
         Whether a group of nodes connected by edges of the outline is also a boundary.
+    parts : mapping of name to list of (kind, (M, k) integer array)
+        Groups of elements of two and three dimensions, as ``cells``.
+    separate : bool
+        Whether the parts are bodies of their own, which cannot be read as one mesh.
     """
 
     points: Array
@@ -44,6 +48,34 @@ class RawMesh:
     edges: dict[str, Integers] = field(default_factory=dict)
     nodes: dict[str, Integers] = field(default_factory=dict)
     sets_are_boundaries: bool = False
+    parts: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
+    separate: bool = False
+
+    def part(self, name: str | None) -> "RawMesh":
+        """The elements of one part, with the groups of the file; all elements for None.
+
+        Nodes of other parts get no place, so that those of two parts that touch are not merged.
+
+        Raises
+        ------
+        MeshError
+            If there is no such part, or several bodies and no name.
+        """
+        if name is None:
+            if self.separate:
+                raise MeshError(f"The file holds {len(self.parts)} parts; choose one by part: "
+                                f"{choices(self.parts)}.")
+            return self
+        if name not in self.parts:
+            raise MeshError(f"The file has no part '{name}'{nearest(name, self.parts)}; its groups "
+                            f"of cells are: {choices(self.parts)}.")
+        cells = self.parts[name]
+        corners = [block.ravel() for _, block in cells]
+        points = np.full(np.shape(self.points), np.nan)
+        if all(not len(block) or block.max() < len(points) for block in corners):
+            used = np.unique(np.concatenate(corners))
+            points[used] = np.asarray(self.points, float)[used]
+        return replace(self, points=points, cells=cells)
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,9 @@ class SlidingTranslation:
         if not 0.0 < length < np.inf:
             raise InputError(f"SlidingTranslation: direction = {self.direction!r} must be finite "
                              f"and longer than zero.")
-        object.__setattr__(self, "direction", (x / length, y / length))
+        if abs(length - 1.0) > 1e-12:  # written to a file and read back it stays the same
+            x, y = x / length, y / length
+        object.__setattr__(self, "direction", (x, y))
 
     def along(self, places: Array, tangents: Array) -> Array:
         """V_tj / V (n,) at places (n, 2) with tangents (n, 2)."""

@@ -1,0 +1,392 @@
+"""Sections of several bodies: ``[bodies.NAME]``, ``[interfaces.NAME]`` and ``[links.NAME]``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal, Protocol
+
+import numpy as np
+
+from fecontact.core.docstrings import inherit_documentation
+from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.core.tables import from_table, located, require_known, shown, to_table
+from fecontact.core.types import Array
+from fecontact.core.units import Unit
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.pairing import Pairing, pair_faces
+from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
+from fecontact.reduction.assembled_basis import assembled_basis
+from fecontact.reduction.links import Bushing, Hinge, Link, Spring, Weld
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.reduce_body import reduce_bodies
+from fecontact.study.geometry_section import (
+    Geometry,
+    geometry_from_table,
+    geometry_mesh,
+    geometry_table,
+)
+from fecontact.study.sections import BasisSettings, BodySettings
+from fecontact.system.gap import Crown
+
+Gap = float | tuple[float, ...] | Crown
+
+LINKS: Mapping[str, type] = {"spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld}
+
+# Keys of an interface on which the modal bases of its bodies depend.
+PAIRING_KEYS = ("face", "other", "nodes", "nodes_on", "reach", "overlap")
+
+
+@dataclass(frozen=True)
+class Placement:
+    """``[bodies.NAME.placement]``: where the body stands; mirrored, then turned, then shifted.
+
+    Parameters
+    ----------
+    shift : (float, float)
+        Displacement along x and y [m].
+    rotation : float
+        Angle about the origin [degrees], counter-clockwise.
+    mirror : 'x' or 'y', optional
+        The coordinate that changes its sign.
+    """
+
+    shift: Annotated[tuple[float, float], Unit("m")] = (0.0, 0.0)
+    rotation: Annotated[float, Unit("degrees")] = 0.0
+    mirror: Literal["x", "y"] | None = None
+
+    def __post_init__(self) -> None:
+        require_finite("Placement", rotation=self.rotation, x=self.shift[0], y=self.shift[1])
+
+    def placed(self, mesh: Mesh) -> Mesh:
+        """The mesh in its place."""
+        return mesh if self == Placement() else mesh.placed(self.shift, self.rotation, self.mirror)
+
+
+@dataclass(frozen=True)
+class BodyBasisSettings(BasisSettings):
+    """``[bodies.NAME.basis]``: as ``[basis]``, but for one of several bodies.
+
+    Places are those of the placed body.
+
+    Parameters
+    ----------
+    contact, contact_nodes : str, int
+        Not for several bodies, of which interfaces name the faces.
+    B, C : place, optional
+        Excitation and load point, which one body alone can have: name of a point or boundary,
+        [x, y], or a patch ``{at = name or [x, y], radius = r}``. By default the points of these
+        names of the only mesh that has them.
+    reduction : 'vibration', 'residual' or 'craig-bampton'
+        Static shapes added to the vibration modes; by default those of forces at the interfaces.
+    """
+
+    reduction: Literal["vibration", "residual", "craig-bampton"] = "residual"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        usual = BasisSettings()
+        for key in ("contact", "contact_nodes"):
+            if getattr(self, key) != getattr(usual, key):
+                raise InputError(f"BodyBasisSettings: {key} is for a single body; name the face in "
+                                 f"[interfaces.NAME] instead.")
+
+
+inherit_documentation(BodyBasisSettings)
+
+
+@dataclass(frozen=True)
+class BodySections:
+    """``[bodies.NAME]``: one of several bodies.
+
+    Parameters
+    ----------
+    geometry : Beam, Pendulum, Block or MeshFile
+        ``[bodies.NAME.geometry]``: as ``[geometry]`` of a single body, in its own coordinates.
+    placement : Placement
+        ``[bodies.NAME.placement]``: shift, rotation and mirror.
+    body : BodySettings
+        ``[bodies.NAME.body]``: as ``[body]``.
+    basis : BodyBasisSettings
+        ``[bodies.NAME.basis]``: modes and points.
+    """
+
+    geometry: Geometry
+    placement: Placement = field(default_factory=Placement)
+    body: BodySettings = field(default_factory=BodySettings)
+    basis: BodyBasisSettings = field(default_factory=BodyBasisSettings)
+
+    def table(self, *, defaults: bool = True) -> dict[str, Any]:
+        """The section as a table for TOML."""
+        parts = {name: to_table(getattr(self, name), defaults=defaults)
+                 for name in ("placement", "body", "basis")}
+        for key in ("contact", "contact_nodes"):
+            parts["basis"].pop(key, None)
+        return {"geometry": geometry_table(self.geometry, defaults=defaults),
+                **{name: table for name, table in parts.items() if table}}
+
+
+@dataclass(frozen=True)
+class InterfaceSettings:
+    """``[interfaces.NAME]``: laws of the interface NAME; of several bodies, its faces too.
+
+    Parameters
+    ----------
+    normal, friction : law, optional
+        ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``; total values refer to the
+        face of the interface. By default those of ``[normal]`` and ``[friction]``.
+    face : str, optional
+        'BODY.BOUNDARY', one of the two faces; required for several bodies. The keys below are for
+        several bodies only.
+    other : str
+        'BODY.BOUNDARY' of the other face, or 'ground'.
+    nodes : int or 'all'
+        Every displacement node, or so many segments of equal length.
+    nodes_on : 'finer' or 'face'
+        Which face has the contact nodes: the finer of the two, or ``face``.
+    reach : float, optional
+        Largest distance between partners [m]; by default the extent of the larger face.
+    overlap : float
+        Depth up to which faces inside each other are set to zero gap, in mean edges of the finer
+        face.
+    gap : float, list or Crown
+        Added to the gaps of the geometry [m].
+    sliding : SlidingTranslation or SlidingRotation, optional
+        Steady motion of the other side: ``{speed, direction}`` or ``{speed, centre}``.
+    """
+
+    normal: NormalLaw | None = None
+    friction: FrictionLaw | None = None
+    face: str | None = None
+    other: str = "ground"
+    nodes: int | Literal["all"] = "all"
+    nodes_on: Literal["finer", "face"] = "finer"
+    reach: Annotated[float | None, Unit("m")] = None
+    overlap: float = 0.01
+    gap: Annotated[Gap, Unit("m")] = 0.0
+    sliding: SlidingTranslation | SlidingRotation | None = None
+
+    @property
+    def pairing_keys(self) -> tuple[Any, ...]:
+        """Values on which the pairing of the faces depends."""
+        return tuple(getattr(self, key) for key in PAIRING_KEYS)
+
+
+class Bodies(Protocol):
+    """What of a study describes several bodies."""
+
+    @property
+    def bodies(self) -> Mapping[str, BodySections]:
+        """The bodies."""
+
+    @property
+    def interfaces(self) -> Mapping[str, InterfaceSettings]:
+        """Where they may touch."""
+
+    @property
+    def links(self) -> Mapping[str, Link]:
+        """What joins them."""
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the study file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Modal basis of a study, and of several bodies the gaps (n,) of their geometry [m]."""
+
+    basis: ModalBasis
+    gaps: Array | None = None
+
+
+def _body(table: Any, where: str) -> BodySections:
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} must be a table of sections, not {shown(table)}.")
+    kinds: dict[str, Any] = {"geometry": None, "placement": Placement, "body": BodySettings,
+             "basis": BodyBasisSettings}
+    for key in table:
+        require_known(key, kinds, where)
+    inner = {name: f"{where[:-1]}.{name}]" for name in kinds}
+    if "geometry" not in table:
+        raise InputError(f"{where} lacks the section {inner['geometry'].partition(': ')[2]}; give "
+                         f"a shape and its dimensions, or the file of a mesh.")
+    parts: dict[str, Any] = {name: from_table(kind, table[name], inner[name])
+                             for name, kind in kinds.items() if kind and name in table}
+    return BodySections(geometry_from_table(table["geometry"], inner["geometry"]), **parts)
+
+
+def bodies_from_tables(tables: Any, title: str) -> dict[str, BodySections]:
+    """All bodies from ``[bodies]``."""
+    if not isinstance(tables, Mapping) or not tables:
+        raise InputError(f"{title}: [bodies] must be a table of bodies, [bodies.NAME.geometry] and "
+                         f"so on, not {shown(tables)}.")
+    return {name: _body(table, f"{title}: [bodies.{name}]") for name, table in tables.items()}
+
+
+def check_bodies(study: Bodies, title: str) -> None:
+    """Refuse names that are used twice or lead nowhere, and bodies that nothing touches.
+
+    Raises
+    ------
+    InputError
+        Naming the section.
+    """
+    if not study.bodies:
+        for name, one in study.interfaces.items():
+            for key, value in to_table(one, defaults=False).items():
+                if key not in ("normal", "friction"):
+                    raise InputError(
+                        f"{title}: [interfaces.{name}]: {key} = {shown(value)} is for several "
+                        f"bodies, described in [bodies.NAME]; the interfaces of a single body are "
+                        f"the boundaries that [basis] names as contact.")
+        if study.links:
+            raise InputError(f"{title} has [links], which join several bodies; describe them in "
+                             f"[bodies.NAME].")
+        return
+    _check_names(study, title)
+    touched: set[str] = set()
+    for name, one in study.interfaces.items():
+        where = f"{title}: [interfaces.{name}]"
+        if one.face is None:
+            raise InputError(f"{where} lacks the key 'face', the boundary \"BODY.BOUNDARY\" of a "
+                             f"body.")
+        for key, face in (("face", one.face), ("other", one.other)):
+            if key == "other" and face == "ground":
+                continue
+            body, dot, boundary = face.partition(".")
+            if not (dot and boundary):
+                ground = " or 'ground'" if key == "other" else ""
+                raise InputError(f"{where}: {key} = {shown(face)} must be \"BODY.BOUNDARY\""
+                                 f"{ground}; the bodies are: {choices(study.bodies)}.")
+            touched.add(_known_body(body, study.bodies, f"{where}: {key} = {shown(face)}"))
+    for name, link in study.links.items():
+        for key, point in (("first", link.first), ("second", link.second)):
+            if point is None:
+                continue
+            where = f"{title}: [links.{name}]: {key} = {shown(point)}"
+            body, dot, _ = point.partition(".")
+            if not dot:
+                raise InputError(f"{where} must be \"BODY.POINT\"; the bodies are: "
+                                 f"{choices(study.bodies)}.")
+            touched.add(_known_body(body, study.bodies, where))
+    loose = [name for name in study.bodies if name not in touched]
+    if loose:
+        raise InputError(f"{title}: no interface and no link touches the "
+                         f"{'body' if len(loose) == 1 else 'bodies'} {choices(loose)}; name a face "
+                         f"of each in [interfaces.NAME], or leave it out.")
+
+
+def _check_names(study: Bodies, title: str) -> None:
+    used: dict[str, str] = {}
+    for section in ("bodies", "interfaces", "links"):
+        for name in getattr(study, section):
+            where = f"{title}: [{section}.{name}]"
+            if not name or "." in name:
+                raise InputError(f"{where}: the name '{name}' must be a text without dots, which "
+                                 f"part the names of keys.")
+            if section == "bodies" and name == "ground":
+                raise InputError(f"{where}: 'ground' is the name of the ground; choose another.")
+            if name in used:
+                raise InputError(f"{where}: the name '{name}' is that of [{used[name]}.{name}] "
+                                 f"too; give each its own.")
+            used[name] = section
+
+
+def _known_body(body: str, bodies: Mapping[str, Any], where: str) -> str:
+    if body not in bodies:
+        raise InputError(f"{where}: there is no body '{body}'{nearest(body, bodies)}; the bodies "
+                         f"are: {choices(bodies)}.")
+    return body
+
+
+def links_from_tables(tables: Any, title: str) -> dict[str, Link]:
+    """All links from ``[links]``; the key ``kind`` names the class of each."""
+    if not isinstance(tables, Mapping):
+        raise InputError(f"{title}: [links] must be a table of links, [links.NAME], not "
+                         f"{shown(tables)}.")
+    found: dict[str, Link] = {}
+    for name, table in tables.items():
+        where = f"{title}: [links.{name}]"
+        kind = table.get("kind") if isinstance(table, Mapping) else None
+        if not isinstance(kind, str) or kind not in LINKS:
+            raise InputError(f"{where}: kind = {shown(kind)} must be one of {choices(LINKS)}"
+                             f"{nearest(str(kind), LINKS)}.")
+        found[name] = from_table(LINKS[kind], {key: value for key, value in table.items()
+                                               if key != "kind"}, where)
+    return found
+
+
+def link_table(link: Link, *, defaults: bool = True) -> dict[str, Any]:
+    """Table of a link; the inverse of :func:`links_from_tables`."""
+    kind = {cls: name for name, cls in LINKS.items()}[type(link)]
+    return {"kind": kind, **to_table(link, defaults=defaults)}
+
+
+def body_meshes(study: Bodies, title: str) -> dict[str, Mesh]:
+    """Meshes of all bodies in their places."""
+    found = {}
+    for name, one in study.bodies.items():
+        mesh = geometry_mesh(one.geometry, study.folder, f"{title}: [bodies.{name}.geometry]:")
+        with located(f"{title}: [bodies.{name}.placement]:", "Mesh"):
+            found[name] = one.placement.placed(mesh)
+    return found
+
+
+def elastic_bodies(study: Bodies, meshes: Mapping[str, Mesh], title: str) -> dict[str, ElasticBody]:
+    """All elastic bodies."""
+    found = {}
+    for name, one in study.bodies.items():
+        with located(f"{title}: [bodies.{name}.body]:", "ElasticBody"):
+            if one.body.rotation is not None:
+                raise InputError("rotation is for a single body: rows in its frame would turn "
+                                 "against those of the others. Prescribe the sliding of its "
+                                 "interfaces instead.")
+            found[name] = one.body.elastic_body(meshes[name])
+    return found
+
+
+def pairings(
+    study: Bodies, bodies: Mapping[str, ElasticBody], title: str
+) -> dict[str, Pairing]:
+    """Pairings of the faces of all interfaces."""
+    found = {}
+    for name, one in study.interfaces.items():
+        with located(f"{title}: [interfaces.{name}]:", "pair_faces"):
+            assert one.face is not None
+            for face in (one.face, one.other):
+                body, _, boundary = face.partition(".")
+                if boundary and boundary not in (known := bodies[body].mesh.boundaries):
+                    raise InputError(f"the mesh of body '{body}' has no boundary '{boundary}'"
+                                     f"{nearest(boundary, known)}; its boundaries are: "
+                                     f"{choices(known)}.")
+            found[name] = pair_faces(bodies, one.face, one.other, nodes=one.nodes,
+                                     nodes_on=one.nodes_on, reach=one.reach, overlap=one.overlap)
+    return found
+
+
+def body_bases(
+    study: Bodies, bodies: Mapping[str, ElasticBody], faces: Mapping[str, Pairing], title: str
+) -> dict[str, ModalBasis]:
+    """Modal bases of all bodies, with the forces at their interfaces; see ``reduce_bodies``."""
+    found = {}
+    with located(f"{title}: [bodies]:"):
+        bases = reduce_bodies(
+            bodies, list(faces.values()), list(study.links.values()),
+            modes={name: one.basis.modes for name, one in study.bodies.items()},
+            each={name: one.basis.options for name, one in study.bodies.items()})
+    for name, one in study.bodies.items():
+        with located(f"{title}: [bodies.{name}.basis]:"):
+            found[name] = one.basis.finished(bases[name])
+    return found
+
+
+def reduced_bodies(
+    bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing], links: Mapping[str, Link],
+    title: str,
+) -> Reduced:
+    """The assembled basis, and the gaps of the geometry."""
+    with located(f"{title}:"):
+        return Reduced(assembled_basis(bases, faces, list(links.values())),
+                       np.concatenate([np.zeros(0), *(one.gaps for one in faces.values())]))

@@ -1,0 +1,160 @@
+"""Meshes, elastic bodies and modal bases of a study, made once and kept."""
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from fecontact.core.errors import InputError, choices
+from fecontact.core.tables import located
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.pairing import Pairing
+from fecontact.reduction.links import Link
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.study.bodies_section import (
+    BodySections,
+    InterfaceSettings,
+    Reduced,
+    body_bases,
+    body_meshes,
+    elastic_bodies,
+    pairings,
+    reduced_bodies,
+)
+from fecontact.study.geometry_section import Geometry, geometry_mesh
+from fecontact.study.sections import BasisSettings, BodySettings
+
+# Cached objects of a study, and that on which each depends.
+_MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
+    "_mesh": lambda study: study.geometry,
+    "_body": lambda study: (study.geometry, study.body),
+    "_meshes": lambda study: {
+        name: (one.geometry, one.placement) for name, one in study.bodies.items()},
+    "_bodies": lambda study: {
+        name: (one.geometry, one.placement, one.body) for name, one in study.bodies.items()},
+    "_pairings": lambda study: (_MADE_FROM["_bodies"](study), {
+        name: one.pairing_keys for name, one in study.interfaces.items()}),
+    "_bases": lambda study: (study.bodies, study.links, _MADE_FROM["_pairings"](study)),
+    "_reduced": lambda study: (study.geometry, study.body, study.basis,
+                               _MADE_FROM["_bases"](study)),
+}
+
+
+class StudyModels:
+    """What of a study is made from geometry, bodies and bases: all but laws and run."""
+
+    geometry: Geometry | None
+    body: BodySettings
+    basis: BasisSettings
+    bodies: Mapping[str, BodySections]
+    interfaces: Mapping[str, InterfaceSettings]
+    links: Mapping[str, Link]
+    path: Path | None
+
+    @property
+    def title(self) -> str:
+        """Name of the study in messages."""
+        return "The study" if self.path is None else str(self.path)
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the study file, to which other paths are relative."""
+        return Path() if self.path is None else self.path.parent
+
+    def mesh(self) -> Mesh:
+        """The mesh, generated or read; cached, as are body and modal basis."""
+        self._require_one("mesh", "meshes")
+        return self._mesh
+
+    def elastic_body(self) -> ElasticBody:
+        """The elastic body."""
+        self._require_one("elastic_body", "elastic_bodies")
+        return self._body
+
+    def modal_basis(self) -> ModalBasis:
+        """The modal basis."""
+        self._require_one("modal_basis", "modal_bases")
+        return self._reduced.basis
+
+    def meshes(self) -> dict[str, Mesh]:
+        """Meshes of several bodies by name, in their places."""
+        self._require_several("meshes", "mesh")
+        return dict(self._meshes)
+
+    def elastic_bodies(self) -> dict[str, ElasticBody]:
+        """Several elastic bodies by name."""
+        self._require_several("elastic_bodies", "elastic_body")
+        return dict(self._bodies)
+
+    def pairings(self) -> dict[str, Pairing]:
+        """Pairings of the faces of several bodies, by the names of the interfaces."""
+        self._require_several("pairings", "mesh")
+        return dict(self._pairings)
+
+    def modal_bases(self) -> dict[str, ModalBasis]:
+        """Modal bases of several bodies by name."""
+        self._require_several("modal_bases", "modal_basis")
+        return dict(self._bases)
+
+    @property
+    def thickness(self) -> float | None:
+        """Thickness of the body, or of all bodies [m]; None if they differ."""
+        found = {one.body.thickness for one in self.bodies.values()} or {self.body.thickness}
+        return found.pop() if len(found) == 1 else None
+
+    def _require_one(self, name: str, instead: str) -> None:
+        if self.bodies:
+            raise InputError(f"{self.title} describes the bodies {choices(self.bodies)}; "
+                             f"Study.{name} is for a single one, use Study.{instead}.")
+
+    def _require_several(self, name: str, instead: str) -> None:
+        if not self.bodies:
+            raise InputError(f"{self.title} describes a single body; Study.{name} is for "
+                             f"several, use Study.{instead}.")
+
+    def reuse(self, other: "StudyModels") -> None:
+        """Take over what another study has made, as far as it depends on equal sections."""
+        for made, needed in _MADE_FROM.items():
+            if made in vars(other) and needed(self) == needed(other):
+                vars(self)[made] = vars(other)[made]
+
+    @property
+    def reduced(self) -> Reduced:
+        """The modal basis, that of all bodies together if there are several."""
+        return self._reduced
+
+    @cached_property
+    def _mesh(self) -> Mesh:
+        assert self.geometry is not None
+        return geometry_mesh(self.geometry, self.folder, f"{self.title}: [geometry]:")
+
+    @cached_property
+    def _body(self) -> ElasticBody:
+        mesh = self._mesh
+        with located(f"{self.title}: [body]:", "ElasticBody"):
+            return self.body.elastic_body(mesh)
+
+    @cached_property
+    def _meshes(self) -> dict[str, Mesh]:
+        return body_meshes(self, self.title)
+
+    @cached_property
+    def _bodies(self) -> dict[str, ElasticBody]:
+        return elastic_bodies(self, self._meshes, self.title)
+
+    @cached_property
+    def _pairings(self) -> dict[str, Pairing]:
+        return pairings(self, self._bodies, self.title)
+
+    @cached_property
+    def _bases(self) -> dict[str, ModalBasis]:
+        return body_bases(self, self._bodies, self._pairings, self.title)
+
+    @cached_property
+    def _reduced(self) -> Reduced:
+        if self.bodies:
+            return reduced_bodies(self._bases, self._pairings, self.links, self.title)
+        body = self._body
+        with located(f"{self.title}: [basis]:"):
+            return Reduced(self.basis.modal_basis(body, self.body.rotation))
