@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite, require_positive
@@ -89,6 +90,24 @@ class ReductionQuality:
     load_compliance: Array
 
 
+@dataclass(frozen=True)
+class BodyPart:
+    """The part of one body in an assembled basis of several.
+
+    Attributes
+    ----------
+    name : str
+    modes : (int, int)
+        First of its modal coordinates, and their number.
+    nodes : (int, int)
+        First of its nodes in ``mode_shapes.nodes``, and their number; (0, 0) without shapes.
+    """
+
+    name: str
+    modes: tuple[int, int]
+    nodes: tuple[int, int] = (0, 0)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ModalBasis(Summarised):
     """Mass-normalised modes ``q`` of a body and its motion at the points of interest.
@@ -136,6 +155,12 @@ class ModalBasis(Summarised):
         by circulatory forces, its skew part, or by rotation.
     rotation : ModalRotation or None
         Rotation of the body, whose Coriolis and stiffening terms damping and stiffness include.
+    contact_normals : (n, 2) array or None
+        Unit normals of the contact nodes, out of the other side; None for (0, 1) everywhere.
+    on_ground : (n,) bool array or None
+        Whether the other side of a contact node is the ground; None for all.
+    parts : tuple of BodyPart
+        Bodies of an assembled basis.
 
     Raises
     ------
@@ -159,6 +184,9 @@ class ModalBasis(Summarised):
     boundary_rows: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
     stiffness: Array | None = None
     rotation: ModalRotation | None = None
+    contact_normals: Array | None = None
+    on_ground: NDArray[np.bool_] | None = None
+    parts: tuple[BodyPart, ...] = ()
 
     def __post_init__(self) -> None:
         m = len(self.angular_frequencies)
