@@ -13,7 +13,11 @@ from eigen import rectangle
 from fecontact import ElasticBody, Mesh
 from fecontact.fem.contact_face import contact_nodes
 from fecontact.reduction.eigenmodes import FreeSystem, free_modes
-from fecontact.reduction.residual_vectors import Flexibility, modal_compliance, residual_modes
+from fecontact.reduction.static_modes.residual_vectors import (
+    Flexibility,
+    modal_compliance,
+    residual_modes,
+)
 
 MODES, NODES = 40, 200
 

@@ -31,7 +31,7 @@ def contact_groups(
     body: ElasticBody, boundaries: str | Sequence[str],
     counts: Literal["all"] | int | Sequence[int | Literal["all"]],
 ) -> ContactNodes:
-    """Contact nodes on one or several boundaries, in the order of the boundaries.
+    """Contact nodes on one or several boundaries, in the order of the boundaries, or on none.
 
     ``counts`` is common to all boundaries or has one entry per boundary; see :func:`contact_nodes`.
 
@@ -50,7 +50,10 @@ def contact_groups(
     names = (boundaries,) if isinstance(boundaries, str) else tuple(boundaries)
     each: tuple[Any, ...] = (tuple(counts) if isinstance(counts, list | tuple)
                              else (counts,) * len(names))
-    if not names or len(set(names)) < len(names):
+    if not names:
+        return ContactNodes(sp.csr_array((0, 2 * len(body.nodes))), np.zeros((0, 2)),
+                            np.zeros(0), ())
+    if len(set(names)) < len(names):
         raise InputError(f"contact = {boundaries!r} must name boundaries, each once.")
     if len(each) != len(names):
         raise InputError(f"contact_nodes = {counts!r} must be one entry for all boundaries, or "

@@ -135,11 +135,12 @@ def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> 
     target = np.stack([wanted[0] - wanted[2] * y, wanted[1] + wanted[2] * x,
                        np.full(len(x), wanted[2])], axis=1)
     # Ignore points without rows (such as a missing B or C) and unused components.
-    rows = basis.T.reshape(-1, basis.modes)[:, : basis.rigid_modes]
+    rigid = basis.angular_frequencies == 0.0
+    rows = basis.T.reshape(-1, basis.modes)[:, rigid]
     used = np.abs(basis.T.reshape(-1, basis.modes)).any(axis=1)
     wanted_rows = target.reshape(-1)[used]
-    if basis.rigid_modes:
-        q[: basis.rigid_modes] = np.linalg.lstsq(rows[used], wanted_rows, rcond=None)[0]
+    if rigid.any():
+        q[rigid] = np.linalg.lstsq(rows[used], wanted_rows, rcond=None)[0]
     missed = np.abs(basis.T.reshape(-1, basis.modes)[used] @ q - wanted_rows).max()
     if missed > 1e-6 * np.abs(wanted_rows).max():
         raise InputError(f"initial: {what} = {tuple(motion)} is not a motion that the body is free "

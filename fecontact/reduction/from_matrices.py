@@ -14,8 +14,12 @@ from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_dam
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs, free_modes
 from fecontact.reduction.matrix_files import AssembledMatrix
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.null_space import lowest_vectors, null_space, relative_energies
 from fecontact.reduction.restriction import Restriction, stack_restriction
+from fecontact.reduction.static_modes.null_space import (
+    lowest_vectors,
+    null_space,
+    relative_energies,
+)
 
 # Up to this size all modes are kept by default.
 _ALL = 2000
@@ -74,7 +78,7 @@ def basis_from_matrices(
     rows : mapping
         ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
-        groups a mapping of their names to such rows. ``B``, ``C`` and further named points: dense
+        groups a mapping of their names to such rows; left out for a body that touches nothing. ``B``, ``C`` and further named points: dense
         or sparse (3, d); B and C default to zero. Two rows, x and y, instead of three mean no
         rotation. See :func:`fecontact.reduction.rows_from_dofs`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
@@ -121,14 +125,14 @@ def basis_from_matrices(
     M, (K, skew) = _symmetric(M), _parts(K)
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
-    return assembled_basis(
+    return basis_of_modes(
         w, shapes, given, contact_x=contact_x, tributary=tributary, thickness=thickness,
         inertia=inertia,
         stiffness=None if skew is None else np.diag(w**2) + shapes.T @ (skew @ shapes),
         damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
 
 
-def assembled_basis(
+def basis_of_modes(
     w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
     tributary: ArrayLike | None, thickness: float | None, inertia: Array | None = None,
     stiffness: Array | None = None,
@@ -146,7 +150,7 @@ def assembled_basis(
         damping=modal_damping(damping, w),
         T=T,
         positions=positions,
-        tributary=_per_node("tributary", 1.0 / n if tributary is None else tributary, n),
+        tributary=_per_node("tributary", 1.0 / max(n, 1) if tributary is None else tributary, n),
         extra=rows.extra,
         groups=rows.groups,
         thickness=thickness,
@@ -296,7 +300,7 @@ def _negative_pivots(matrix: Any) -> bool:
         scale = 1.0 / np.sqrt(matrix.diagonal())
         lowest = np.linalg.eigvalsh(matrix.toarray() * np.outer(scale, scale))[0]
         return bool(lowest <= 1e-15 * len(scale))
-    from fecontact.reduction.null_space import symmetric_factors
+    from fecontact.reduction.static_modes.null_space import symmetric_factors
 
     return bool((symmetric_factors(matrix).U.diagonal() <= 0.0).any())
 

@@ -10,7 +10,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.eigenmodes import fixed_signs
-from fecontact.reduction.from_matrices import assembled_basis, given_matrix, inertia_of
+from fecontact.reduction.from_matrices import basis_of_modes, given_matrix, inertia_of
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.restriction import stack_restriction
 
@@ -157,7 +157,7 @@ def basis_from_modes(
     S = S / np.sqrt(masses)
     signs = fixed_signs(S)
     order = np.argsort(w, kind="stable")
-    return assembled_basis(
+    return basis_of_modes(
         w[order], (S * signs)[:, order], stack_restriction(rows, d), contact_x=contact_x,
         tributary=tributary, thickness=thickness, damping=_reordered(damping, order, signs),
         inertia=inertia)

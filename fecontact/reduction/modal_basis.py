@@ -2,131 +2,40 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite, require_positive
-from fecontact.core.types import Array, ArrayLike, Integers
+from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.fem.fields import BodyFields
-from fecontact.fem.interpolation import interpolation
-from fecontact.fem.points import rotating_rows
+from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
-
-
-@dataclass(frozen=True, eq=False)
-class ModeShapes:
-    """Mode shapes over the whole body, for plots and for loads at any point.
-
-    Attributes
-    ----------
-    nodes : (N, 2) array
-        Reference places of the displacement nodes [m].
-    cells : (M, 3) or (M, 4) integer array
-        First-order cells between these nodes (four per finite element).
-    outline : (k, 2) integer array
-        Edges on the outline, as pairs of nodes.
-    shapes : (N, 2, m) array
-        Mass-normalised mode shapes, x and y.
-    stress : (N, 4, m) array
-        Stresses xx, yy, zz, xy of the modes, averaged at the nodes [Pa per unit coordinate].
-    restriction : sparse (3 P, 2 N) array
-        Displacements and rotation of the P points from those of the nodes (node by node, x then y),
-        so that ``T = restriction @ shapes``; its transpose distributes a force at a point over the
-        nodes.
-    elements : (E, k) integer array, optional
-        Nodes of each finite element: corners, mid-sides, centre; by default the cells.
-    """
-
-    nodes: Array
-    cells: Integers
-    outline: Integers
-    shapes: Array
-    stress: Array
-    restriction: Any
-    elements: Integers | None = None
-
-    def rows_at(self, place: Sequence[float], name: str) -> Array:
-        """Displacement x, y and rotation (3, m) of the modes at a place within an element.
-
-        InputError, with ``name`` in front, for a place outside the body.
-        """
-        elements = self.cells if self.elements is None else self.elements
-        rows = rotating_rows(len(self.nodes), *interpolation(self.nodes, elements, place, name))
-        return np.asarray(rows @ self.shapes.reshape(2 * len(self.nodes), -1))
-
-
-@dataclass(frozen=True, eq=False)
-class ReductionQuality:
-    """Quality of a basis compared with its finite-element body.
-
-    Attributes
-    ----------
-    mass : float
-        Mass of the body [kg].
-    vibration_modes : int
-        Number of leading modes that are eigenmodes of the body.
-    residuals : (m,) array
-        ``|K s - w^2 M s| / (|K| |s|)`` of each mode s; small for eigenmodes only.
-    orthogonality : float
-        Largest entry of ``shapes^T M shapes - 1``.
-    compliance : (P, 2) array
-        Elastic displacement of each point in x and y per unit force there, of the full body (loads
-        are balanced by supports and inertia) [m/N].
-    load_compliance : (1 + b, 2) array
-        Work ``f^T u`` of the loads in the elastic displacement under them, of the full body:
-        gravity of 1 m/s^2 in x and y [N m], then for each of the b boundaries pressure and
-        shear of 1 Pa.
-    """
-
-    mass: float
-    vibration_modes: int
-    residuals: Array
-    orthogonality: float
-    compliance: Array
-    load_compliance: Array
-
-
-@dataclass(frozen=True)
-class BodyPart:
-    """The part of one body in an assembled basis of several.
-
-    Attributes
-    ----------
-    name : str
-    modes : (int, int)
-        First of its modal coordinates, and their number.
-    nodes : (int, int)
-        First of its nodes in ``mode_shapes.nodes``, and their number; (0, 0) without shapes.
-    """
-
-    name: str
-    modes: tuple[int, int]
-    nodes: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModalBasis(Summarised):
-    """Mass-normalised modes ``q`` of a body and its motion at the points of interest.
+    """Mass-normalised modes ``q`` of a body, or several, and the motion of points of interest.
 
-    The equations of motion are ``q'' + damping q' + stiffness_matrix q = T^T f + centrifugal_load``
-    (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless ``stiffness`` is
+    The equations of motion are ``q'' + damping q' + stiffness_matrix q = T^T f + centrifugal_load
+    + link_load`` (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless ``stiffness`` is
     given; the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for each, x tangential
     to the ground, y away from it, phi counter-clockwise.
 
     Attributes
     ----------
     angular_frequencies : (m,) array
-        Of the symmetric part of the stiffness without rotation [rad/s], ascending; exactly zero
-        for rigid modes.
+        Of the symmetric part of the stiffness without rotation [rad/s], ascending, of several
+        bodies one after the other; exactly zero for rigid modes.
     damping : (m, m) array
         Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D. Its skew part is
         gyroscopic and does no work.
     T : (P, 3, m) array
-        Rows of excitation point B, load point C, the n contact nodes and further named points.
+        Rows of excitation point B, load point C, the n contact nodes and further named points;
+        those of a contact node are its motion relative to the other side along its tangent and
+        normal, and its relative rotation.
     positions : (P, 2) array
         Reference places of these points [m].
     tributary : (n,) array
@@ -156,17 +65,21 @@ class ModalBasis(Summarised):
     rotation : ModalRotation or None
         Rotation of the body, whose Coriolis and stiffening terms damping and stiffness include.
     contact_normals : (n, 2) array or None
-        Unit normals of the contact nodes, out of the other side; None for (0, 1) everywhere.
+        Unit normal (n_x, n_y) at each contact node, out of the other side; its tangent is
+        (n_y, -n_x). None means (0, 1) everywhere.
     on_ground : (n,) bool array or None
-        Whether the other side of a contact node is the ground; None for all.
+        Whether the other side of each contact node is the ground, not a body; None means all.
     parts : tuple of BodyPart
-        Bodies of an assembled basis.
+        The bodies, if there are several.
+    link_load : (m,) array or None
+        Constant modal forces of preloaded links between bodies.
 
     Raises
     ------
     InputError
         For arrays of wrong shape, values that are not finite, tributary lengths or a thickness
-        that are not positive, and groups that do not add up to the contact nodes.
+        that are not positive, normals that are not of length one, and groups or parts that do not
+        add up.
     """
 
     angular_frequencies: Array
@@ -187,13 +100,14 @@ class ModalBasis(Summarised):
     contact_normals: Array | None = None
     on_ground: NDArray[np.bool_] | None = None
     parts: tuple[BodyPart, ...] = ()
+    link_load: Array | None = None
 
     def __post_init__(self) -> None:
         m = len(self.angular_frequencies)
         if not self.boundaries and not np.size(self.boundary_rows):
             object.__setattr__(self, "boundary_rows", np.zeros((0, 2, m)))
         arrays = ["angular_frequencies", "damping", "T", "positions", "tributary", "boundary_rows"]
-        arrays += [name for name in ("inertia_rows", "stiffness")
+        arrays += [name for name in ("inertia_rows", "stiffness", "contact_normals", "link_load")
                    if getattr(self, name) is not None]
         for name in arrays:
             array = np.array(getattr(self, name), dtype=float, order="C")
@@ -208,7 +122,8 @@ class ModalBasis(Summarised):
             require_positive("Modal basis", thickness=self.thickness)
             object.__setattr__(self, "thickness", float(self.thickness))
         groups = tuple((str(name), int(count)) for name, count in self.groups)
-        groups = groups or (("contact", len(self.tributary)),)
+        if not groups and len(self.tributary):
+            groups = (("contact", len(self.tributary)),)
         if sum(count for _, count in groups) != len(self.tributary):
             raise InputError(f"Modal basis: the contact groups {groups} do not add up to the "
                              f"{len(self.tributary)} contact nodes.")
@@ -217,15 +132,45 @@ class ModalBasis(Summarised):
         for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2)),
                             ("inertia_rows", (2, m)),
                             ("boundary_rows", (len(self.boundaries), 2, m)),
-                            ("stiffness", (m, m))):
+                            ("stiffness", (m, m)), ("link_load", (m,)),
+                            ("contact_normals", (len(self.tributary), 2))):
             given = getattr(self, name)
             if given is not None and given.shape != shape:
                 raise InputError(f"Modal basis: {name} must have shape {shape}, not "
                                  f"{given.shape}.")
+        self._check_sides()
+
+    def _check_sides(self) -> None:
+        """Check normals, other sides and bodies."""
+        if self.contact_normals is not None:
+            lengths = np.linalg.norm(self.contact_normals, axis=1)
+            if (np.abs(lengths - 1.0) > 1e-9).any():
+                worst = int(np.argmax(np.abs(lengths - 1.0)))
+                raise InputError(f"Modal basis: the normal of contact node {worst} has the length "
+                                 f"{lengths[worst]:.6g}; contact_normals must be of length one.")
+        if self.on_ground is not None:
+            given = np.array(self.on_ground)
+            if given.shape != self.tributary.shape or given.dtype != bool:
+                raise InputError(f"Modal basis: on_ground must be {self.contact_nodes} flags, true "
+                                 f"or false, not an array of shape {given.shape} of {given.dtype}.")
+            given.setflags(write=False)
+            object.__setattr__(self, "on_ground", given)
+        object.__setattr__(self, "parts", tuple(self.parts))
+        names = [part.name for part in self.parts]
+        if len(set(names)) < len(names):
+            raise InputError(f"Modal basis: the bodies {listed(names)} must have different names.")
+        nodes = 0 if self.mode_shapes is None else len(self.mode_shapes.nodes)
+        for part in self.parts:
+            for what, (first, count), total in (("modes", part.modes, self.modes),
+                                                ("nodes", part.nodes, nodes)):
+                if not 0 <= first <= first + count <= total:
+                    raise InputError(f"Modal basis: body '{part.name}' has {count} {what} from "
+                                     f"{first}, but there are {total}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes, frequencies, damping, contact nodes and points."""
-        hertz = [f"{value:.5g}" for value in self.frequencies_hz[self.rigid_modes :]]
+        elastic = self.angular_frequencies > 0.0
+        hertz = [f"{value:.5g}" for value in np.sort(self.frequencies_hz[elastic])]
         middle = hertz if len(hertz) < 6 else [*hertz[:3], "...", hertz[-1]]
         diagonal = (self.damping == np.diag(np.diag(self.damping))).all()
         full = "full matrix" + _skew(self.damping, ", in part gyroscopic")
@@ -234,11 +179,12 @@ class ModalBasis(Summarised):
             ("modes", f"{self.modes}, {self.rigid_modes} rigid"),
             ("frequencies", f"{', '.join(middle)} Hz" if hertz else "none"),
             ("damping", "none" if not self.damping.any() else full if not diagonal
-             else f"ratios {span(self.damping_ratios[self.rigid_modes :])}"),
+             else f"ratios {span(self.damping_ratios[elastic])}"),
             *([] if self.stiffness is None else
               [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
             *([] if self.rotation is None else
               [("rotation", quantity(self.rotation.speed, "rad/s"))]),
+            *([("bodies", listed([part.name for part in self.parts]))] if self.parts else []),
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 else "")),
             ("points", listed(["B", "C", *self.extra])),
@@ -260,6 +206,20 @@ class ModalBasis(Summarised):
     def frequencies_hz(self) -> Array:
         """Eigenfrequencies (m,) [Hz]."""
         return self.angular_frequencies / (2.0 * np.pi)
+
+    @property
+    def normals(self) -> Array:
+        """Unit normal (n, 2) at each contact node, out of the other side."""
+        if self.contact_normals is None:
+            return np.tile([0.0, 1.0], (self.contact_nodes, 1))
+        return self.contact_normals
+
+    @property
+    def ground_nodes(self) -> NDArray[np.bool_]:
+        """Whether the other side of each contact node (n,) is the ground."""
+        if self.on_ground is None:
+            return np.ones(self.contact_nodes, dtype=bool)
+        return self.on_ground
 
     @property
     def stiffness_matrix(self) -> Array:
@@ -287,7 +247,7 @@ class ModalBasis(Summarised):
 
     @property
     def rigid_modes(self) -> int:
-        """Number of modes of frequency zero; they come first."""
+        """Number of modes of frequency zero; those of one body come first."""
         return int(np.count_nonzero(self.angular_frequencies == 0.0))
 
     @property
@@ -438,6 +398,7 @@ class ModalBasis(Summarised):
             raise InputError(f"modes {list(modes)} must be different numbers from 0 to "
                              f"{self.modes - 1}, at least one.")
         given, quality, turning = self.mode_shapes, self.quality, self.rotation
+        below = np.searchsorted(chosen, np.arange(self.modes + 1))
         return replace(
             self,
             angular_frequencies=self.angular_frequencies[chosen],
@@ -451,6 +412,10 @@ class ModalBasis(Summarised):
                 stiffening=turning.stiffening[np.ix_(chosen, chosen)], load=turning.load[chosen]),
             mode_shapes=None if given is None else replace(
                 given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
+            link_load=None if self.link_load is None else self.link_load[chosen],
+            parts=tuple(replace(part, modes=(int(below[first]), int(below[end] - below[first])))
+                        for part in self.parts
+                        for first, end in [(part.modes[0], sum(part.modes))]),
             quality=None if quality is None else replace(
                 quality, residuals=quality.residuals[chosen],
                 vibration_modes=int(np.count_nonzero(chosen < quality.vibration_modes))),

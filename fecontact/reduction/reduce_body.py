@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.core.tables import located
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.contact_face import contact_groups
@@ -15,12 +16,13 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import body_elements, linear_cells, stress_of
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
-from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
-from fecontact.reduction.modal_basis import ModalBasis, ModeShapes, ReductionQuality
-from fecontact.reduction.residual_vectors import Flexibility, residual_modes
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import modal_rotation
+from fecontact.reduction.static_modes.craig_bampton import craig_bampton
+from fecontact.reduction.static_modes.residual_vectors import Flexibility, residual_modes
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
@@ -39,6 +41,7 @@ def modal_basis(
     tolerance: float = 0.1,
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
+    interface_rows: Sequence[Any] = (),
 ) -> ModalBasis:
     """Mass-normalised modes, and T at B, C and the contact nodes.
 
@@ -50,7 +53,7 @@ def modal_basis(
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
         Boundary that touches the ground, its outward normal pointing to -y; each of several is a
-        contact group.
+        contact group. None of them, ``()``, for a body that touches others only.
     contact_nodes : int or 'all', or one of them for each boundary
         Number of equal segments of the boundary, each with a contact node at its centre that moves
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.
@@ -72,6 +75,9 @@ def modal_basis(
         under pressure and shear, further points under forces.
     rotation : Rotation, optional
         The body rotates; displacements are those in its frame, modes those at rest.
+    interface_rows : sequence of sparse (3 k, 2 N) arrays
+        Displacements x, y and rotation of further places at which forces act, as contact nodes and feet of a pairing,
+        see :func:`fecontact.reduction.reduce_bodies`; they are completed as B and C are.
 
     Raises
     ------
@@ -104,11 +110,16 @@ def modal_basis(
                          "'craig-bampton'; choose one of these, or leave loads out.")
     system = FreeSystem.of(body)
     completing = loading(body, system, loads, points)
-    # Forces act at B, C and the contact nodes in x and y; there are no moments.
-    loaded = np.flatnonzero(np.arange(restriction.shape[0]) % 3 < 2)
-    flexibility = Flexibility(system, sp.csr_array(restriction[loaded] @ body.expansion))
-    w, free_shapes, vibration = _modes(system, flexibility, modes, reduction, tolerance,
-                                       2 * (2 + len(face.tributary)), completing)
+    # Forces act at B, C, the contact nodes and interfaces in x and y; there are no moments.
+    at_points = sp.csr_array(restriction[np.arange(restriction.shape[0]) % 3 < 2])
+    at_interfaces = [_interface_rows(body, rows) for rows in interface_rows]
+    flexibility = Flexibility(system, sp.csr_array(
+        sp.vstack([at_points, *at_interfaces]) @ body.expansion))
+    row = np.arange(len(flexibility.rows.indptr) - 1)
+    is_point = row < at_points.shape[0]
+    used = (row < 2 * (2 + len(face.tributary))) | ~is_point
+    w, free_shapes, vibration = _modes(system, flexibility.of_rows(used), modes, reduction,
+                                       tolerance, completing)
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
@@ -138,7 +149,8 @@ def modal_basis(
             restriction=restriction,
             elements=elements,
         ),
-        quality=_quality(body, system, flexibility, w, free_shapes, vibration, forces),
+        quality=_quality(body, system, flexibility.of_rows(is_point), w, free_shapes, vibration,
+                         forces),
         groups=face.groups,
         thickness=body.thickness,
         inertia_rows=rows[0],
@@ -149,13 +161,81 @@ def modal_basis(
     return basis if turning is None else basis.with_rotation_speed(turning.speed)
 
 
+def reduce_bodies(
+    bodies: Mapping[str, ElasticBody],
+    pairings: Sequence[Any] = (),
+    *,
+    modes: int | Mapping[str, int] = 20,
+    each: Mapping[str, Mapping[str, Any]] | None = None,
+    **options: Any,
+) -> dict[str, ModalBasis]:
+    """Modal bases of several bodies that can carry the forces between them.
+
+    By default modes with residual vectors of forces at the nodes and feet of the pairings.
+
+    Parameters
+    ----------
+    bodies : mapping of name to ElasticBody
+    pairings : sequence of Pairing
+        Where the bodies may touch each other or the ground; they name the bodies.
+    modes : int or mapping of name to int
+        Number of modes of each body, rigid ones included, without residual vectors.
+    each : mapping of name to mapping, optional
+        Options of single bodies, as for :func:`~fecontact.modal_basis`: ``{"pad": {"damping":
+        0.02}}``.
+    **options : Any
+        Options common to all bodies.
+
+    Returns
+    -------
+    dict of str to ModalBasis
+
+    Raises
+    ------
+    InputError, MeshError
+        For names of bodies that are not there, and as :func:`~fecontact.modal_basis`.
+    """
+    require_kind("reduce_bodies", Mapping, bodies=bodies)
+    each = {} if each is None else each
+    counts = modes if isinstance(modes, Mapping) else dict.fromkeys(bodies, modes)
+    named = {name for one in pairings for name in (one.body, one.other) if name is not None}
+    for what, names in (("pairings", sorted(named)), ("modes", counts), ("each", each)):
+        for name in names:
+            if name not in bodies:
+                raise InputError(f"reduce_bodies: {what} names the body '{name}'"
+                                 f"{nearest(str(name), bodies)}; the bodies are "
+                                 f"{choices(bodies)}.")
+    found = {}
+    for name, body in bodies.items():
+        if name not in counts:
+            raise InputError(f"reduce_bodies: modes lacks the body '{name}'.")
+        rows = [one.nodes for one in pairings if one.body == name]
+        rows += [one.feet for one in pairings if one.other == name]
+        given = {"contact": (), "reduction": "residual", **options, **each.get(name, {})}
+        with located(f"Body '{name}':"):
+            found[name] = modal_basis(body, counts[name], interface_rows=rows, **given)
+    return found
+
+
+def _interface_rows(body: ElasticBody, given: Any) -> Any:
+    """Rows of displacements x and y of rows x, y and rotation of points."""
+    import scipy.sparse as sp
+
+    rows = sp.csr_array(given)
+    if rows.shape[1] != 2 * len(body.nodes) or rows.shape[0] % 3:
+        raise InputError(f"modal_basis: interface_rows of shape {rows.shape} must be (3 k, "
+                         f"{2 * len(body.nodes)}), displacements x, y and rotation of k places "
+                         f"from the nodes of this body; pair the faces of the same bodies.")
+    return rows[np.arange(rows.shape[0]) % 3 < 2]
+
+
 def _modes(
     system: FreeSystem, flexibility: Flexibility, count: int, reduction: Reduction,
-    tolerance: float, used: int, loads: Array,
+    tolerance: float, loads: Array,
 ) -> tuple[Array, Array, int]:
     """Frequencies, shapes and number of the eigenmodes among them."""
     if reduction == "craig-bampton":
-        w, shapes = craig_bampton(system, flexibility.rows[:used], count, loads)
+        w, shapes = craig_bampton(system, flexibility.rows, count, loads)
         return w, shapes, system.rigid.shape[1]
     w, shapes = free_modes(system, count)
     if reduction == "vibration":
@@ -163,8 +243,7 @@ def _modes(
     if count < system.rigid.shape[1]:
         raise InputError(f"modes = {count} must be at least the number of rigid modes, "
                          f"{system.rigid.shape[1]}, for reduction = 'residual'.")
-    more, completing = residual_modes(flexibility.of_first(used), w, shapes, tolerance,
-                                      loads)
+    more, completing = residual_modes(flexibility, w, shapes, tolerance, loads)
     return np.concatenate([w, more]), np.hstack([shapes, completing]), count
 
 

@@ -73,7 +73,7 @@ class BasisReport:
     @property
     def highest_frequency_hz(self) -> float:
         """Highest frequency of the basis [Hz]."""
-        return float(self.basis.frequencies_hz[-1])
+        return float(self.basis.frequencies_hz.max())
 
     @property
     def time_step(self) -> float:
@@ -91,6 +91,8 @@ class BasisReport:
             return ("The basis is rigid: the body moves, but does not deform. Keep more modes "
                     "where its vibration or its elasticity at the contact matters.")
         error = self.contact_error
+        if not error.size:
+            return "The body has no contact nodes."
         node, axis = np.unravel_index(int(np.argmax(error)), error.shape)
         worst = float(error[node, axis])
         if worst <= _GOOD:
@@ -157,7 +159,7 @@ class BasisReport:
         return "\n".join(lines)
 
     def _kind(self, mode: int) -> str:
-        if mode < self.basis.rigid_modes:
+        if self.basis.angular_frequencies[mode] == 0.0:
             return "rigid"
         quality = self.basis.quality
         if quality is None or mode < quality.vibration_modes:

@@ -85,16 +85,14 @@ def stack_restriction(rows: Mapping[str, Any], d: int) -> Restriction:
     Raises
     ------
     InputError
-        If ``contact`` is missing, or a block has a wrong shape.
+        If a block has a wrong shape.
     """
     import scipy.sparse as sp
 
-    if "contact" not in rows:
-        raise InputError("rows must have an entry 'contact', of shape (n, 3, d) or (n, 2, d).")
-    given = rows["contact"]
-    named = given if isinstance(given, Mapping) and given else {"contact": given}
+    given = rows.get("contact", {})
+    named = given if isinstance(given, Mapping) else {"contact": given}
     blocks = {name: _contact_block(block, d) for name, block in named.items()}
-    contact = sp.csr_array(sp.vstack(list(blocks.values())))
+    contact = sp.csr_array(sp.vstack([sp.csr_array((0, d)), *blocks.values()]))
     extra = tuple(name for name in rows if name not in ("B", "C", "contact"))
     ends = [_point_block(name, rows[name], d) if name in rows else sp.csr_array((3, d))
             for name in ("B", "C")]

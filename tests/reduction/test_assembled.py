@@ -16,7 +16,7 @@ from fecontact import (
 )
 from fecontact.io import AssembledMatrix
 from fecontact.reduction import normalisation, rows_from_dofs
-from fecontact.reduction.null_space import null_space, relative_energies
+from fecontact.reduction.static_modes.null_space import null_space, relative_energies
 
 SUPPORTS = {"free": {}, "hinged": {"hinge": "xy"}, "on rollers": {"left": "x"},
             "clamped": {"left": "xy"}}

@@ -11,10 +11,10 @@ import fecontact
 from fecontact import ElasticBody, InputError
 from fecontact.io import read_basis, write_basis
 from fecontact.reduction import BasisReport, eigenfrequencies_hz
-from fecontact.reduction.craig_bampton import craig_bampton
 from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.factorisation import SymmetricFactors
-from fecontact.reduction.residual_vectors import Flexibility
+from fecontact.reduction.static_modes.craig_bampton import craig_bampton
+from fecontact.reduction.static_modes.residual_vectors import Flexibility
 
 modal_basis = partial(fecontact.modal_basis, contact="bottom")
 
@@ -161,7 +161,10 @@ def test_fixed_interface_modes_are_those_of_the_body_held_at_its_interface():
     # The lowest modes of the body on rigid supports at its face span what was added.
     exact = 2.0 * np.pi * eigenfrequencies_hz(held, 6)
     K = sp.csc_array(body.stiffness)
-    from fecontact.reduction.craig_bampton import _fixed_interface_modes, _independent
+    from fecontact.reduction.static_modes.craig_bampton import (
+        _fixed_interface_modes,
+        _independent,
+    )
 
     patterns = _independent(only)
     shapes = _fixed_interface_modes(system, rows.T @ patterns, only.deflections(patterns),

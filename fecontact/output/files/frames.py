@@ -11,7 +11,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.contact_faces import contact_directions, nodes_on_ground
-from fecontact.reduction.modal_basis import ModeShapes
+from fecontact.reduction.mode_shapes import ModeShapes
 
 
 def frame_indices(

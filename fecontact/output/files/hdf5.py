@@ -22,14 +22,12 @@ from fecontact.core.files.stored import (
     values,
 )
 from fecontact.core.interrupts import held_back_interrupt
-from fecontact.reduction.modal_basis import (
-    ModalBasis,
-    ModeShapes,
-    ReductionQuality,
-)
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
 
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
+_OPTIONAL = ("inertia_rows", "stiffness", "contact_normals", "on_ground", "link_load")
 _MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
 
 
@@ -141,15 +139,19 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     """Write a basis into an HDF5 group."""
     for name in _PLAIN:
         group.create_dataset(name, data=getattr(basis, name))
-    if basis.stiffness is not None:
-        group.create_dataset("stiffness", data=basis.stiffness)
+    for name in _OPTIONAL:
+        if getattr(basis, name) is not None:
+            given = getattr(basis, name)
+            group.create_dataset(name, data=given.astype("i1" if given.dtype == bool else float))
+    if basis.parts:
+        parts = group.create_dataset("parts", data=[(*part.modes, *part.nodes)
+                                                    for part in basis.parts])
+        parts.attrs["names"] = [part.name for part in basis.parts]
     if basis.rotation is not None:
         rotation = group.create_group("rotation")
         for name, value in vars(basis.rotation).items():
             rotation.create_dataset(name, data=value)
     group.attrs["extra"] = list(basis.extra)
-    if basis.inertia_rows is not None:
-        group.create_dataset("inertia_rows", data=basis.inertia_rows)
     if basis.boundaries:
         group.create_dataset("boundary_rows", data=basis.boundary_rows)
         group["boundary_rows"].attrs["names"] = list(basis.boundaries)
@@ -189,25 +191,37 @@ def stored_basis(group: Any) -> ModalBasis:
     names, sizes = (np.atleast_1d(group.attrs[name]) for name in ("groups", "group_sizes"))
     require_lengths("'group_sizes'", len(names), sizes)
     boundaries: tuple[str, ...] = ()
-    loads: dict[str, Any] = {}
-    if "inertia_rows" in group:
-        loads["inertia_rows"] = array(group, "inertia_rows", (2, m))
+    tributary = array(group, "tributary", (None,))
+    shapes = {"inertia_rows": (2, m), "stiffness": (m, m), "link_load": (m,),
+              "contact_normals": (len(tributary), 2)}
+    given: dict[str, Any] = {name: array(group, name, shape) for name, shape in shapes.items()
+                             if name in group}
+    if "on_ground" in group:
+        given["on_ground"] = array(
+            group, "on_ground", (len(tributary),), "i").astype(bool)
     if "boundary_rows" in group:
         stored = member(group, "boundary_rows")
         boundaries = tuple(str(name) for name in np.atleast_1d(stored.attrs["names"]))
-        loads["boundary_rows"] = array(group, "boundary_rows", (len(boundaries), 2, m))
+        given["boundary_rows"] = array(group, "boundary_rows", (len(boundaries), 2, m))
     return ModalBasis(
         w, array(group, "damping", (m, m)), T, array(group, "positions", (len(T), 2)),
-        array(group, "tributary", (None,)), extra=extra,
+        tributary, extra=extra,
         mode_shapes=(_read_mode_shapes(member(group, "mode_shapes"), m, len(T))
                      if "mode_shapes" in group else None),
         quality=(_read_quality(member(group, "quality"), m, len(T), len(boundaries))
                  if "quality" in group else None),
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
-        boundaries=boundaries, **loads,
+        boundaries=boundaries, parts=_read_parts(group) if "parts" in group else (), **given,
         thickness=float(group.attrs["thickness"]) if "thickness" in group.attrs else None,
-        stiffness=array(group, "stiffness", (m, m)) if "stiffness" in group else None,
         rotation=_read_rotation(member(group, "rotation"), m) if "rotation" in group else None)
+
+
+def _read_parts(group: Any) -> tuple[BodyPart, ...]:
+    blocks = array(group, "parts", (None, 4), "i").tolist()
+    names = np.atleast_1d(group["parts"].attrs["names"])
+    require_lengths("the names of 'parts'", len(blocks), names)
+    return tuple(BodyPart(str(name), (block[0], block[1]), (block[2], block[3]))
+                 for name, block in zip(names, blocks, strict=True))
 
 
 def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:

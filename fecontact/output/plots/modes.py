@@ -9,7 +9,8 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.output.plots.figure import new_figure
 from fecontact.reduction.convergence import ModeConvergence
-from fecontact.reduction.modal_basis import ModalBasis, ModeShapes
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.mode_shapes import ModeShapes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

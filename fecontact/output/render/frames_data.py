@@ -21,7 +21,8 @@ from fecontact.output.files.frames import (
 )
 from fecontact.output.plots.style import state_names
 from fecontact.reduction.contact_faces import contact_sides, nodes_on_ground, several_bodies
-from fecontact.reduction.modal_basis import ModalBasis, ModeShapes
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.mode_shapes import ModeShapes
 
 Colour = Literal["displacement", "von_mises"]
 

@@ -10,7 +10,7 @@ from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.offscreen import known_window
 from fecontact.reduction.contact_faces import contact_faces
-from fecontact.reduction.modal_basis import ModeShapes
+from fecontact.reduction.mode_shapes import ModeShapes
 
 COLOUR_MAPS = {"displacement": "viridis", "von_mises": "cividis"}
 NODE_COLOURS = {"open": "#ffffff", **STATE_COLOURS}

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs
@@ -29,10 +30,10 @@ class Flexibility:
         self._factors = SymmetricFactors(system.factors)
         self._places, self._half = self._factors.forward_substitute(self.rows[:, system.held])
 
-    def of_first(self, count: int) -> "Flexibility":
-        """The same for the first rows alone."""
+    def of_rows(self, which: NDArray[np.bool_]) -> "Flexibility":
+        """The same for some rows alone."""
         part = copy(self)
-        part.rows, part._half = self.rows[:count], self._half[:, :count]
+        part.rows, part._half = self.rows[which], self._half[:, which]
         for name in ("compliance", "_balance"):
             part.__dict__.pop(name, None)
         return part

@@ -14,7 +14,7 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem
-from fecontact.reduction.residual_vectors import Flexibility, diagonalised
+from fecontact.reduction.static_modes.residual_vectors import Flexibility, diagonalised
 
 
 def craig_bampton(

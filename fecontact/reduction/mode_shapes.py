@@ -1,0 +1,104 @@
+"""What a modal basis holds of its bodies: shapes, quality of the reduction, blocks of modes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.types import Array, Integers
+from fecontact.fem.interpolation import interpolation
+from fecontact.fem.points import rotating_rows
+
+
+@dataclass(frozen=True, eq=False)
+class ModeShapes:
+    """Mode shapes over the whole body, for plots and for loads at any point.
+
+    Attributes
+    ----------
+    nodes : (N, 2) array
+        Reference places of the displacement nodes [m].
+    cells : (M, 3) or (M, 4) integer array
+        First-order cells between these nodes (four per finite element).
+    outline : (k, 2) integer array
+        Edges on the outline, as pairs of nodes.
+    shapes : (N, 2, m) array
+        Mass-normalised mode shapes, x and y.
+    stress : (N, 4, m) array
+        Stresses xx, yy, zz, xy of the modes, averaged at the nodes [Pa per unit coordinate].
+    restriction : sparse (3 P, 2 N) array
+        Displacements and rotation of the P points from those of the nodes (node by node, x then y),
+        so that ``T = restriction @ shapes``; its transpose distributes a force at a point over the
+        nodes.
+    elements : (E, k) integer array, optional
+        Nodes of each finite element: corners, mid-sides, centre; by default the cells.
+    """
+
+    nodes: Array
+    cells: Integers
+    outline: Integers
+    shapes: Array
+    stress: Array
+    restriction: Any
+    elements: Integers | None = None
+
+    def rows_at(self, place: Sequence[float], name: str) -> Array:
+        """Displacement x, y and rotation (3, m) of the modes at a place within an element.
+
+        InputError, with ``name`` in front, for a place outside the body.
+        """
+        elements = self.cells if self.elements is None else self.elements
+        rows = rotating_rows(len(self.nodes), *interpolation(self.nodes, elements, place, name))
+        return np.asarray(rows @ self.shapes.reshape(2 * len(self.nodes), -1))
+
+
+@dataclass(frozen=True, eq=False)
+class ReductionQuality:
+    """Quality of a basis compared with its finite-element body.
+
+    Attributes
+    ----------
+    mass : float
+        Mass of the body [kg].
+    vibration_modes : int
+        Number of leading modes that are eigenmodes of the body.
+    residuals : (m,) array
+        ``|K s - w^2 M s| / (|K| |s|)`` of each mode s; small for eigenmodes only.
+    orthogonality : float
+        Largest entry of ``shapes^T M shapes - 1``.
+    compliance : (P, 2) array
+        Elastic displacement of each point in x and y per unit force there, of the full body (loads
+        are balanced by supports and inertia) [m/N].
+    load_compliance : (1 + b, 2) array
+        Work ``f^T u`` of the loads in the elastic displacement under them, of the full body:
+        gravity of 1 m/s^2 in x and y [N m], then for each of the b boundaries pressure and
+        shear of 1 Pa.
+    """
+
+    mass: float
+    vibration_modes: int
+    residuals: Array
+    orthogonality: float
+    compliance: Array
+    load_compliance: Array
+
+
+@dataclass(frozen=True)
+class BodyPart:
+    """One of several bodies in a basis.
+
+    Attributes
+    ----------
+    name : str
+    modes : (int, int)
+        First of its modal coordinates and their number, zero where modes are common to all bodies,
+        as with links between them.
+    nodes : (int, int)
+        First of its nodes in ``mode_shapes.nodes`` and their number, zero for a body without
+        shapes.
+    """
+
+    name: str
+    modes: tuple[int, int]
+    nodes: tuple[int, int] = (0, 0)

@@ -1,0 +1,1 @@
+"""Rigid, residual and constraint modes, from static solutions of finite-element matrices."""
