@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
@@ -62,22 +61,12 @@ def several_bodies(basis: ModalBasis) -> bool:
     return bool(basis.parts) or basis.contact_normals is not None or basis.on_ground is not None
 
 
-def nodes_on_ground(basis: ModalBasis) -> NDArray[np.bool_]:
-    """Whether the other side of each contact node (n,) is the ground."""
-    if basis.on_ground is None:
-        return np.ones(basis.contact_nodes, dtype=bool)
-    return np.asarray(basis.on_ground, dtype=bool)
-
-
 def contact_directions(basis: ModalBasis) -> tuple[Array, Array]:
     """Tangents (n, 2) and normals (n, 2) of the contact nodes in global axes.
 
     Normals point out of the other side; a tangent is its normal turned clockwise by 90 degrees.
     """
-    if basis.contact_normals is None:
-        normals = np.tile((0.0, 1.0), (basis.contact_nodes, 1))
-    else:
-        normals = np.asarray(basis.contact_normals, dtype=float)
+    normals = basis.normals
     return np.column_stack([normals[:, 1], -normals[:, 0]]), normals
 
 
@@ -86,7 +75,7 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
     x, length = basis.contact_x, basis.tributary
     if not several_bodies(basis):
         return (ContactFace("", (), slice(0, len(x)), x, "x", length),)
-    ground, (tangents, normals) = nodes_on_ground(basis), contact_directions(basis)
+    ground, (tangents, normals) = basis.ground_nodes, contact_directions(basis)
     places = basis.positions[2 : 2 + len(x)]
     found, first = [], 0
     for name, count in basis.groups:
@@ -95,17 +84,14 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
         flat = bool(ground[nodes].all() or np.abs(normals[nodes, 0]).max(initial=0.0) < _FLAT)
         abscissa = x[nodes] if flat else _arc_length(places[nodes], normals[nodes],
                                                      tangents[nodes], length[nodes])
-        bodies = [part.name for part in basis.parts
-                  if basis.contact_T[nodes, :, part.modes[0] : sum(part.modes)].any()]
-        found.append(ContactFace(
-            name, (*bodies, *(("ground",) if ground[nodes].any() else ())), nodes, abscissa,
-            "x" if flat else "s", length[nodes]))
+        bodies = _bodies_at(basis, nodes) + ["ground"] * bool(ground[nodes].any())
+        found.append(ContactFace(name, tuple(bodies), nodes, abscissa, "x" if flat else "s",
+                                 length[nodes]))
     return tuple(found)
 
 
 def node_name(basis: ModalBasis, node: int) -> str:
-    """``contact node 3``, or with its interface ``shoe: node 3``; numbers are those of the basis.
-    """
+    """``contact node 3``, or ``shoe: node 3`` with its interface; numbers are those of the basis."""
     if not several_bodies(basis):
         return f"contact node {node}"
     ends = np.cumsum([count for _, count in basis.groups])
@@ -155,6 +141,24 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
     masks = [sp.kron(sp.coo_array((chosen.astype(float), (row, node)), shape=weights.shape),
                      np.ones((2, 2))) for chosen in (own, ~own)]
     return sp.csr_array(both * masks[0]), sp.csr_array(-(both * masks[1]))
+
+
+def _bodies_at(basis: ModalBasis, nodes: slice) -> list[str]:
+    """Names of the bodies with a part in the motion of some contact nodes."""
+    moving: Any = ()
+    if basis.mode_shapes is not None:
+        rows = basis.mode_shapes.restriction.tocsr()[6 + 3 * nodes.start : 6 + 3 * nodes.stop]
+        moving = np.unique(rows.indices[rows.data != 0.0] // 2)
+    found = []
+    for part in basis.parts:
+        if part.nodes[1]:
+            touches = np.searchsorted(moving, part.nodes[0]) < np.searchsorted(
+                moving, sum(part.nodes))
+        else:
+            touches = basis.contact_T[nodes, :, part.modes[0] : sum(part.modes)].any()
+        if touches:
+            found.append(part.name)
+    return found
 
 
 def _arc_length(places: Array, normals: Array, tangents: Array, tributary: Array) -> Array:

@@ -10,7 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.reduction.contact_faces import contact_directions, nodes_on_ground
+from fecontact.reduction.contact_faces import contact_directions
 from fecontact.reduction.mode_shapes import ModeShapes
 
 
@@ -95,7 +95,7 @@ def _local_forces(trajectory: Trajectory, which: Any) -> Array:
     ground, basis = trajectory.system.ground, trajectory.system.basis
     if ground.wavy and ground.normal == "surface":
         places = basis.contact_x + trajectory.modal_coordinates[which] @ basis.contact_T[:, 0].T
-        along = along - nodes_on_ground(basis) * normal * np.array([
+        along = along - basis.ground_nodes * normal * np.array([
             ground.slope(place, time)
             for place, time in zip(places, trajectory.time[which], strict=True)])
     return np.stack([along, normal], axis=-1)

@@ -8,6 +8,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.output.plots.figure import new_figure
+from fecontact.reduction.contact_faces import mode_names
 from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -26,7 +27,7 @@ def plot_modes(
 ) -> "Figure":
     """Plot the first modes: deformed body, coloured by amplitude, over its undeformed outline.
 
-    Each is scaled to the same largest displacement.
+    Of several bodies, the first modes of each. Each is scaled to the same largest displacement.
 
     Parameters
     ----------
@@ -60,13 +61,23 @@ def plot_modes(
         grid = figure.subplots(rows, columns, squeeze=False)
         for axis in grid.flat:
             axis.set_axis_off()
-        for mode, axis in enumerate(grid.flat[:shown]):
+        names = mode_names(basis)
+        for mode, axis in zip(_first_modes(basis, shown), grid.flat, strict=False):
             drawn = _draw_mode(axis, field, mode, reach)
             hertz = basis.frequencies_hz[mode]
-            axis.set_title(f"mode {mode}: " + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
+            axis.set_title(f"{names[mode]}{',' if basis.parts else ':'} "
+                           + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
         figure.colorbar(drawn, ax=grid, location="bottom", aspect=50, shrink=0.5, pad=0.02,
                         label="amplitude, relative to the largest")
     return figure
+
+
+def _first_modes(basis: ModalBasis, count: int) -> list[int]:
+    """Numbers of as many modes, of several bodies evenly from each."""
+    ranks = np.arange(basis.modes)
+    for part in basis.parts:
+        ranks[part.modes[0] : sum(part.modes)] = np.arange(part.modes[1])
+    return sorted(np.argsort(ranks, kind="stable")[:count].tolist())
 
 
 def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None) -> "Figure":

@@ -111,8 +111,8 @@ class ForceChart:
         axes.grid(color=_GRID)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(loc="upper right", ncols=4 if len(totals) > 2 else 2, fontsize=0.9 * self.font, frameon=False,
-                    borderaxespad=0.0)
+        axes.legend(loc="upper right", ncols=4 if len(totals) > 2 else 2,
+                    fontsize=0.9 * self.font, frameon=False, borderaxespad=0.0)
         canvas.draw()
         image = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
         box = axes.get_window_extent()

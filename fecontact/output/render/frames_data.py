@@ -20,7 +20,7 @@ from fecontact.output.files.frames import (
     von_mises,
 )
 from fecontact.output.plots.style import state_names
-from fecontact.reduction.contact_faces import contact_sides, nodes_on_ground, several_bodies
+from fecontact.reduction.contact_faces import contact_sides, several_bodies
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 
@@ -43,7 +43,7 @@ def body_labels(basis: ModalBasis) -> tuple[tuple[str, int], ...]:
     if field is None:
         return ()
     # Arrows of the ground's forces lie below a body, those of other bodies inside.
-    contacts = basis.positions[2 : 2 + basis.contact_nodes][~nodes_on_ground(basis)]
+    contacts = basis.positions[2 : 2 + basis.contact_nodes][~basis.ground_nodes]
     for part in basis.parts:
         first, count = part.nodes
         nodes = field.nodes[first : first + count]
@@ -120,12 +120,12 @@ class Motion:
     @cached_property
     def footed(self) -> NDArray[np.intp]:
         """Contact nodes (f,) whose other side is a body, not the ground."""
-        return np.flatnonzero(~nodes_on_ground(self.trajectory.system.basis))
+        return np.flatnonzero(~self.trajectory.system.basis.ground_nodes)
 
     @cached_property
     def has_ground(self) -> bool:
         """Whether there is a ground under any of the bodies."""
-        return bool(nodes_on_ground(self.trajectory.system.basis).any())
+        return bool(self.trajectory.system.basis.ground_nodes.any())
 
     @cached_property
     def labels(self) -> tuple[tuple[str, int], ...]:
@@ -171,7 +171,7 @@ class Motion:
         if not self.has_ground:
             return self.box[2]
         basis = self.trajectory.system.basis
-        heights = basis.positions[2 : 2 + basis.contact_nodes, 1][nodes_on_ground(basis)]
+        heights = basis.positions[2 : 2 + basis.contact_nodes, 1][basis.ground_nodes]
         return float(heights.min() - self.scale * self._gap)
 
     def body(self, frame: int) -> tuple[Array, Array]:
@@ -227,8 +227,8 @@ class Motion:
         gap = self.trajectory.system.gap
         if not isinstance(gap, tuple):
             return float(cast(float, gap))
-        return float(np.asarray(gap)[nodes_on_ground(self.trajectory.system.basis)].min(initial=np.inf)
-                     ) if self.has_ground else 0.0
+        below = np.asarray(gap)[self.trajectory.system.basis.ground_nodes]
+        return float(below.min()) if len(below) else 0.0
 
     @property
     def _drift_scale(self) -> float:
@@ -248,7 +248,7 @@ class Motion:
         if not self.has_ground:
             return np.zeros(len(q))
         basis = self.trajectory.system.basis
-        return np.asarray(q @ basis.contact_T[nodes_on_ground(basis), 0].mean(axis=0))
+        return np.asarray(q @ basis.contact_T[basis.ground_nodes, 0].mean(axis=0))
 
     def _scaled(self, motion: Array, q: Array) -> Array:
         """Drawn motion (k, N, 2) from displacements (k, N, 2) at coordinates q (k, m)."""
