@@ -91,7 +91,7 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
 
 
 def node_name(basis: ModalBasis, node: int) -> str:
-    """``contact node 3``, or ``shoe: node 3`` with its interface; numbers are those of the basis."""
+    """``contact node 3``, or ``shoe: node 3`` with its interface; numbers as in the basis."""
     if not several_bodies(basis):
         return f"contact node {node}"
     ends = np.cumsum([count for _, count in basis.groups])

@@ -22,7 +22,7 @@ def test_a_single_body_has_one_face_along_x():
     assert node_name(body, 2) == "contact node 2"
     assert mode_names(body)[3] == "mode 3"
     tangents, normals = contact_directions(body)
-    assert (tangents == [1.0, 0.0]).all() and (normals == [0.0, 1.0]).all()
+    np.testing.assert_array_equal(np.hstack([tangents, normals]), [[1.0, 0.0, 0.0, 1.0]] * 4)
 
 
 def test_faces_name_their_interface_and_its_bodies():
