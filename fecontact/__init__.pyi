@@ -33,6 +33,7 @@ from .sweeps.sweep import sweep
 from .system.contact_system import ContactSystem
 from .system.forcing_period import forcing_period
 from .system.gap import Crown
+from .system.interfaces import Interface
 from .system.quasistatic.loading import load_history
 from .system.quasistatic.path import LoadPath
 from .system.quasistatic.prestressed_modes import prestressed_modes
@@ -55,6 +56,7 @@ __all__ = [
     "FecontactError",
     "Ground",
     "InputError",
+    "Interface",
     "Load",
     "LoadPath",
     "LossFactor",

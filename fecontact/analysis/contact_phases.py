@@ -18,12 +18,12 @@ Nodes = int | str | None
 
 
 def chosen_nodes(system: ContactSystem, nodes: Nodes) -> Integers:
-    """Indices of selected nodes: one node, those of a contact group, or all (None).
+    """Indices of selected nodes: one node, those of an interface, or all (None).
 
     Raises
     ------
     InputError
-        For a node or a group that does not exist.
+        For a node or an interface that does not exist.
     """
     basis = system.basis
     if nodes is None:
@@ -31,8 +31,8 @@ def chosen_nodes(system: ContactSystem, nodes: Nodes) -> Integers:
     if isinstance(nodes, str):
         names = [name for name, _ in basis.groups]
         if nodes not in names:
-            raise InputError(f"There is no contact group '{nodes}'{nearest(nodes, names)}; the "
-                             f"groups are: {choices(names)}.")
+            raise InputError(f"There is no interface '{nodes}'{nearest(nodes, names)}; the "
+                             f"interfaces are: {choices(names)}.")
         group = names.index(nodes)
         first = sum(count for _, count in basis.groups[:group])
         return first + np.arange(basis.groups[group][1])
@@ -94,7 +94,7 @@ class ContactMotion:
 
     @classmethod
     def of(cls, trajectory: Trajectory, nodes: Nodes = None) -> "ContactMotion":
-        """Motion of one node, of a contact group, or of all contact nodes of a run.
+        """Motion of one node, of an interface, or of all contact nodes of a run.
 
         Raises
         ------

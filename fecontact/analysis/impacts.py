@@ -112,7 +112,7 @@ def find_impacts(
     trajectory : Trajectory
         A run with several output times in each contact.
     nodes : int, str or None
-        Number of a contact node, name of a contact group, or None for all nodes. A face is in
+        Number of a contact node, name of an interface, or None for all nodes. A face is in
         contact while any of its nodes is.
     shortest_flight : float
         Phases separated by less than this time are merged [s].

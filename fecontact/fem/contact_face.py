@@ -61,7 +61,7 @@ def contact_groups(
     edges = np.concatenate([np.sort(body.mesh.boundary(name), axis=1) for name in names])
     if len(np.unique(edges, axis=0)) < len(edges):
         raise InputError(f"The contact boundaries {choices(names)} share edges; an edge can "
-                         f"belong to only one contact group.")
+                         f"belong to only one interface.")
     faces = [contact_nodes(body, name, count)
              for name, count in zip(names, each, strict=True)]
     return ContactNodes(

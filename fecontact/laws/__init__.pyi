@@ -16,6 +16,7 @@ from .ground.measured_profile import MeasuredProfile
 from .ground.motion import HarmonicSpeed, SpeedRamp
 from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
+from .ground.sliding import SlidingRotation, SlidingTranslation
 from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .normal.measured_surface import MeasuredSurface
 from .normal.power import BackBurdekinContact, PowerContact, RestitutionContact
@@ -74,6 +75,8 @@ __all__ = [
     "RoughSurface",
     "Signal",
     "Sine",
+    "SlidingRotation",
+    "SlidingTranslation",
     "SpeedRamp",
     "Step",
     "SweptSine",

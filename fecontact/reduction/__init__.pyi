@@ -1,7 +1,9 @@
+from .assembled_basis import PointPairing, assembled_basis
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
+from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
 from .rotating import ModalRotation
@@ -11,9 +13,12 @@ __all__ = [
     "BodyPart",
     "ModalRotation",
     "ModeShapes",
+    "PointPairing",
     "ReductionQuality",
+    "assembled_basis",
     "eigenfrequencies_hz",
     "mode_convergence",
     "normalisation",
+    "reduce_bodies",
     "rows_from_dofs",
 ]

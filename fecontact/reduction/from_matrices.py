@@ -78,9 +78,9 @@ def basis_from_matrices(
     rows : mapping
         ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
-        groups a mapping of their names to such rows; left out for a body that touches nothing. ``B``, ``C`` and further named points: dense
-        or sparse (3, d); B and C default to zero. Two rows, x and y, instead of three mean no
-        rotation. See :func:`fecontact.reduction.rows_from_dofs`.
+        groups a mapping of their names to such rows; none for a body that touches nothing. ``B``,
+        ``C`` and further named points: dense or sparse (3, d); B and C default to zero. Two rows,
+        x and y, instead of three mean no rotation. See :func:`fecontact.reduction.rows_from_dofs`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
         Ratios of the modes, factors, or the damping matrix in the given degrees of freedom [N s/m],
         whose skew part is gyroscopic.

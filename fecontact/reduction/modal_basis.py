@@ -20,9 +20,9 @@ class ModalBasis(Summarised):
     """Mass-normalised modes ``q`` of a body, or several, and the motion of points of interest.
 
     The equations of motion are ``q'' + damping q' + stiffness_matrix q = T^T f + centrifugal_load
-    + link_load`` (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless ``stiffness`` is
-    given; the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for each, x tangential
-    to the ground, y away from it, phi counter-clockwise.
+    + link_load`` (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless
+    ``stiffness`` is given; the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for
+    each, x tangential to the ground, y away from it, phi counter-clockwise.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class ModalBasis(Summarised):
     quality : ReductionQuality or None
         Comparison with the body; None for a basis without one.
     groups : tuple of (str, int)
-        Names of the contact groups and their numbers of nodes, in the order of the nodes; by
+        Names of the interfaces and their numbers of nodes, in the order of the nodes; by
         default one group 'contact'.
     thickness : float or None
         Out-of-plane thickness of the body [m], which makes pressures of line loads; None where it
@@ -125,7 +125,7 @@ class ModalBasis(Summarised):
         if not groups and len(self.tributary):
             groups = (("contact", len(self.tributary)),)
         if sum(count for _, count in groups) != len(self.tributary):
-            raise InputError(f"Modal basis: the contact groups {groups} do not add up to the "
+            raise InputError(f"Modal basis: the interfaces {groups} do not add up to the "
                              f"{len(self.tributary)} contact nodes.")
         object.__setattr__(self, "groups", groups)
         points = 2 + len(self.tributary) + len(self.extra)

@@ -52,8 +52,8 @@ def modal_basis(
     modes : int
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground, its outward normal pointing to -y; each of several is a
-        contact group. None of them, ``()``, for a body that touches others only.
+        Boundary that touches the ground, its outward normal pointing to -y; each of several is an
+        interface of its name. None, ``()``, for a body that touches others only.
     contact_nodes : int or 'all', or one of them for each boundary
         Number of equal segments of the boundary, each with a contact node at its centre that moves
         with the segment's mean displacement; 'all' takes every displacement node of the boundary.
@@ -76,8 +76,8 @@ def modal_basis(
     rotation : Rotation, optional
         The body rotates; displacements are those in its frame, modes those at rest.
     interface_rows : sequence of sparse (3 k, 2 N) arrays
-        Displacements x, y and rotation of further places at which forces act, as contact nodes and feet of a pairing,
-        see :func:`fecontact.reduction.reduce_bodies`; they are completed as B and C are.
+        Displacements x, y and rotation of further places at which forces act, such as the nodes and
+        feet of a pairing: see :func:`fecontact.reduction.reduce_bodies`.
 
     Raises
     ------
@@ -176,6 +176,7 @@ def reduce_bodies(
     Parameters
     ----------
     bodies : mapping of name to ElasticBody
+        The bodies.
     pairings : sequence of Pairing
         Where the bodies may touch each other or the ground; they name the bodies.
     modes : int or mapping of name to int

@@ -26,7 +26,7 @@ class Restriction:
     extra : tuple of str
         Names of the further points.
     groups : tuple of (str, int)
-        Names of the contact groups and their numbers of nodes.
+        Names of the interfaces and their numbers of nodes.
     """
 
     restriction: Any

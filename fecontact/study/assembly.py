@@ -13,7 +13,7 @@ from fecontact.laws.excitation import Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.study.sections import ContactLaws
+from fecontact.study.sections import InterfaceSettings
 from fecontact.system.contact_system import (
     NO_FRICTION_LAW,
     NO_NORMAL_LAW,
@@ -35,8 +35,8 @@ class Described(Protocol):
         """Law of friction of all faces."""
 
     @property
-    def contact(self) -> Mapping[str, ContactLaws]:
-        """Laws of single contact groups."""
+    def interfaces(self) -> Mapping[str, InterfaceSettings]:
+        """Laws of single interfaces."""
 
     @property
     def load(self) -> Load:
@@ -59,10 +59,10 @@ def contact_system(study: Described, basis: ModalBasis, title: str) -> ContactSy
         For laws, loads or a gap that do not fit the basis; the message names the section.
     """
     groups = dict(basis.groups)
-    for name in study.contact:
+    for name in study.interfaces:
         if name not in groups:
-            raise InputError(f"{title}: [contact.{name}]: the basis has no contact group '{name}'"
-                             f"{nearest(name, groups)}; its groups are: {choices(groups)}.")
+            raise InputError(f"{title}: [interfaces.{name}]: the basis has no interface '{name}'"
+                             f"{nearest(name, groups)}; its interfaces are: {choices(groups)}.")
     if study.normal is None and len(_own(study, "normal")) < len(groups):
         raise InputError(NO_NORMAL_LAW.format(f"{title} lacks the section [normal]"))
     if study.friction is None and len(_own(study, "friction")) < len(groups) and (
@@ -92,8 +92,8 @@ def contact_system(study: Described, basis: ModalBasis, title: str) -> ContactSy
 
 
 def _own(study: Described, part: str) -> dict[str, Any]:
-    """Laws given for single contact groups."""
-    return {group: law for group, laws in study.contact.items()
+    """Laws given for single interfaces."""
+    return {group: law for group, laws in study.interfaces.items()
             if (law := getattr(laws, part)) is not None}
 
 
@@ -102,7 +102,7 @@ def _laws(study: Described, groups: Mapping[str, int]) -> Iterator[tuple[str, An
     for part in LAWS:
         own = _own(study, part)
         for group, law in own.items():
-            yield f"contact.{group}.{part}", law, groups[group]
+            yield f"interfaces.{group}.{part}", law, groups[group]
         for count in [sum(groups.values())] if not own else [
                 count for group, count in groups.items() if group not in own]:
             if getattr(study, part) is not None:

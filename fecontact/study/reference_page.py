@@ -58,8 +58,8 @@ def _parts() -> Iterator[tuple[str, str]]:
         name = entry.name.removesuffix("_settings")
         if name in ("geometry", "gap", "path"):
             continue
-        if name == "contact":
-            name = "contact.NAME"
+        if name == "interfaces":
+            name = "interfaces.NAME"
         yield from _sections(name, _inner(hints[entry.name]), printed)
 
 

@@ -89,14 +89,14 @@ class BodySettings:
 
 
 @dataclass(frozen=True)
-class ContactLaws:
-    """``[contact.NAME]``: contact laws of the group NAME.
+class InterfaceSettings:
+    """``[interfaces.NAME]``: laws of the interface NAME.
 
     Parameters
     ----------
     normal, friction : law, optional
-        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``; total values refer to the face of
-        the group.
+        ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``; total values refer to the
+        face of the interface.
     """
 
     normal: NormalLaw | None = None
@@ -113,7 +113,7 @@ class BasisSettings:
     modes : int
         Number of modes, the rigid ones included.
     contact : str or list of str
-        Boundary in contact with the ground, or several; each becomes a contact group of its name.
+        Boundary in contact with the ground, or several; each becomes an interface of its name.
     contact_nodes : int or 'all', or list
         Number of contact nodes, or 'all' for every mesh node of the boundary; a list has one entry
         for each boundary.

@@ -39,7 +39,7 @@ from fecontact.study.preload_section import PreloadSettings
 from fecontact.study.sections import (
     BasisSettings,
     BodySettings,
-    ContactLaws,
+    InterfaceSettings,
     OutputSettings,
     RenderSettings,
     SimulationSettings,
@@ -81,9 +81,9 @@ class Study(Summarised):
         ``[normal]``, ... : laws, ground, drive and load (contact requires a normal law, which has
         no default); see
         :class:`~fecontact.ContactSystem`.
-    contact : mapping of contact group to ContactLaws
-        ``[contact.NAME.normal]``, ``[contact.NAME.friction]``: laws of single contact groups; all
-        others use ``[normal]`` and ``[friction]``.
+    interfaces : mapping of interface to InterfaceSettings
+        ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``: laws of single interfaces;
+        all others use ``[normal]`` and ``[friction]``.
     gap : float, (n,) tuple or Crown
         Initial distance of the contact nodes from flat ground [m], or ``{radius, centre}`` for a
         face in the shape of an arc; written above all sections.
@@ -110,7 +110,7 @@ class Study(Summarised):
     basis: BasisSettings = field(default_factory=BasisSettings)
     normal: NormalLaw | None = None
     friction: FrictionLaw | None = None
-    contact: Mapping[str, ContactLaws] = field(default_factory=dict)
+    interfaces: Mapping[str, InterfaceSettings] = field(default_factory=dict)
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
@@ -126,7 +126,7 @@ class Study(Summarised):
 
     def summary(self) -> list[tuple[str, str]]:
         """Short description: file, geometry, modes, laws and duration of the run."""
-        groups = [f"own laws for {listed(list(self.contact))}"] if self.contact else []
+        groups = [f"own laws for {listed(list(self.interfaces))}"] if self.interfaces else []
         end = self.simulation.t_end
         laws = [type(law).__name__ for law in (self.normal, self.friction) if law is not None]
         return [
@@ -181,7 +181,7 @@ class Study(Summarised):
         tables = {name: table if name == "geometry" else with_folder(table, folder)
                   for name, table in tables.items()}
         for name in tables:
-            if name not in (valid := ("gap", "geometry", "contact", "preload", "sweep",
+            if name not in (valid := ("gap", "geometry", "interfaces", "preload", "sweep",
                                            *_SECTIONS)):
                 raise InputError(f"{title} has an unknown section or key '{name}'"
                                  f"{nearest(name, valid)}; there are: {choices(valid)}.")
@@ -191,8 +191,8 @@ class Study(Summarised):
         return cls(
             geometry_from_table(tables["geometry"], f"{title}: [geometry]"),
             gap=_gap(tables.get("gap", 0.0), title),
-            contact=convert(tables.get("contact", {}), Mapping[str, ContactLaws], title,
-                            "contact"),
+            interfaces=convert(tables.get("interfaces", {}), Mapping[str, InterfaceSettings], title,
+                               "interfaces"),
             sweep=from_table(SweepSettings, flat_axes(tables["sweep"]), f"{title}: [sweep]")
             if "sweep" in tables else None,
             preload=from_table(PreloadSettings, tables["preload"], f"{title}: [preload]")
@@ -230,13 +230,13 @@ class Study(Summarised):
         sections = {name: to_table(getattr(self, name), defaults=defaults)
                     for name in _SECTIONS
                     if getattr(self, name) is not None}
-        contact = {"contact": plain(self.contact)} if self.contact else {}
+        interfaces = {"interfaces": plain(self.interfaces)} if self.interfaces else {}
         for name in ("preload", "sweep"):
             if getattr(self, name) is not None:
                 sections[name] = to_table(getattr(self, name), defaults=defaults)
         return {"gap": plain(self.gap),
                 "geometry": geometry_table(self.geometry, defaults=defaults),
-                **contact,
+                **interfaces,
                 **{name: table for name, table in sections.items() if table or defaults}}
 
     def to_toml(self) -> str:

@@ -1,7 +1,7 @@
 """The contact system: a modal basis, laws at its contact nodes, drive and load."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Literal, cast
@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.compiled import CompiledLaw
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
@@ -24,6 +25,17 @@ from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
 from fecontact.system.arrays import system_arrays
 from fecontact.system.gap import Gap, gap_values
+from fecontact.system.interfaces import (
+    Interface,
+    PrescribedMotion,
+    Sliding,
+    checked_sliding,
+    inner_name,
+    motion_sources,
+    outer_name,
+    prescribed_motion,
+    system_fields,
+)
 from fecontact.system.loads import require_motion
 
 NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a rough "
@@ -34,7 +46,7 @@ NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a
                    "its coefficients, such as the exponential or the constant one (0 for no "
                    "friction); `fecontact laws` lists them.")
 
-PARTS = ("normal", "friction", "ground", "drive", "load")
+PARTS = ("normal", "friction", "sliding", "ground", "drive", "load")
 
 _KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
 
@@ -46,7 +58,10 @@ def needs_friction(basis: ModalBasis) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactSystem(Summarised):
-    """Reduced equations of an elastic body in contact with moving ground, (4.1-1) to (4.1-23).
+    """Reduced equations of elastic bodies in contact with moving ground or each other.
+
+    One body on the ground, (4.1-1) to (4.1-23): ``ContactSystem(basis, normal=, friction=, ...)``;
+    several: ``ContactSystem(bodies=, interfaces=, links=, ...)``.
 
     ``q'' + D q' + w^2 q = T^T f``, where f are the forces of the drive's springs and dashpots at B,
     the loads at C and other points, and ``[-R_j, F_j, 0]`` at contact node j from the normal and
@@ -55,9 +70,9 @@ class ContactSystem(Summarised):
     Attributes
     ----------
     basis : ModalBasis
-    normal : normal law, or mapping of contact group to normal law
+    normal : normal law, or mapping of interface to normal law
         Normal force F (on the body, upwards) from penetration and its rate.
-    friction : friction law, or mapping of contact group to friction law
+    friction : friction law, or mapping of interface to friction law
         Friction force R (on the body, against the slip velocity). Required if a contact node can
         move along the ground.
     ground : Ground
@@ -69,30 +84,60 @@ class ContactSystem(Summarised):
     gap : float, (n,) sequence, Crown or function of x
         Initial distance g_j of the contact nodes from flat ground, zero or above [m]; stored as
         numbers.
+    sliding : mapping of interface to SlidingTranslation or SlidingRotation
+        Prescribed motion of the other sides of interfaces.
+    bodies : mapping of name to ModalBasis, optional
+        Several bodies, assembled to ``basis``.
+    interfaces : sequence of Interface, optional
+        Where they may touch, with the laws; these become ``normal``, ``friction``, ``gap`` and
+        ``sliding``.
+    links : sequence of links, optional
+        Welds, hinges, bushings and springs between the bodies.
 
     Raises
     ------
     InputError
-        Without a normal law, or a required friction law; for a part of wrong type, laws for unknown
-        contact groups, parameters or gaps that do not match the number of contact nodes, laws that
+        Without contact nodes, a normal law, or a required friction law; for a part of wrong type,
+        laws for unknown interfaces, parameters or gaps that do not match the number of contact
+        nodes, speeds that cannot be combined (:attr:`prescribed_motion`), laws that
         :func:`require_sound` refuses, and drives or loads in a direction in which no mode moves
         their point.
     """
 
-    basis: ModalBasis
-    # Required; the error message is more helpful than Python's own.
+    # Basis and normal are required; the error message is more helpful than Python's own.
+    basis: ModalBasis = None  # type: ignore[assignment]
     normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
     friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
     gap: Gap = 0.0
+    sliding: Mapping[str, Sliding] = field(default_factory=dict)
+    bodies: InitVar[Mapping[str, ModalBasis] | None] = None
+    interfaces: InitVar[Sequence[Interface] | None] = None
+    links: InitVar[Sequence[Any] | None] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(
+        self, bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
+        links: Sequence[Any] | None,
+    ) -> None:
+        if bodies is not None or interfaces is not None or links is not None:
+            if any(getattr(self, name) is not None for name in ("basis", "normal", "friction")):
+                raise InputError("ContactSystem: give either basis with normal and friction, or "
+                                 "bodies with interfaces, which hold their laws.")
+            for name, value in system_fields(bodies, interfaces, links).items():
+                object.__setattr__(self, name, value)
+        self._check()
+
+    def _check(self) -> None:
+        """Check all parts and bring them into their stored form."""
+        if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
+            raise InputError("ContactSystem: there are no contact nodes; give the basis contact "
+                             "nodes, or the bodies an interface.")
         if self.normal is None:
             raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
         if self.friction is None:
-            if needs_friction(self.basis):
+            if isinstance(self.basis, ModalBasis) and needs_friction(self.basis):
                 raise InputError(NO_FRICTION_LAW.format("ContactSystem lacks friction"))
             object.__setattr__(self, "friction", ConstantFriction(0.0))
         for name, kind in _KINDS.items():
@@ -109,6 +154,8 @@ class ContactSystem(Summarised):
                     raise InputError(f"ContactSystem: {name} = {one!r} must be a "
                                      f"{law.__name__}.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+        object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
+        _ = self.prescribed_motion
         for part in (self.law_groups("normal"), self.law_groups("friction")):
             for _, share, one in part:
                 one.table(share)
@@ -120,24 +167,25 @@ class ContactSystem(Summarised):
         names = [group for group, _ in self.basis.groups]
         for group in given:
             if group not in names:
-                raise InputError(f"ContactSystem: {name} has a law for the contact group "
-                                 f"{group!r}{nearest(str(group), names)}, but the groups of "
+                raise InputError(f"ContactSystem: {name} has a law for the interface "
+                                 f"{group!r}{nearest(str(group), names)}, but the interfaces of "
                                  f"the basis are: {choices(names)}.")
         missing = [group for group in names if group not in given]
         if missing:
-            raise InputError(f"ContactSystem: {name} lacks a law for the contact "
-                             f"group{'s' * (len(missing) > 1)} {choices(missing)}.")
+            raise InputError(f"ContactSystem: {name} lacks a law for the "
+                             f"interface{'s' * (len(missing) > 1)} {choices(missing)}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes and contact nodes, laws, ground, drive and load."""
-        modes, frequencies, _, nodes, *_ = self.basis.summary()
+        own = dict(self.basis.summary())
         drive, ground = self.drive, self.ground
         low, high = ground.height_range
         stiffness = [f"{quantity(value, 'N/m')} in {axis}" for axis, value in (
             ("x", drive.stiffness_x), ("y", drive.stiffness_y)) if value]
         moved = drive.frequency_hz if any(motion.largest > 0.0 for motion in drive.motions) else 0.0
         return [
-            modes, frequencies, nodes,
+            *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
+              if name in own),
             *((kind, _law_names(getattr(self, kind))) for kind in ("normal", "friction")),
             ("ground", quantity(ground.speed, "m/s")
              + (f", {quantity(high - low, 'm')} from valley to peak" if ground.wavy else "")),
@@ -149,7 +197,7 @@ class ContactSystem(Summarised):
         """Groups of contact nodes with a common law: slice, share of each node, law.
 
         Extensive parameters are totals of the whole face for a single law, and totals of the group
-        for the law of a contact group.
+        for the law of an interface.
         """
         given, tributary = getattr(self, kind), self.basis.tributary
         if not isinstance(given, Mapping):
@@ -165,6 +213,25 @@ class ContactSystem(Summarised):
     def share(self) -> Array:
         """Fraction (n,) of the contact face of each node; their sum is one."""
         return self.basis.tributary / self.basis.tributary.sum()
+
+    @cached_property
+    def prescribed_motion(self) -> PrescribedMotion:
+        """Motion of ground and other sides: a function of time and a factor for each node."""
+        return prescribed_motion(self.basis, self.ground, self.sliding)
+
+    @property
+    def sliding_factors(self) -> Array:
+        """Tangential velocity (n,) of each node's other side by the speed of the motion."""
+        return self.prescribed_motion.factors
+
+    @property
+    def motion_kernel(self) -> CompiledLaw:
+        """Compiled travel and speed of the motion."""
+        return self.prescribed_motion.kernel
+
+    def motion_parameters(self) -> Array:
+        """Parameters of the compiled motion."""
+        return self.prescribed_motion.parameters.copy()
 
     @property
     def memory(self) -> int:
@@ -197,7 +264,7 @@ class ContactSystem(Summarised):
     def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
         """Times between two [s] at which drive, loads or ground motion have kinks, ascending."""
         given: tuple[Any, ...] = (
-            *self.drive.motions, *self.load.signals.values(), self.ground)
+            *self.drive.motions, *self.load.signals.values(), *self._motions())
         return tuple(sorted({time for source in given
                              for time in source.breakpoints(start, end)}))
 
@@ -208,12 +275,17 @@ class ContactSystem(Summarised):
         """
         given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
         given += self.load.signals.values()
-        given += [self.ground.motion] if self.ground.motion is not None else []
+        given += self._motions()
         periods = [source.shortest_period for source in given]
         wavelength, speed = self.ground.shortest_wavelength, self.ground.largest_speed(start, end)
         if wavelength is not None and speed > 0.0:
             periods.append(wavelength / speed)
         return float(min((period for period in periods if period is not None), default=np.inf))
+
+    def _motions(self) -> list[Any]:
+        """Motions in time of ground and sliding interfaces."""
+        return [source.motion for source in motion_sources(self.basis, self.ground, self.sliding)
+                if source.motion is not None]
 
     def stored_energy(self, penetration: Array) -> Array:
         """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""
@@ -296,11 +368,11 @@ class ContactSystem(Summarised):
         if inside:
             changes["basis"] = with_basis_parameters(changes.get("basis", self.basis), inside)
         for name in changes:
-            if "." in name and _inner_name(name).partition(".")[0] not in PARTS:
+            if "." in name and inner_name(name).partition(".")[0] not in PARTS:
                 raise self._unknown(name)
         try:
             return cast("ContactSystem", with_parameters(self, {
-                _inner_name(name): value for name, value in changes.items()}))
+                inner_name(name): value for name, value in changes.items()}))
         except KeyError as error:
             raise self._unknown(error.args[0]) from None
 
@@ -308,9 +380,9 @@ class ContactSystem(Summarised):
         """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
 
         Without the numbers of the basis, which :meth:`parameter` and :meth:`with_` know too.
-        Parameters of the laws of a contact group: ``contact.NAME.normal.stiffness``.
+        Parameters of the laws of an interface: ``interfaces.NAME.normal.stiffness``.
         """
-        return {_outer_name(self, f"{part}.{name}"): value
+        return {outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
                 for name, value in parameters_of(getattr(self, part)).items()}
 
@@ -332,7 +404,8 @@ class ContactSystem(Summarised):
 
     def _unknown(self, name: str) -> InputError:
         names = (*self.parameters(), "gap", *PARTS)
-        return InputError(f"The system has no parameter '{_outer_name(self, name)}'"
+        names = tuple(name for name in names if name != "sliding" or self.sliding)
+        return InputError(f"The system has no parameter '{outer_name(self, name)}'"
                           f"{nearest(name, names)}; "
                           f"its parameters are: {choices(names)}.")
 
@@ -349,28 +422,7 @@ def _load_summary(load: Load) -> str:
 
 
 def _law_names(law: Any) -> str:
-    """Class of a law, or those of the contact groups."""
+    """Class of a law, or those of the interfaces."""
     if isinstance(law, Mapping):
         return listed([f"{type(one).__name__} ({group})" for group, one in law.items()])
     return type(law).__name__
-
-
-def _inner_name(name: str) -> str:
-    """``normal.NAME.stiffness`` for ``contact.NAME.normal.stiffness``."""
-    first, _, rest = name.partition(".")
-    group, _, parameter = rest.partition(".")
-    kind, _, last = parameter.partition(".")
-    if first != "contact" or kind not in ("normal", "friction"):
-        return name
-    return f"{kind}.{group}.{last}" if last else f"{kind}.{group}"
-
-
-def _outer_name(system: ContactSystem, name: str) -> str:
-    """The reverse, for laws of contact groups."""
-    kind, _, rest = name.partition(".")
-    if kind not in ("normal", "friction") or not isinstance(getattr(system, kind), Mapping):
-        return name
-    group, _, last = rest.partition(".")
-    if group not in getattr(system, kind):
-        return name
-    return f"contact.{group}.{kind}.{last}" if last else f"contact.{group}.{kind}"

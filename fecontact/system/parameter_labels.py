@@ -17,9 +17,9 @@ def parameter_label(name: str, owner: type = ContactSystem) -> str:
     ``ground.speed`` becomes ``ground speed [m/s]``. Names that are not parameters of the dataclass
     ``owner``, or whose unit depends on the law, get no unit.
     """
-    inner = re.sub(r"^contact\.[^.]+\.", "", name)
+    inner = re.sub(r"^interfaces\.[^.]+\.", "", name)
     units = _units(owner).get(inner, frozenset())
-    words = re.sub(r"\b(\w+) \1\b", r"\1", re.sub(r"[._]", " ", name.removeprefix("contact.")))
+    words = re.sub(r"\b(\w+) \1\b", r"\1", re.sub(r"[._]", " ", name.removeprefix("interfaces.")))
     return f"{words} [{next(iter(units))}]" if len(units) == 1 else words
 
 

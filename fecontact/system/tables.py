@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fecontact.core.tables import convert, from_table, plain, require_known, to_table
+from fecontact.laws.ground.sliding import Sliding
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
@@ -16,9 +17,11 @@ def system_tables(system: ContactSystem) -> dict[str, Any]:
         given = getattr(system, part)
         if isinstance(given, Mapping):
             for group, law in given.items():
-                tables.setdefault("contact", {}).setdefault(group, {})[part] = to_table(law)
+                tables.setdefault("interfaces", {}).setdefault(group, {})[part] = to_table(law)
         else:
             tables[part] = to_table(given)
+    for group, one in system.sliding.items():
+        tables.setdefault("interfaces", {}).setdefault(group, {})["sliding"] = to_table(one)
     tables["gap"] = plain(system.gap)
     return tables
 
@@ -28,16 +31,22 @@ def system_from_tables(
 ) -> ContactSystem:
     """The contact system of a basis and tables ``normal``, ``friction``, ... , ``gap``."""
     parts = system_parts(tables, where, PART_CLASSES)
-    groups = convert(tables.get("contact", {}), Mapping[str, Mapping[str, Any]], where, "contact")
+    groups = convert(tables.get("interfaces", {}), Mapping[str, Mapping[str, Any]], where,
+                     "interfaces")
+    sliding: dict[str, Any] = {}
     for group, laws in groups.items():
         for part, table in laws.items():
-            require_known(part, ("normal", "friction"), f"{where}: [contact.{group}]")
+            place = f"{where}: [interfaces.{group}]"
+            require_known(part, ("normal", "friction", "sliding"), place)
+            if part == "sliding":
+                sliding[group] = convert(table, Sliding, place, part)
+                continue
             if not isinstance(parts.get(part), dict):
                 parts[part] = {}
             parts[part][group] = from_table(PART_CLASSES[part], table,
-                                            f"{where}: [contact.{group}.{part}]")
+                                            f"{where}: [interfaces.{group}.{part}]")
     gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
-    return ContactSystem(basis, gap=gap, **parts)
+    return ContactSystem(basis, gap=gap, sliding=sliding, **parts)
 
 
 def system_parts(

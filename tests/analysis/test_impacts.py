@@ -191,7 +191,7 @@ def test_contacts_between_outputs_are_not_lost_silently(outputs):
 
 
 def test_nodes_that_do_not_exist():
-    with pytest.raises(InputError, match="no contact group 'sole'"):
+    with pytest.raises(InputError, match="no interface 'sole'"):
         find_impacts(bouncing(outputs=301), "sole")
     with pytest.raises(InputError, match="Contact node 1 does not exist"):
         find_impacts(bouncing(outputs=301), 1)

@@ -1,4 +1,4 @@
-"""Laws in study files: by name, from the user's own file, for contact groups, with data files."""
+"""Laws in study files: by name, from the user's own file, for interfaces, with data files."""
 
 import pickle
 from dataclasses import MISSING, fields
@@ -262,10 +262,10 @@ contact_nodes = [3, 4]
 stiffness = 2e6
 roughness_height = 5.2e-6
 damping = 6.0
-[contact.left.friction]
+[interfaces.left.friction]
 law = "jenkins"
 stiffness = 1e6
-[contact.right.normal]
+[interfaces.right.normal]
 law = "linear"
 stiffness = 1e6
 [load]
@@ -284,13 +284,13 @@ t_end = 1e-3
     system = study.system()
     assert system.basis.groups == (("left", 3), ("right", 4))
     assert system.memory == 1
-    assert Study.from_toml(study.to_toml(), path).contact == study.contact
+    assert Study.from_toml(study.to_toml(), path).interfaces == study.interfaces
     run = fc.simulate(system, 1e-3, outputs=3)
     fc.write_case(tmp_path / "a.vtkhdf", run)
     again = fc.read_case(tmp_path / "a.vtkhdf").trajectory
     assert (again.normal_force == run.normal_force).all()
     assert again.system.basis.groups == system.basis.groups
-    path.write_text(path.read_text().replace("contact.left.friction", "contact.middle.friction"))
+    path.write_text(path.read_text().replace("interfaces.left.", "interfaces.middle."))
     assert execute(["run", str(path)]) == 1
     assert "'middle'" in capsys.readouterr().err
 

@@ -149,7 +149,7 @@ def test_a_study_of_ones_own_names_its_law(stored, capsys):
     {"drive": {"motion_x": {"law": "hostile.py:Harm"}}},
     {"load": {"forces": [{"point": "C", "component": "x",
                           "signal": {"law": "hostile.py:Harm"}}]}},
-    {"contact": {"contact": {"normal": {"law": "hostile.py:Harm"}}}},
+    {"interfaces": {"contact": {"normal": {"law": "hostile.py:Harm"}}}},
 ])
 def test_a_hostile_file_runs_nothing(stored, place, capsys):
     hostile = stored.parent / "hostile.py"

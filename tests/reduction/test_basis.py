@@ -162,7 +162,7 @@ def test_matrices_are_checked(mass, stiffness, options, message):
 
 
 @pytest.mark.parametrize(("rows", "message"), [
-    ({}, "'contact'"), ({"contact": np.zeros((3, 2))}, r"rows\['contact'\]"),
+    ({"contact": np.zeros((3, 2))}, r"rows\['contact'\]"),
     ({"contact": np.zeros((0, 3, 2))}, r"rows\['contact'\]"),
     ({**NO_CONTACT, "B": np.zeros((3, 3))}, r"rows\['B'\] must have shape \(3, d\) with d = 2"),
     ({**NO_CONTACT, "B": 1.0}, r"rows\['B'\]"),

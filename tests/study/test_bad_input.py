@@ -202,10 +202,10 @@ friction.static_coefficient -1
 friction.static_coefficient nan
 friction.static_coefficient {}
 friction 3
-contact {nowhere={}}
-contact {contact={norml={}}} normal
-contact {contact=3}
-contact {contact={normal={law="linear",stiffness=-1}}} stiffness
+interfaces {nowhere={}}
+interfaces {contact={norml={}}} normal
+interfaces {contact=3}
+interfaces {contact={normal={law="linear",stiffness=-1}}} stiffness
 ground.speed nan
 ground.speed inf
 ground.speed "a"

@@ -59,8 +59,8 @@ def test_defaults_and_units_of_a_section():
     needed = study_keys("load.forces")
     assert '| `component` | "x", "y" or "phi" | `"y"` |' in needed
     assert "| `signal` | a table of a law and its parameters |  | Its history" in needed
-    contact = study_keys("contact.NAME")
-    assert "total values refer to the face of the group" in contact
+    laws = study_keys("interfaces.NAME")
+    assert "total values refer to the face of the interface" in laws
 
 
 def test_keys_on_the_command_line(capsys):

@@ -121,8 +121,8 @@ def test_groups_have_laws_of_their_own():
         drive=Drive(stiffness_x=4000.0, damping_x=1.0))
     assert system.basis.groups == (("left", 1), ("right", 1))
     assert (system.memory, system.size) == (1, 6 + 2)
-    assert system.parameters()["contact.left.friction.stiffness"] == 1e5
-    changed = system.with_(**{"contact.right.friction.static_coefficient": 0.9})
+    assert system.parameters()["interfaces.left.friction.stiffness"] == 1e5
+    changed = system.with_(**{"interfaces.right.friction.static_coefficient": 0.9})
     assert changed.friction["right"].static_coefficient == 0.9
     assert changed.friction["left"] is friction["left"]
     # Each node of the whole is that of a system that has its law at both nodes.
@@ -139,14 +139,14 @@ def test_groups_have_laws_of_their_own():
         state = y[: alone.size] if alone.memory == 0 else y
         assert both[node] == pytest.approx(
             alone.contact_history(np.zeros(1), state[None])[0][node], rel=1e-13)
-    assert system.with_(**{"contact.left.friction.stiffness": 2e5}).contact_history(
+    assert system.with_(**{"interfaces.left.friction.stiffness": 2e5}).contact_history(
         np.zeros(1), y[None])[0, 0, 1] == pytest.approx(2.0 * both[0, 1], rel=1e-12)
 
 
 def test_a_group_without_a_law_is_named():
-    with pytest.raises(ValueError, match="lacks a law for the contact group 'right'"):
+    with pytest.raises(ValueError, match="lacks a law for the interface 'right'"):
         ContactSystem(basis(("left", "right")), RoughSurface(1e6, 1e-5),
                       friction={"left": JenkinsFriction(1e5, 0.4)})
-    with pytest.raises(ValueError, match="contact group 'centre'"):
+    with pytest.raises(ValueError, match="interface 'centre'"):
         ContactSystem(basis(), RoughSurface(1e6, 1e-5),
                       friction={"centre": JenkinsFriction(1e5, 0.4)})

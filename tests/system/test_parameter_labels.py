@@ -14,7 +14,7 @@ from fecontact.system.parameter_labels import _classes, _units_of, parameter_lab
     ("ground.speed", "ground speed [m/s]"),
     ("ground.profile.amplitude", "ground profile amplitude [m]"),
     ("drive.angular_frequency", "drive angular frequency [rad/s]"),
-    ("contact.SOLE.friction.smoothing_slope", "SOLE friction smoothing slope [s/m]"),
+    ("interfaces.SOLE.friction.smoothing_slope", "SOLE friction smoothing slope [s/m]"),
     ("normal.roughness_height", "normal roughness height [m]"),
     ("load.normal", "load normal [N]"),
     ("gap", "gap [m]"),

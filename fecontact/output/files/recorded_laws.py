@@ -160,8 +160,8 @@ def recorded_system(
 
 def _law(part: str, tables: Mapping[str, Any], where: str, needs: str) -> Any:
     """A law that needs no user code, or its placeholder."""
-    if tables.get("contact"):
-        return UnreadLaw(tables["contact"], needs)
+    if tables.get("interfaces"):
+        return UnreadLaw(tables["interfaces"], needs)
     try:
         return system_parts(tables, where, (part,))[part]
     except UntrustedError:

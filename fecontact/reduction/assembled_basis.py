@@ -1,0 +1,387 @@
+"""One modal basis of several bodies: their modes one block after the other, relative contact rows.
+
+With the rows T_a of a contact node on body a, those T_b of its foot on body b and the node's frame
+(t_j, n_j), its relative displacement is ``d_j = R_j (T_a q_a - T_b q_b)``: the contact rows of the
+assembled basis, for which a system needs no knowledge of the bodies.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import InputError, choices, nearest, shown
+from fecontact.core.tables import located
+from fecontact.core.types import Array, ArrayLike
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
+
+
+@dataclass(frozen=True, eq=False)
+class PointPairing:
+    """Contact nodes between named points of two bodies, or of a body and the ground.
+
+    Parameters
+    ----------
+    body : str
+        Name of the body.
+    points : str, int, or sequence of them
+        The contact nodes: named points of its basis, or numbers of contact nodes of it.
+    other : str, optional
+        Name of the other body; by default the ground.
+    other_points : str, int, or sequence of them, optional
+        As many points of the other body, the feet.
+    normals : (2,) or (n, 2) numbers
+        Normal out of the other side into ``body``, of any length.
+    gaps : float or (n,) numbers
+        Distance of each point from its foot along the normal, zero or above [m]; the places of the
+        points do not matter.
+    tributary : (n,) numbers, optional
+        Length that each contact node represents [m]; by default equal, with sum one.
+
+    Raises
+    ------
+    InputError
+        For no points, arrays that do not fit them, gaps that are negative, and normals of length
+        zero.
+    """
+
+    body: str
+    points: str | int | Sequence[str | int]
+    other: str | None = None
+    other_points: str | int | Sequence[str | int] = ()
+    normals: ArrayLike = (0.0, 1.0)
+    gaps: ArrayLike = 0.0
+    tributary: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        require_kind("PointPairing", str, body=self.body)
+        require_kind("PointPairing", (str, type(None)), other=self.other)
+        for name in ("points", "other_points"):
+            given = getattr(self, name)
+            require_kind("PointPairing", (str, int, Sequence), **{name: given})
+            object.__setattr__(self, name, (given,) if isinstance(given, str | int)
+                               else tuple(given))
+        points, feet = tuple(self.points), tuple(self.other_points)  # type: ignore[arg-type]
+        n = len(points)
+        if not n:
+            raise InputError("PointPairing: points is empty; name at least one contact node.")
+        wanted = 0 if self.other is None else n
+        if len(feet) != wanted:
+            raise InputError(f"PointPairing: other_points must be {wanted} points, "
+                             f"{'none on the ground' if self.other is None else 'one a node'}, "
+                             f"not {len(feet)}.")
+        normals = np.broadcast_to(_numbers("normals", self.normals, ((2,), (n, 2))), (n, 2))
+        lengths = np.linalg.norm(normals, axis=1)
+        if not (lengths > 0.0).all():
+            raise InputError("PointPairing: normals must be longer than zero.")
+        gaps = np.broadcast_to(_numbers("gaps", self.gaps, ((), (n,))), (n,))
+        lengths_of_nodes = np.full(n, 1.0 / n) if self.tributary is None else _numbers(
+            "tributary", self.tributary, ((n,),))
+        if (gaps < 0.0).any() or not (lengths_of_nodes > 0.0).all():
+            raise InputError("PointPairing: gaps must be zero or above, tributary above zero.")
+        for name, value in (("normals", normals / lengths[:, None]), ("gaps", gaps),
+                            ("tributary", lengths_of_nodes)):
+            value = np.array(value)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+
+def _numbers(name: str, given: ArrayLike, shapes: Sequence[tuple[int, ...]]) -> Array:
+    values = as_floats(given, f"PointPairing: {name}")
+    if values.shape not in shapes or not np.isfinite(values).all():
+        raise InputError(f"PointPairing: {name} = {shown(given)} must be finite numbers of shape "
+                         f"{' or '.join(map(str, shapes))}, one a node.")
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """Rows (3 n, m_k) of places of one body over its modes, and (3 n, 2 N_k) over its nodes."""
+
+    body: str
+    modal: Array
+    nodal: Any
+
+
+@dataclass(frozen=True, eq=False)
+class _Contact:
+    """Contact nodes of one interface and both sides; the other one is None on the ground."""
+
+    places: Array
+    normals: Array
+    tributary: Array
+    side: _Side
+    other: _Side | None
+
+    @property
+    def frames(self) -> Any:
+        """Sparse (3 n, 3 n): x, y, rotation to tangent, normal, rotation."""
+        import scipy.sparse as sp
+
+        x, y = self.normals.T
+        zero, one = np.zeros_like(x), np.ones_like(x)
+        frames = np.array([[y, -x, zero], [x, y, zero], [zero, zero, one]]).transpose(2, 0, 1)
+        return sp.csr_array(sp.block_diag(list(frames), format="csr"))
+
+
+def assembled_basis(
+    bases: Mapping[str, ModalBasis],
+    pairings: Mapping[str, Any],
+    links: Sequence[Any] = (),
+) -> ModalBasis:
+    """One basis of several bodies, for a contact system of all of them.
+
+    The modal coordinates are those of the bodies one after the other, damping and stiffness
+    block-diagonal, so the frequencies ascend within each body only. Contact nodes follow the
+    interfaces, which become the groups; their rows are relative motions along tangent and normal.
+    Points are named ``body.point``, boundaries ``body.boundary``; B and C are those of the one body
+    that has them. Contact nodes of the bases serve where a :class:`PointPairing` names them.
+
+    Parameters
+    ----------
+    bases : mapping of name to ModalBasis
+        The bodies, which do not rotate.
+    pairings : mapping of name to Pairing or PointPairing
+        The interfaces.
+    links : sequence of links, optional
+        Welds, hinges, bushings and springs; with any, the modes are those of the linked bodies
+        instead of blocks, see :func:`fecontact.reduction.links.linked`.
+
+    Raises
+    ------
+    InputError
+        For names that are not those of bodies and points, names with a dot, pairings of other
+        meshes, bodies that rotate, and B or C at two bodies.
+    """
+    require_kind("Several bodies", Mapping, bodies=bases, interfaces=pairings)
+    _check_bodies(bases)
+    for name in pairings:
+        _check_name("interface", name)
+    contacts = []
+    for name, pairing in pairings.items():
+        with located(f"Interface '{name}':", "PointPairing"):
+            contacts.append(_contact(bases, pairing))
+    places = _Places(bases)
+    named = [_named_point(bases, point) for point in ("B", "C")]
+    extra = [(name, point) for name, basis in bases.items()
+             for point in (*(end for end in ("B", "C") if _has(basis, end)), *basis.extra)]
+    further = [_points(bases[name], name, [point]) for name, point in extra]
+    T = [places.modal([(1.0, side)] if side else [], 3) for side in named]
+    nodal = [places.nodal([(1.0, side)] if side else [], 3) for side in named]
+    for contact in contacts:
+        frames = contact.frames
+        sides = [(frames, contact.side)]
+        if contact.other is not None:
+            sides.append((-frames, contact.other))
+        T.append(places.modal(sides, frames.shape[0]))
+        nodal.append(places.nodal(sides, frames.shape[0]))
+    T += [places.modal([(1.0, side)], 3) for side in further]
+    nodal += [places.nodal([(1.0, side)], 3) for side in further]
+    counts = [len(contact.tributary) for contact in contacts]
+    return ModalBasis(
+        angular_frequencies=np.concatenate([one.angular_frequencies for one in bases.values()]),
+        damping=places.blocks([one.damping for one in bases.values()]),
+        T=np.concatenate(T).reshape(-1, 3, places.modes),
+        positions=np.concatenate([
+            *(_position(bases, side, point) for side, point in zip(named, ("B", "C"), strict=True)),
+            *(contact.places for contact in contacts),
+            *(bases[name].positions[[bases[name].point_index(point)]] for name, point in extra)]),
+        tributary=np.concatenate([np.zeros(0), *(contact.tributary for contact in contacts)]),
+        extra=tuple(f"{name}.{point}" for name, point in extra),
+        mode_shapes=places.joined_shapes(nodal),
+        groups=tuple(zip(pairings, counts, strict=True)),
+        thickness=_common([one.thickness for one in bases.values()]),
+        inertia_rows=_beside([one.inertia_rows for one in bases.values()]),
+        boundaries=tuple(f"{name}.{boundary}" for name, basis in bases.items()
+                         for boundary in basis.boundaries),
+        boundary_rows=_boundary_rows(bases, places),
+        stiffness=places.blocks([one.stiffness_matrix for one in bases.values()]) if any(
+            one.stiffness is not None for one in bases.values()) else None,
+        contact_normals=np.concatenate([np.zeros((0, 2)), *(one.normals for one in contacts)]),
+        on_ground=np.repeat([contact.other is None for contact in contacts], counts).astype(bool),
+        parts=places.parts,
+    )
+
+
+class _Places:
+    """Blocks of the bodies in vectors of modal coordinates and of nodes."""
+
+    def __init__(self, bases: Mapping[str, ModalBasis]) -> None:
+        self.bases = bases
+        mode = node = 0
+        parts = []
+        for name, basis in bases.items():
+            nodes = 0 if basis.mode_shapes is None else len(basis.mode_shapes.nodes)
+            parts.append(BodyPart(name, (mode, basis.modes), (node, nodes)))
+            mode, node = mode + basis.modes, node + nodes
+        self.parts, self.modes, self.nodes = tuple(parts), mode, node
+        self._of = {part.name: part for part in parts}
+
+    def columns(self, body: str) -> slice:
+        """Modal coordinates of a body."""
+        first, count = self._of[body].modes
+        return slice(first, first + count)
+
+    def modal(self, sides: Sequence[tuple[Any, _Side]], rows: int) -> Array:
+        """Rows (rows, m): the sum of factors times those of sides."""
+        found = np.zeros((rows, self.modes))
+        for factor, side in sides:
+            found[:, self.columns(side.body)] += factor * side.modal if isinstance(
+                factor, float) else factor @ side.modal
+        return found
+
+    def nodal(self, sides: Sequence[tuple[Any, _Side]], rows: int) -> Any:
+        """The same over the nodes, sparse (rows, 2 N)."""
+        import scipy.sparse as sp
+
+        found = sp.csr_array((rows, 2 * self.nodes))
+        for factor, side in sides:
+            first, count = self._of[side.body].nodes
+            if not count:
+                continue
+            part = sp.coo_array(factor * side.nodal if isinstance(factor, float)
+                                else factor @ side.nodal)
+            found = found + sp.csr_array(sp.coo_array(
+                (part.data, (part.row, part.col + 2 * first)), shape=found.shape))
+        return found
+
+    def blocks(self, matrices: Sequence[Array]) -> Array:
+        """Matrices (m_k, m_k) along the diagonal."""
+        found = np.zeros((self.modes, self.modes))
+        for part, matrix in zip(self.parts, matrices, strict=True):
+            columns = self.columns(part.name)
+            found[columns, columns] = matrix
+        return found
+
+    def joined_shapes(self, restriction: Sequence[Any]) -> ModeShapes | None:
+        """The shapes of all bodies, zero outside their own blocks; None if no body has any."""
+        import scipy.sparse as sp
+
+        given = [(part, shapes) for part in self.parts
+                 if (shapes := self.bases[part.name].mode_shapes) is not None]
+        if not given:
+            return None
+        shapes, stress = np.zeros((self.nodes, 2, self.modes)), np.zeros(
+            (self.nodes, 4, self.modes))
+        for part, one in given:
+            nodes = slice(part.nodes[0], sum(part.nodes))
+            shapes[nodes, :, self.columns(part.name)] = one.shapes
+            stress[nodes, :, self.columns(part.name)] = one.stress
+        elements = [one.cells if one.elements is None else one.elements for _, one in given]
+        alike = len({array.shape[1] for array in elements}) == 1
+        cells = [one.cells for _, one in given]
+        if len({array.shape[1] for array in cells}) > 1:
+            # Quadrilaterals beside triangles: both as triangles.
+            cells = [array if array.shape[1] == 3 else
+                     np.concatenate([array[:, [0, 1, 2]], array[:, [0, 2, 3]]]) for array in cells]
+        first = [part.nodes[0] for part, _ in given]
+
+        def together(arrays: Sequence[Any]) -> Any:
+            return np.concatenate([array + start for array, start in zip(arrays, first,
+                                                                         strict=True)])
+
+        return ModeShapes(
+            nodes=np.concatenate([one.nodes for _, one in given]), cells=together(cells),
+            outline=together([one.outline for _, one in given]), shapes=shapes, stress=stress,
+            restriction=sp.csr_array(sp.vstack(list(restriction))),
+            elements=together(elements) if alike else None)
+
+
+def _contact(bases: Mapping[str, ModalBasis], pairing: Any) -> _Contact:
+    for name in (pairing.body, pairing.other):
+        if name is not None and name not in bases:
+            raise InputError(f"there is no body '{name}'{nearest(str(name), bases)}; the bodies "
+                             f"are {choices(bases)}.")
+    body, other = pairing.body, pairing.other
+    if isinstance(pairing, PointPairing):
+        basis = bases[body]
+        places = basis.positions[[basis.point_index(point) for point in pairing.points]]  # type: ignore[union-attr]
+        side = _points(basis, body, pairing.points)
+        feet = None if other is None else _points(bases[other], other, pairing.other_points)
+    else:
+        places = pairing.places
+        side = _faces(bases[body], body, pairing.nodes)
+        feet = None if other is None else _faces(bases[other], other, pairing.feet)
+    return _Contact(places, pairing.normals, pairing.tributary, side, feet)
+
+
+def _points(basis: ModalBasis, name: str, points: Any) -> _Side:
+    index = np.array([basis.point_index(point) for point in points])
+    rows = (3 * index[:, None] + np.arange(3)).ravel()
+    shapes = basis.mode_shapes
+    return _Side(name, basis.T[index].reshape(-1, basis.modes),
+                 None if shapes is None else shapes.restriction.tocsr()[rows])
+
+
+def _faces(basis: ModalBasis, name: str, rows: Any) -> _Side:
+    shapes = basis.mode_shapes
+    if shapes is None:
+        raise InputError(f"the basis of body '{name}' holds no shapes over the body, which a "
+                         f"pairing of faces needs; give a PointPairing between named points.")
+    if rows.shape[1] != 2 * len(shapes.nodes):
+        raise InputError(f"the pairing was made for another mesh of body '{name}', of "
+                         f"{rows.shape[1] // 2} nodes, not {len(shapes.nodes)}; pair the faces of "
+                         f"the same bodies.")
+    return _Side(name, np.asarray(rows @ shapes.shapes.reshape(rows.shape[1], -1)), rows)
+
+
+def _check_name(what: str, name: Any) -> None:
+    if not isinstance(name, str) or not name or "." in name:
+        raise InputError(f"The name {name!r} of {'an' if what[0] in 'aeiou' else 'a'} {what} must "
+                         f"be a text without dots.")
+
+
+def _check_bodies(bases: Mapping[str, ModalBasis]) -> None:
+    if not bases:
+        raise InputError("Several bodies: bodies is empty; give the modal basis of at least one.")
+    for name, basis in bases.items():
+        _check_name("body", name)
+        require_kind(f"Body '{name}'", ModalBasis, basis=basis)
+        if basis.rotation is not None:
+            raise InputError(f"Body '{name}' rotates, which bodies of an assembly cannot do: rows "
+                             f"in its frame would turn against those of the others. Leave out "
+                             f"rotation and prescribe the sliding of its interfaces.")
+        if basis.parts:
+            raise InputError(f"Body '{name}' consists of several bodies itself; give these one by "
+                             f"one.")
+
+
+def _has(basis: ModalBasis, point: str) -> bool:
+    return bool(basis.T[basis.point_index(point)].any())
+
+
+def _named_point(bases: Mapping[str, ModalBasis], point: str) -> _Side | None:
+    """B or C of the one body that has it."""
+    having = [name for name, basis in bases.items() if _has(basis, point)]
+    if len(having) > 1:
+        raise InputError(f"The bodies {choices(having)} all have a point {point}, but drive and "
+                         f"load know one; leave it out of all bases but one, and name further "
+                         f"points by points=.")
+    return _points(bases[having[0]], having[0], [point]) if having else None
+
+
+def _position(bases: Mapping[str, ModalBasis], side: _Side | None, point: str) -> Array:
+    if side is None:
+        return np.zeros((1, 2))
+    return bases[side.body].positions[[bases[side.body].point_index(point)]]
+
+
+def _common(values: Sequence[float | None]) -> float | None:
+    return values[0] if len(set(values)) == 1 else None
+
+
+def _beside(rows: Sequence[Array | None]) -> Array | None:
+    known = [one for one in rows if one is not None]
+    return np.hstack(known) if len(known) == len(rows) else None
+
+
+def _boundary_rows(bases: Mapping[str, ModalBasis], places: _Places) -> Array:
+    found = [np.zeros((0, 2, places.modes))]
+    for name, basis in bases.items():
+        rows = np.zeros((len(basis.boundaries), 2, places.modes))
+        rows[:, :, places.columns(name)] = basis.boundary_rows
+        found.append(rows)
+    return np.concatenate(found)
