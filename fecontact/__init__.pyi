@@ -1,4 +1,4 @@
-from . import analysis, bifurcation, integrate, io, laws, plot, reduction, study, sweeps
+from . import analysis, bifurcation, fem, integrate, io, laws, plot, reduction, study, sweeps
 from .core.errors import (
     AnalysisError,
     FecontactError,
@@ -81,6 +81,7 @@ __all__ = [
     "bifurcation",
     "ensemble",
     "event",
+    "fem",
     "forcing_period",
     "generate",
     "integrate",

@@ -12,7 +12,7 @@ import pytest
 
 import fecontact
 
-NAMESPACES = ("laws", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps",
+NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps",
               "plot", "io")
 PUBLIC = [("fecontact", name) for name in fecontact.__all__ if name not in NAMESPACES] + [
     (f"fecontact.{space}", name) for space in NAMESPACES

@@ -10,8 +10,9 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
+from fecontact.fem.body_forces import along_outline
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows
+from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,44 +93,69 @@ def contact_nodes(
     """
     import scipy.sparse as sp
 
-    chains = _chains(body.mesh.boundary(boundary))
-    chains.sort(key=lambda chain: float(body.mesh.nodes[chain, 0].min()))
-    chains = [chain if body.mesh.nodes[chain[0, 0], 0] <= body.mesh.nodes[chain[-1, 1], 0]
-              else chain[::-1, ::-1] for chain in chains]
-    _check_faces_down(body, boundary)
-    edges = [body.edge_nodes(chain) for chain in chains]
-    nodes = np.unique(np.concatenate([e.ravel() for e in edges]))
+    check_faces_down(body, boundary)
     if count == "all":
-        ordered = np.concatenate([_in_order(e) for e in edges])
+        nodes = face_nodes(body, boundary)
         tributary = np.zeros(len(body.nodes))
-        for e in edges:
-            np.add.at(tributary, e, edge_weights(body, e))
-        return ContactNodes(node_matrix(body, ordered), body.nodes[ordered], tributary[ordered],
-                            ((boundary, len(ordered)),))
-    if isinstance(count, bool) or not isinstance(count, int) or not (
-            len(chains) <= count <= len(nodes)):
-        raise InputError(f"contact_nodes = {count!r} must be 'all' or a whole number from "
-                         f"{len(chains)} to {len(nodes)}, the number of nodes on boundary "
-                         f"'{boundary}'; refine the mesh for more.")
-    segments, each = [], []
-    totals = np.array([_lengths(body, e).sum() for e in edges])
-    for e, share in zip(edges, _shared_out(count, totals), strict=True):
-        segments += _cut(body, e, share)
-        each += [_lengths(body, e).sum() / share] * share
+        edges = np.concatenate(face_chains(body, boundary))
+        np.add.at(tributary, edges, edge_weights(body, edges))
+        return ContactNodes(node_matrix(body, nodes), body.nodes[nodes], tributary[nodes],
+                            ((boundary, len(nodes)),))
+    segments, lengths = face_segments(body, boundary, count)
     rows = [patch_rows(body, segment) for segment in segments]
     return ContactNodes(
         sp.csr_array(sp.vstack([row.matrix for row in rows])),
         np.array([row.position for row in rows]),
-        np.array(each),
+        lengths,
         ((boundary, len(rows)),),
     )
 
 
-def _check_faces_down(body: ElasticBody, boundary: str) -> None:
-    outline = {(min(e), max(e)): e for e in map(tuple, body.mesh.outline.tolist())}
-    edges = np.array([outline[min(e), max(e)]
-                      for e in map(tuple, body.mesh.boundary(boundary).tolist())])
-    # The body lies on the left of its outline: a face that looks down runs to +x.
+def face_nodes(body: ElasticBody, boundary: str) -> Integers:
+    """Displacement nodes of a boundary, in the order of :func:`face_chains`."""
+    return np.concatenate([_in_order(chain) for chain in face_chains(body, boundary)])
+
+
+def face_segments(
+    body: ElasticBody, boundary: str, count: int, runs: Sequence[Pieces] | None = None,
+    key: str = "contact_nodes",
+) -> tuple[list[Pieces], Array]:
+    """Segments of equal length of a boundary, or of the successive pieces ``runs`` of it.
+
+    Each segment is the pieces of edges that it consists of; beside them stand their lengths [m].
+    ``key`` names the count in messages.
+    """
+    parts = ([whole(chain) for chain in face_chains(body, boundary)] if runs is None
+             else list(runs))
+    most = len(np.unique(np.concatenate([part.nodes.ravel() for part in parts])))
+    if isinstance(count, bool) or not isinstance(count, int) or not len(parts) <= count <= most:
+        raise InputError(f"{key} = {count!r} must be 'all' or a whole number from {len(parts)} to "
+                         f"{most}, the number of nodes on boundary '{boundary}'; refine the mesh "
+                         f"for more.")
+    segments: list[Pieces] = []
+    each: list[float] = []
+    totals = np.array([_lengths(body, part).sum() for part in parts])
+    for part, share, total in zip(parts, _shared_out(count, totals), totals, strict=True):
+        segments += _cut(body, part, share)
+        each += [total / share] * share
+    return segments, np.array(each)
+
+
+def face_chains(body: ElasticBody, boundary: str) -> list[Integers]:
+    """Displacement nodes (k, degree + 1) of each connected part of a boundary, edge by edge.
+
+    The body lies on the left of successive edges; the parts are in the order of their smallest
+    abscissae.
+    """
+    chains = _chains(along_outline(body.mesh, body.mesh.boundary(boundary)))
+    chains.sort(key=lambda chain: float(body.mesh.nodes[chain, 0].min()))
+    return [body.edge_nodes(chain) for chain in chains]
+
+
+def check_faces_down(body: ElasticBody, boundary: str) -> None:
+    """Raise :class:`InputError` unless all edges of a boundary face the ground below."""
+    edges = along_outline(body.mesh, body.mesh.boundary(boundary))
+    # The body lies on the left of its edges: a face that looks down runs to +x.
     runs = body.mesh.nodes[edges[:, 1], 0] - body.mesh.nodes[edges[:, 0], 0]
     length = np.linalg.norm(body.mesh.nodes[edges[:, 1]] - body.mesh.nodes[edges[:, 0]], axis=1)
     if runs.sum() < 0.5 * length.sum() or (runs < -1e-9 * length).any():
@@ -139,22 +165,17 @@ def _check_faces_down(body: ElasticBody, boundary: str) -> None:
 
 
 def _chains(edges: Integers) -> list[Integers]:
-    """The edges as chains (k, 2) of successive edges, each from one end to the other."""
-    neighbours: dict[int, list[int]] = {}
-    for index, edge in enumerate(edges.tolist()):
-        for node in edge:
-            neighbours.setdefault(node, []).append(index)
-    left = set(range(len(edges)))
+    """Directed edges as chains (k, 2) of successive edges, each from one end to the other."""
+    ahead: dict[int, list[int]] = {}
+    for start, end in edges.tolist():
+        ahead.setdefault(start, []).append(end)
+    ends = set(edges[:, 1].tolist())
     chains = []
-    ends = sorted(node for node, around in neighbours.items() if len(around) == 1)
-    for start in [*ends, *sorted(neighbours)]:
+    for start in sorted(ahead, key=lambda node: (node in ends, node)):
         chain, node = [], start
-        while ahead := [index for index in neighbours[node] if index in left]:
-            left.discard(ahead[0])
-            a, b = edges[ahead[0]].tolist()
-            other = b if node == a else a
-            chain.append((node, other))
-            node = other
+        while ahead.get(node):
+            chain.append((node, ahead[node].pop(0)))
+            node = chain[-1][1]
         if chain:
             chains.append(np.array(chain))
     return chains
@@ -167,9 +188,9 @@ def _in_order(nodes: Integers) -> Integers:
     return along if closed else np.append(along, nodes[-1, -1])
 
 
-def _lengths(body: ElasticBody, nodes: Integers) -> Array:
-    ends = body.nodes[nodes[:, -1]] - body.nodes[nodes[:, 0]]
-    return np.asarray(np.linalg.norm(ends, axis=1))
+def _lengths(body: ElasticBody, pieces: Pieces) -> Array:
+    ends = body.nodes[pieces.nodes[:, -1]] - body.nodes[pieces.nodes[:, 0]]
+    return np.asarray((pieces.end - pieces.start) * np.linalg.norm(ends, axis=1))
 
 
 def _shared_out(count: int, totals: Array) -> list[int]:
@@ -180,8 +201,8 @@ def _shared_out(count: int, totals: Array) -> list[int]:
     return [int(share) for share in shares]
 
 
-def _cut(body: ElasticBody, nodes: Integers, count: int) -> list[Pieces]:
-    length = _lengths(body, nodes)
+def _cut(body: ElasticBody, run: Pieces, count: int) -> list[Pieces]:
+    length = _lengths(body, run)
     reached = np.concatenate([[0.0], np.cumsum(length)])
     cuts = np.linspace(0.0, reached[-1], count + 1)
     pieces = []
@@ -189,5 +210,7 @@ def _cut(body: ElasticBody, nodes: Integers, count: int) -> list[Pieces]:
         start = np.clip((low - reached[:-1]) / length, 0.0, 1.0)
         end = np.clip((high - reached[:-1]) / length, 0.0, 1.0)
         kept = end - start > 1e-12
-        pieces.append(Pieces(nodes[kept], start[kept], end[kept]))
+        part = run.end - run.start
+        pieces.append(Pieces(run.nodes[kept], (run.start + start * part)[kept],
+                             (run.start + end * part)[kept]))
     return pieces

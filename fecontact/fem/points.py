@@ -165,7 +165,12 @@ def whole(nodes: Integers) -> Pieces:
 
 def edge_weights(body: ElasticBody, nodes: Integers) -> Array:
     """Integrals (k, degree + 1) of the shape functions over whole edges [m]."""
-    _, values, lengths = _sampled(whole(nodes), body.nodes)
+    return piece_weights(body, whole(nodes))
+
+
+def piece_weights(body: ElasticBody, pieces: Pieces) -> Array:
+    """Integrals (k, degree + 1) of the shape functions over pieces of edges [m]."""
+    _, values, lengths = _sampled(pieces, body.nodes)
     return np.einsum("kg,kgn->kn", lengths, values)
 
 
