@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_scale
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
-from fecontact.core.units import round_125
+from fecontact.core.units import quantity, round_125
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.ground.sliding import Sliding, SlidingRotation
 from fecontact.output.files.frames import (
     blocks,
     contact_forces,
@@ -20,7 +21,7 @@ from fecontact.output.files.frames import (
     von_mises,
 )
 from fecontact.output.plots.style import state_names
-from fecontact.reduction.contact_faces import contact_sides, several_bodies
+from fecontact.reduction.contact_faces import contact_faces, contact_sides, several_bodies
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 
@@ -30,6 +31,18 @@ COLOURS = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stres
 
 _VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
 _LABEL_ROOM = 0.1  # of the extent of all bodies, from a body's name to the nearest contact node
+
+
+def _way(sliding: Sliding) -> str:
+    """Direction and speed of a prescribed sliding."""
+    speed = abs(sliding.speed)
+    if isinstance(sliding, SlidingRotation):
+        arrow, size = "↺" if sliding.speed > 0.0 else "↻", quantity(speed, "rad/s")
+    else:
+        x, y = np.sign(sliding.speed) * np.asarray(sliding.direction)
+        arrow = "→↗↑↖←↙↓↘"[round(np.arctan2(y, x) / (0.25 * np.pi)) % 8]
+        size = quantity(speed, "m/s")
+    return f"{arrow} {size}" if sliding.motion is None else f"{arrow} in time"
 
 
 def body_labels(basis: ModalBasis) -> tuple[tuple[str, int], ...]:
@@ -126,6 +139,26 @@ class Motion:
     def has_ground(self) -> bool:
         """Whether there is a ground under any of the bodies."""
         return bool(self.trajectory.system.basis.ground_nodes.any())
+
+    @cached_property
+    def sliding(self) -> tuple[str, ...]:
+        """What slides by prescription, and which way, such as ``disc ↺ 3 rad/s``.
+
+        A body whose sliding varies in time has no number; it stands still in the picture.
+        """
+        system = self.trajectory.system
+        if not system.sliding:
+            return ()
+        feet = contact_sides(system.basis)[1]
+        found: dict[str, None] = {}
+        for face in contact_faces(system.basis):
+            if face.name not in system.sliding:
+                continue
+            nodes = feet[2 * face.nodes.start : 2 * face.nodes.stop].indices // 2
+            other = [part.name for part in system.basis.parts
+                     if len(nodes) and part.nodes[0] <= nodes[0] < sum(part.nodes)]
+            found[f"{other[0] if other else 'ground'} {_way(system.sliding[face.name])}"] = None
+        return tuple(found)
 
     @cached_property
     def labels(self) -> tuple[tuple[str, int], ...]:

@@ -204,10 +204,13 @@ class Overlay(Strips):
                 length_includes_head=True, color=FORCE_COLOUR, linewidth=0.0))
         self._text(figure, 0.66 if force > 0.0 else 0.615, 0.34,
                    f"up to {quantity(force, 'N')}" if force > 0.0 else "none")
+        moving = []
         if self.motion.has_ground and (speed := self.motion.ground_speed):
             heading = "→" if speed > 0.0 else "←"
-            self._text(figure, 0.97, 0.34, f"ground {heading} {quantity(abs(speed), 'm/s')}",
-                       ha="right")
+            moving.append(f"ground {heading} {quantity(abs(speed), 'm/s')}")
+        moving += self.motion.sliding
+        if moving:
+            self._text(figure, 0.97, 0.34, "   ".join(moving), ha="right")
 
 
 def _short(value: float) -> str:
