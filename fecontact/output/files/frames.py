@@ -11,6 +11,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.contact_faces import contact_directions
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 
 
@@ -61,6 +62,15 @@ def require_field(trajectory: Trajectory) -> ModeShapes:
         raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "
                          "body; make the basis with modal_basis(body, ...).")
     return field
+
+
+def body_numbers(basis: ModalBasis) -> NDArray[np.int32]:
+    """Number (N,) of the body of each mesh node, in the order of ``basis.parts``."""
+    assert basis.mode_shapes is not None
+    found = np.zeros(len(basis.mode_shapes.nodes), dtype=np.int32)
+    for number, part in enumerate(basis.parts):
+        found[part.nodes[0] : sum(part.nodes)] = number
+    return found
 
 
 def displacement(field: ModeShapes, q: Array) -> Array:
