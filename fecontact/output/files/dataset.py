@@ -153,8 +153,8 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
 def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
     """A run as an :class:`xarray.Dataset`, with coordinates and an attribute ``units`` each.
 
-    Dimensions are time, point, component, node and mode, with several bodies also direction: ``ds.displacement.sel(point="B",
-    component="x")``.
+    Dimensions are time, point, component, node and mode, with several bodies also direction:
+    ``ds.displacement.sel(point="B", component="x")``.
 
     Raises
     ------
