@@ -87,10 +87,12 @@ def history(
     unit = _OF_POINTS[quantity]
     unit = unit.replace("m", "rad") if component == "phi" else unit
     if is_relative(point, basis):
-        title, component = f"relative {title}", f"along {'tn'[_COMPONENTS[component]]}" if (
-            component != "phi") else component
+        title = f"relative {title}"
+        way = {"x": "along t", "y": "along n"}.get(component, component)
+    else:
+        way = component
     return History(motion[:, _COMPONENTS[component]], unit,
-                   f"{title} {component} of {point_name(point, basis)}")
+                   f"{title} {way} of {point_name(point, basis)}")
 
 
 def usual_component(system: ContactSystem) -> str:

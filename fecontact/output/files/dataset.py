@@ -62,6 +62,9 @@ def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
         "mode": Variable(("mode",), np.arange(basis.modes), "1"),
         "mode_frequency": Variable(("mode",), basis.frequencies_hz, "Hz"),
     }
+    if not len(found["point"].values):
+        # The classic netCDF format takes a dimension of length zero for one that grows.
+        del found["point"]
     if not several_bodies(basis):
         return found
     faces, normals = contact_faces(basis), basis.normals
@@ -100,6 +103,8 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
                               ("velocity", rate, "m/s, m/s, rad/s")):
         for what, rows, dim, last in (("", basis.T[points], "point", "component"),
                                       (node, basis.T[nodes], "node", axes)):
+            if not len(rows):
+                continue
             found[what + name] = Variable(("time", dim, last), np.einsum(
                 "pam,tm->tpa", rows, modal), unit)
     if several:

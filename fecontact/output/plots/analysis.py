@@ -240,7 +240,8 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
                 unit = abscissa_unit(face)
                 panel.bar(face.abscissa / unit, values[face.nodes] / factor,
                           width=0.92 * face.tributary / unit, color=COLOURS[0])
-                panel.set_ylim(bottom=min(0.0, float(values.min()) / factor))
+            # Not before all of a row are drawn: its panels share their scale.
+            panels[row, 0].set_ylim(bottom=min(0.0, float(values.min()) / factor))
             label = label.replace("N", "J/m") if base == "N" else label
             panels[row, 0].set_ylabel(f"{name} [{label}]")
         figure.align_ylabels(panels[:, 0])

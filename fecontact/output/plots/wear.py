@@ -65,7 +65,6 @@ def plot_wear(
                 load.stairs(history.line_load[k - 1][face.nodes][order] / load_unit, edges / unit,
                             baseline=None, color=colour, linewidth=1.5)
             profile.axhline(0.0, color="#303030", linewidth=0.8)
-            load.set_ylim(bottom=0.0)
             load.set_xlabel(f"{face.label} [{symbol}]")
             area = length[face.nodes] / length[face.nodes].sum()
             for values, name, colour in ((depth.max(axis=1), "largest", COLOURS[1]),
@@ -73,6 +72,7 @@ def plot_wear(
                 growth.plot(history.cycles, values / depth_unit, color=colour, label=name)
             growth.set_xlabel("cycles")
             profile.set_title(face.title or title)
+        panels[1, 0].set_ylim(bottom=0.0)  # not before all of the row are drawn
         if faces[0].title:
             figure.suptitle(title)
         for panel, label in zip(panels[:, 0], (f"worn profile [{depth_symbol}]",
