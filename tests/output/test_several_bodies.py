@@ -114,7 +114,7 @@ def test_feet_on_the_ground_are_not_drawn(trajectory):
     assert motion.contact_places(0).shape == motion.forces[0].shape == (29 + 8, 2)
     # The ground lies under the beam, although the block's nodes are contact nodes too.
     assert motion.ground_level == pytest.approx(0.0)
-    left, right, bottom, top = motion.box
+    left, right, _, top = motion.box
     assert left < 0.0 < 0.2 < right
     assert top > 0.04
 
@@ -332,8 +332,8 @@ def test_case_reads_back_and_holds_the_bodies_for_other_programs(trajectory, tmp
         force = group["PointData/contact_force"][()].reshape(4, 145, 3)
         which = frame_indices(trajectory.time, 4)
         np.testing.assert_allclose(
-            force[:, body == 0, :2].sum(axis=1), contact_forces(trajectory, which)[:, :8].sum(axis=1),
-            rtol=1e-5, atol=1e-3)
+            force[:, body == 0, :2].sum(axis=1),
+            contact_forces(trajectory, which)[:, :8].sum(axis=1), rtol=1e-5, atol=1e-3)
 
 
 def test_paraview_reads_bodies_at_every_time(trajectory, tmp_path):
