@@ -242,7 +242,8 @@ def _outline_tangents(mesh: Mesh) -> tuple[Array, Array]:
     for other in (before, after):
         alike = np.sign(bent) * bent[other] >= _ALIKE * np.abs(bent)
         smooth &= alike | corner[other] | (other < 0)
-    tangent = _unit(chord / length[:, None] ** 2 + (chord / length[:, None] ** 2)[after])
+    inverse = chord / length[:, None] ** 2
+    tangent = _unit(np.where(smooth[:, None], inverse + inverse[after], along))
     at_start = np.where(before < 0, False, smooth[before])
     first = np.where(at_start[:, None], tangent[before], along)
     last = np.where(smooth[:, None], tangent, along)

@@ -11,7 +11,7 @@ from fecontact.fem.points import Pieces, piece_weights
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 _CUTS = 16  # parts of an edge between whose ends one end of the other face can be found
-_PARTS = 4  # of a piece, in each of which a uniform pressure is integrated
+_PARTS = 2  # of a piece, in each of which a uniform pressure is integrated
 _INSET = 1e-6  # of an edge, from its ends
 _HALVINGS = 40
 _FACING = 0.1  # least cosine between opposed normals: 84 degrees
@@ -62,31 +62,61 @@ def node_samples(face: Face, nodes: Integers) -> Samples:
                    looks)
 
 
-def segment_samples(face: Face, segments: Sequence[Pieces]) -> Samples:
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Places on a face, by edge and s, opposite to which an edge of the other face ends."""
+
+    edges: Integers
+    s: Array
+
+
+def opposite_ends(face: Face, other: Face, reach: float) -> Marks:
+    """Where the shape functions of the other face have their kinks."""
+    ends = node_samples(other, np.unique(other.nodes[:, [0, -1]]))
+    found = ends.closest(face, reach)
+    return Marks(found.edges[found.valid], found.s[found.valid])
+
+
+def segment_samples(
+    face: Face, segments: Sequence[Pieces], marks: Marks | None = None
+) -> Samples:
     """Gauss points of segments, whose shares of each segment sum to one."""
-    owner = np.repeat(np.arange(len(segments)),
-                      [_PARTS * len(_GAUSS) * len(part.nodes) for part in segments])
-    samples = pressure_samples(face, segments)
+    samples = pressure_samples(face, segments, marks)
+    owner = np.repeat(np.arange(len(segments)), [len(part.nodes) for part in segments])
+    owner = owner[samples.owner]
     total = np.bincount(owner, samples.share)
     return Samples(owner, samples.share / total[owner], samples.places, samples.straight,
                    samples.looks)
 
 
-def pressure_samples(face: Face, runs: Sequence[Pieces]) -> Samples:
-    """Gauss points of parts of a face, with the lengths that they stand for as shares [m]."""
+def pressure_samples(face: Face, runs: Sequence[Pieces], marks: Marks | None = None) -> Samples:
+    """Gauss points of pieces of a face, with the lengths that they stand for as shares [m].
+
+    Between ``marks`` they integrate the shape functions of both sides of a flat face exactly. Their
+    owners are the pieces, one after the other.
+    """
     nodes, start, end = (np.concatenate([getattr(run, name) for run in runs])
                          for name in ("nodes", "start", "end"))
     size = len(face.body.nodes)
     keys = face.nodes[:, 0] * size + face.nodes[:, -1]
     order = np.argsort(keys)
     edges = order[np.searchsorted(keys[order], nodes[:, 0] * size + nodes[:, -1])]
+    piece = np.arange(len(edges))
+    if marks is not None:
+        mark, cut = np.nonzero((marks.edges[:, None] == edges) & (start < marks.s[:, None])
+                               & (marks.s[:, None] < end))
+        piece, start = np.concatenate([piece, cut]), np.concatenate([start, marks.s[mark]])
+        order = np.lexsort((start, piece))
+        piece, start = piece[order], start[order]
+        end = np.where(np.append(piece[1:] == piece[:-1], False), np.append(start[1:], 0.0),
+                       end[piece])
     inside = ((np.arange(_PARTS)[:, None] + 0.5 * (1.0 + _GAUSS)) / _PARTS).ravel()
     weights = np.tile(0.5 * _WEIGHTS / _PARTS, _PARTS)
-    s = start[:, None] + (end - start)[:, None] * inside
-    share = (face.lengths[edges] * (end - start))[:, None] * weights
-    edges, s = np.repeat(edges, len(inside)), s.ravel()
-    looks = np.repeat(face.outward(edges, s)[:, None], 2, axis=1)
-    return Samples(np.arange(len(s)), share.ravel(), face.at(edges, s), face.straight(edges, s),
+    s = (start[:, None] + (end - start)[:, None] * inside).ravel()
+    share = (face.lengths[edges[piece]] * (end - start))[:, None] * weights
+    piece = np.repeat(piece, len(inside))
+    looks = np.repeat(face.outward(edges[piece], s)[:, None], 2, axis=1)
+    return Samples(piece, share.ravel(), face.at(edges[piece], s), face.straight(edges[piece], s),
                    looks)
 
 

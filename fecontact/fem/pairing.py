@@ -25,11 +25,12 @@ from fecontact.fem.face_samples import (
     covered,
     lumped_lengths,
     node_samples,
+    opposite_ends,
     pressure_samples,
     segment_samples,
 )
 from fecontact.fem.pairing_report import SAME, PairingReport, closed_gaps, no_partner, reasons
-from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, piece_weights, whole
+from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, whole
 
 _COUNT = "pair_faces: nodes"
 _FINER = 0.999  # ratio of spacings from which a face is finer than another
@@ -198,7 +199,7 @@ def _paired(
     samples = node_samples(face, present)
     found = samples.closest(other, limit)
     shared = np.isin(present, other.nodes) & (face.body is other.body)
-    runs = covered(face, other, limit)
+    runs, marks = covered(face, other, limit), opposite_ends(face, other, limit)
     partnered = np.zeros(len(face.body.nodes), dtype=bool)
     partnered[present[found.valid & ~shared]] = True
     lengths = lumped_lengths(face, runs, partnered)[present]
@@ -212,15 +213,16 @@ def _paired(
         matrix, tributary = node_matrix(face.body, present[kept]), lengths[kept]
     else:
         segments, tributary = face_segments(face.body, face.boundary, nodes, runs, _COUNT)
-        samples, matrix = segment_samples(face, segments), _segment_matrix(face, segments)
+        samples, matrix = segment_samples(face, segments, marks), _segment_matrix(face, segments)
     found = samples.closest(other, limit)
-    return _described(face, other, samples, found, matrix, tributary, overlap, limit,
-                      runs, (alone, why))
+    pressure = pressure_samples(face, runs, marks)
+    return _described(face, other, samples, found, matrix, tributary, overlap, limit, pressure,
+                      (alone, why))
 
 
 def _described(
     face: Face, other: Face, samples: Samples, found: Closest, matrix: Any, tributary: Array,
-    overlap: float, limit: float, runs: list[Pieces], alone: tuple[Array, tuple[str, ...]],
+    overlap: float, limit: float, pressure: Samples, alone: tuple[Array, tuple[str, ...]],
 ) -> Pairing:
     """The pairing of contact nodes all of which have a partner."""
     import scipy.sparse as sp
@@ -241,8 +243,8 @@ def _described(
     arms = samples.mean(samples.straight, size) - hit.mean(
         other.straight(found.edges, found.s)[found.valid], size)
     report = PairingReport(
-        face.label, other.label, size, *alone, _length(runs, face) / float(face.lengths.sum()),
-        _unevenness(other, at_node.T @ tributary, pressure_samples(face, runs), limit),
+        face.label, other.label, size, *alone, float(pressure.share.sum() / face.lengths.sum()),
+        _unevenness(other, at_node.T @ tributary, pressure, limit),
         float(gaps.max()), closed, float(np.abs((tangents * arms).sum(axis=1)).max()))
     return Pairing(_body(face), _body(other), places, normals, tangents, gaps, tributary, matrix,
                    feet, hit.mean(found.places[found.valid], size), report)
@@ -284,10 +286,6 @@ def _segment_matrix(face: Face, segments: list[Pieces]) -> Any:
     import scipy.sparse as sp
 
     return sp.csr_array(sp.vstack([patch_rows(face.body, part).matrix for part in segments]))
-
-
-def _length(runs: list[Pieces], face: Face) -> float:
-    return float(sum(piece_weights(face.body, run).sum() for run in runs))
 
 
 def _at_nodes(other: Face, samples: Samples, found: Closest, size: int) -> Any:

@@ -2,6 +2,7 @@ from .assembled_basis import PointPairing, assembled_basis
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
+from .links import Bushing, Hinge, Spring, Weld, linked
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from .reduce_body import reduce_bodies
 from .report import BasisReport
@@ -11,12 +12,17 @@ from .rotating import ModalRotation
 __all__ = [
     "BasisReport",
     "BodyPart",
+    "Bushing",
+    "Hinge",
     "ModalRotation",
     "ModeShapes",
     "PointPairing",
     "ReductionQuality",
+    "Spring",
+    "Weld",
     "assembled_basis",
     "eigenfrequencies_hz",
+    "linked",
     "mode_convergence",
     "normalisation",
     "reduce_bodies",

@@ -15,6 +15,8 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array, ArrayLike
+from fecontact.fem.pairing import Pairing
+from fecontact.reduction.links import Link, linked
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
 
@@ -129,8 +131,8 @@ class _Contact:
 
 def assembled_basis(
     bases: Mapping[str, ModalBasis],
-    pairings: Mapping[str, Any],
-    links: Sequence[Any] = (),
+    pairings: Mapping[str, Pairing | PointPairing],
+    links: Sequence[Link] = (),
 ) -> ModalBasis:
     """One basis of several bodies, for a contact system of all of them.
 
@@ -181,7 +183,7 @@ def assembled_basis(
     T += [places.modal([(1.0, side)], 3) for side in further]
     nodal += [places.nodal([(1.0, side)], 3) for side in further]
     counts = [len(contact.tributary) for contact in contacts]
-    return ModalBasis(
+    whole = ModalBasis(
         angular_frequencies=np.concatenate([one.angular_frequencies for one in bases.values()]),
         damping=places.blocks([one.damping for one in bases.values()]),
         T=np.concatenate(T).reshape(-1, 3, places.modes),
@@ -204,6 +206,7 @@ def assembled_basis(
         on_ground=np.repeat([contact.other is None for contact in contacts], counts).astype(bool),
         parts=places.parts,
     )
+    return linked(whole, links) if links else whole
 
 
 class _Places:
@@ -290,7 +293,7 @@ class _Places:
             elements=together(elements) if alike else None)
 
 
-def _contact(bases: Mapping[str, ModalBasis], pairing: Any) -> _Contact:
+def _contact(bases: Mapping[str, ModalBasis], pairing: Pairing | PointPairing) -> _Contact:
     for name in (pairing.body, pairing.other):
         if name is not None and name not in bases:
             raise InputError(f"there is no body '{name}'{nearest(str(name), bases)}; the bodies "

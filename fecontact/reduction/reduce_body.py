@@ -14,10 +14,12 @@ from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import body_elements, linear_cells, stress_of
+from fecontact.fem.pairing import Pairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
+from fecontact.reduction.links import Bushing, Link, Weld
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import modal_rotation
@@ -41,7 +43,7 @@ def modal_basis(
     tolerance: float = 0.1,
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
-    interface_rows: Sequence[Any] = (),
+    rows: Any = (),
 ) -> ModalBasis:
     """Mass-normalised modes, and T at B, C and the contact nodes.
 
@@ -75,9 +77,8 @@ def modal_basis(
         under pressure and shear, further points under forces.
     rotation : Rotation, optional
         The body rotates; displacements are those in its frame, modes those at rest.
-    interface_rows : sequence of sparse (3 k, 2 N) arrays
-        Displacements x, y and rotation of further places at which forces act, such as the nodes and
-        feet of a pairing: see :func:`fecontact.reduction.reduce_bodies`.
+    rows : sequence of sparse (k, 2 N) arrays
+        Further motions on which forces act, as those of pairings; see :func:`.reduce_bodies`.
 
     Raises
     ------
@@ -110,11 +111,11 @@ def modal_basis(
                          "'craig-bampton'; choose one of these, or leave loads out.")
     system = FreeSystem.of(body)
     completing = loading(body, system, loads, points)
-    # Forces act at B, C, the contact nodes and interfaces in x and y; there are no moments.
+    # At B, C and the contact nodes there are forces in x and y, but no moments.
     at_points = sp.csr_array(restriction[np.arange(restriction.shape[0]) % 3 < 2])
-    at_interfaces = [_interface_rows(body, rows) for rows in interface_rows]
+    further_rows = [_given_rows(body, given) for given in rows]
     flexibility = Flexibility(system, sp.csr_array(
-        sp.vstack([at_points, *at_interfaces]) @ body.expansion))
+        sp.vstack([at_points, *further_rows]) @ body.expansion))
     row = np.arange(len(flexibility.rows.indptr) - 1)
     is_point = row < at_points.shape[0]
     used = (row < 2 * (2 + len(face.tributary))) | ~is_point
@@ -163,7 +164,8 @@ def modal_basis(
 
 def reduce_bodies(
     bodies: Mapping[str, ElasticBody],
-    pairings: Sequence[Any] = (),
+    pairings: Sequence[Pairing] = (),
+    links: Sequence[Link] = (),
     *,
     modes: int | Mapping[str, int] = 20,
     each: Mapping[str, Mapping[str, Any]] | None = None,
@@ -171,7 +173,8 @@ def reduce_bodies(
 ) -> dict[str, ModalBasis]:
     """Modal bases of several bodies that can carry the forces between them.
 
-    By default modes with residual vectors of forces at the nodes and feet of the pairings.
+    By default modes with residual vectors of forces at the nodes and feet of the pairings, and of
+    forces and moments at the points of the links.
 
     Parameters
     ----------
@@ -179,6 +182,8 @@ def reduce_bodies(
         The bodies.
     pairings : sequence of Pairing
         Where the bodies may touch each other or the ground; they name the bodies.
+    links : sequence of links
+        What joins them; points of the meshes need not be among ``points``.
     modes : int or mapping of name to int
         Number of modes of each body, rigid ones included, without residual vectors.
     each : mapping of name to mapping, optional
@@ -212,22 +217,39 @@ def reduce_bodies(
             raise InputError(f"reduce_bodies: modes lacks the body '{name}'.")
         rows = [one.nodes for one in pairings if one.body == name]
         rows += [one.feet for one in pairings if one.other == name]
-        given = {"contact": (), "reduction": "residual", **options, **each.get(name, {})}
+        given: dict[str, Any] = {"contact": (), "reduction": "residual", **options,
+                                 **each.get(name, {})}
         with located(f"Body '{name}':"):
-            found[name] = modal_basis(body, counts[name], interface_rows=rows, **given)
+            given["points"], joints = _joints(name, body, given.get("points") or {}, links)
+            rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + joints
+            found[name] = modal_basis(body, counts[name], rows=rows, **given)
     return found
 
 
-def _interface_rows(body: ElasticBody, given: Any) -> Any:
-    """Rows of displacements x and y of rows x, y and rotation of points."""
+def _given_rows(body: ElasticBody, given: Any) -> Any:
     import scipy.sparse as sp
 
     rows = sp.csr_array(given)
-    if rows.shape[1] != 2 * len(body.nodes) or rows.shape[0] % 3:
-        raise InputError(f"modal_basis: interface_rows of shape {rows.shape} must be (3 k, "
-                         f"{2 * len(body.nodes)}), displacements x, y and rotation of k places "
-                         f"from the nodes of this body; pair the faces of the same bodies.")
-    return rows[np.arange(rows.shape[0]) % 3 < 2]
+    if rows.shape[1] != 2 * len(body.nodes):
+        raise InputError(f"modal_basis: rows of shape {rows.shape} must be (k, "
+                         f"{2 * len(body.nodes)}), motions from the displacements of the nodes of "
+                         f"this body; pair the faces of the same bodies.")
+    return rows
+
+
+def _joints(name: str, body: ElasticBody, points: Mapping[str, Place], links: Sequence[Link]
+            ) -> tuple[dict[str, Place], list[Any]]:
+    """Points of a body with those of its links, and the rows on which their forces act."""
+    known, rows = dict(points), []
+    for link in links:
+        for end in (link.first, link.second):
+            owner, _, point = (end or "").partition(".")
+            if owner == name:
+                if point not in ("B", "C"):
+                    known.setdefault(point, point)
+                matrix = place_rows(body, known.get(point, point), point).matrix
+                rows.append(matrix if isinstance(link, Weld | Bushing) else matrix[:2])
+    return known, rows
 
 
 def _modes(

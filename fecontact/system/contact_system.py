@@ -20,6 +20,7 @@ from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
+from fecontact.reduction.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
@@ -116,11 +117,11 @@ class ContactSystem(Summarised):
     sliding: Mapping[str, Sliding] = field(default_factory=dict)
     bodies: InitVar[Mapping[str, ModalBasis] | None] = None
     interfaces: InitVar[Sequence[Interface] | None] = None
-    links: InitVar[Sequence[Any] | None] = None
+    links: InitVar[Sequence[Link] | None] = None
 
     def __post_init__(
         self, bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-        links: Sequence[Any] | None,
+        links: Sequence[Link] | None,
     ) -> None:
         if bodies is not None or interfaces is not None or links is not None:
             if any(getattr(self, name) is not None for name in ("basis", "normal", "friction")):

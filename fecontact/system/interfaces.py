@@ -17,12 +17,14 @@ from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
+from fecontact.fem.pairing import Pairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion, constant_speed
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembled_basis import PointPairing, assembled_basis
+from fecontact.reduction.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 
@@ -58,7 +60,7 @@ class Interface:
     """
 
     name: str
-    pairing: Any
+    pairing: Pairing | PointPairing
     normal: NormalLaw
     friction: FrictionLaw | None = None
     sliding: Sliding | None = None
@@ -67,7 +69,7 @@ class Interface:
     def __post_init__(self) -> None:
         require_kind("Interface", str, name=self.name)
         owner = f"Interface '{self.name}'"
-        require_kind(owner, PointPairing, pairing=self.pairing)
+        require_kind(owner, (Pairing, PointPairing), pairing=self.pairing)
         require_kind(owner, NormalLaw, normal=self.normal)
         require_kind(owner, (FrictionLaw, type(None)), friction=self.friction)
         require_kind(owner, (SlidingTranslation, SlidingRotation, type(None)),
@@ -76,7 +78,7 @@ class Interface:
 
 def system_fields(
     bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-    links: Sequence[Any] | None,
+    links: Sequence[Link] | None,
 ) -> dict[str, Any]:
     """Basis, laws, gap and sliding of a contact system of several bodies.
 

@@ -43,6 +43,8 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
         For points or boundaries that the basis does not have, gravity or base acceleration with a
         basis without rows of inertia, and places outside the body or for a basis without shapes.
     """
+    if basis.link_load is not None:
+        yield ActingLoad("the preload of links", basis.link_load, 1.0, "they hold")
     if load.normal:
         yield ActingLoad(f"normal = {load.normal!r}", basis.T[1, 1], -load.normal,
                          "'C' moves along y")
