@@ -61,7 +61,7 @@ def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
     if not faces[0].name:
         shares = contact_shares(trajectory)
         return [(f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()]
-    rows = [("bodies", ", ".join(f"{part.name} ({part.modes[1]} modes)" for part in basis.parts))]
+    rows = [("bodies", dict(basis.summary()).get("bodies", "1"))]
     for face in faces:
         shares = contact_shares(trajectory, face.nodes)
         rows.append((face.title, f"{len(face.abscissa)} nodes, " + ", ".join(

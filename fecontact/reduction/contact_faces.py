@@ -99,8 +99,11 @@ def node_name(basis: ModalBasis, node: int) -> str:
 
 
 def mode_names(basis: ModalBasis) -> list[str]:
-    """``mode 3`` for each mode, or with its body and counted there, ``pad: mode 3``."""
-    if not basis.parts:
+    """``mode 3`` for each mode, or with its body and counted there, ``pad: mode 3``.
+
+    Modes of linked bodies are those of all of them.
+    """
+    if sum(part.modes[1] for part in basis.parts) < basis.modes:
         return [f"mode {mode}" for mode in range(basis.modes)]
     return [f"{part.name}: mode {mode}" for part in basis.parts for mode in range(part.modes[1])]
 

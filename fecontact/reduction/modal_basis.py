@@ -184,7 +184,7 @@ class ModalBasis(Summarised):
               [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
             *([] if self.rotation is None else
               [("rotation", quantity(self.rotation.speed, "rad/s"))]),
-            *([("bodies", listed([f"{part.name} ({part.modes[1]} modes)"
+            *([("bodies", listed([f"{part.name} ({part.modes[1]} modes)" if part.modes[1] else part.name
                                      for part in self.parts]))] if self.parts else []),
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 or self.parts else "")),

@@ -1,5 +1,7 @@
 """Places along the faces of several bodies, and the two sides of an interface."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from joined_bodies import Touch, joined, moved, stack
@@ -34,6 +36,10 @@ def test_faces_name_their_interface_and_its_bodies():
     assert node_name(stack(), 7) == "shoe: node 7"
     assert node_name(stack(), 8) == "foot: node 8"
     assert mode_names(stack())[4:6] == ["block: mode 4", "beam: mode 0"]
+    linked = replace(stack(), parts=tuple(replace(part, modes=(0, 0)) for part in stack().parts))
+    assert mode_names(linked)[4:6] == ["mode 4", "mode 5"]
+    assert contact_faces(linked)[0].title == "shoe: block and beam"
+    assert dict(linked.summary())["bodies"] == "block, beam"
 
 
 def test_a_leaning_face_is_measured_along_itself():
@@ -89,8 +95,6 @@ def test_both_sides_of_an_interface_move_with_their_bodies(angle):
 
 def test_a_body_that_touches_itself_has_two_sides():
     """Two rectangles of one mesh, the upper on the lower one, counted as one body."""
-    from dataclasses import replace
-
     body = stack()
     alone = replace(body, parts=(replace(body.parts[0], name="ring", modes=(0, 10),
                                          nodes=(0, len(body.mode_shapes.nodes))),))

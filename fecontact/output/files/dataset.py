@@ -10,7 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.frames import contact_forces
-from fecontact.reduction.contact_faces import contact_faces, mode_names, several_bodies
+from fecontact.reduction.contact_faces import contact_faces, several_bodies
 
 if TYPE_CHECKING:
     import xarray
@@ -78,9 +78,9 @@ def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
         "node_normal_x": Variable(("node",), normals[:, 0], "1"),
         "node_normal_y": Variable(("node",), normals[:, 1], "1"),
     }
-    if basis.parts:
-        found["mode_body"] = Variable(("mode",), np.array(
-            [name.partition(":")[0] for name in mode_names(basis)]), "1")
+    owners = [part.name for part in basis.parts for _ in range(part.modes[1])]
+    if len(owners) == basis.modes:  # modes of linked bodies have none
+        found["mode_body"] = Variable(("mode",), np.array(owners), "1")
     return found
 
 
