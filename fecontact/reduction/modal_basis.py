@@ -184,8 +184,8 @@ class ModalBasis(Summarised):
               [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
             *([] if self.rotation is None else
               [("rotation", quantity(self.rotation.speed, "rad/s"))]),
-            *([("bodies", listed([f"{part.name} ({part.modes[1]} modes)" if part.modes[1] else part.name
-                                     for part in self.parts]))] if self.parts else []),
+            *([("bodies", listed([part.name + f" ({part.modes[1]} modes)" * (part.modes[1] > 0)
+                                  for part in self.parts]))] if self.parts else []),
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 or self.parts else "")),
             ("points", listed(["B", "C", *self.extra])),
