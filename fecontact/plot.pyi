@@ -7,12 +7,13 @@ from .output.plots.analysis import (
 )
 from .output.plots.basins import plot_basins
 from .output.plots.bifurcation_diagram import plot_branches
+from .output.plots.contact_map import plot_contact_map
 from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
 from .output.plots.figure import new_figure
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.preload import plot_loop, plot_shear
-from .output.plots.run import plot_contact_map, plot_energies, plot_history, plot_phase
+from .output.plots.run import plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
 from .output.plots.wear import plot_wear

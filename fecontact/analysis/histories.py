@@ -8,6 +8,8 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.reduction.contact_faces import node_name
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 
 Point = str | int | tuple[float, float]
@@ -53,7 +55,8 @@ def history(
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
     component : 'x', 'y' or 'phi'
-        Component of displacements and velocities: tangential, normal, or rotation.
+        Component of displacements and velocities: tangential, normal, or rotation. Contact nodes
+        of several bodies move relative to the other side, along their tangents and normals.
 
     Raises
     ------
@@ -65,7 +68,7 @@ def history(
     if quantity not in QUANTITIES:
         raise InputError(f"quantity = {quantity!r} is not known{nearest(str(quantity), QUANTITIES)}"
                          f"; choose from {choices(QUANTITIES)}.")
-    title = quantity.replace("_", " ")
+    title, basis = quantity.replace("_", " "), trajectory.system.basis
     if quantity in _TOTALS:
         name = _TOTALS[quantity]
         return History(getattr(trajectory, name).sum(axis=1), _OF_NODES[name], title)
@@ -73,18 +76,23 @@ def history(
         if isinstance(point, bool) or not isinstance(point, int | np.integer):
             raise InputError(f"The {title} is one of contact nodes, not of point = {point!r}; give "
                              f"the number of a node, from 0 to "
-                             f"{trajectory.system.basis.contact_nodes - 1}.")
-        node = trajectory.system.basis.point_index(int(point)) - 2
+                             f"{basis.contact_nodes - 1}.")
+        node = basis.point_index(int(point)) - 2
         return History(getattr(trajectory, quantity)[:, node], _OF_NODES[quantity],
-                       f"{title} of {point_name(point)}")
+                       f"{title} of {point_name(point, basis)}")
     motion = getattr(trajectory, quantity)(point)
     if component not in _COMPONENTS or _COMPONENTS[component] >= motion.shape[1]:
-        raise InputError(f"component = {component!r} is not one of {point_name(point)}; choose "
-                         f"from {choices(list(_COMPONENTS)[: motion.shape[1]])}.")
+        raise InputError(f"component = {component!r} is not one of {point_name(point, basis)}; "
+                         f"choose from {choices(list(_COMPONENTS)[: motion.shape[1]])}.")
     unit = _OF_POINTS[quantity]
     unit = unit.replace("m", "rad") if component == "phi" else unit
+    if is_relative(point, basis):
+        title = f"relative {title}"
+        way = {"x": "along t", "y": "along n"}.get(component, component)
+    else:
+        way = component
     return History(motion[:, _COMPONENTS[component]], unit,
-                   f"{title} {component} of {point_name(point)}")
+                   f"{title} {way} of {point_name(point, basis)}")
 
 
 def usual_component(system: ContactSystem) -> str:
@@ -93,10 +101,18 @@ def usual_component(system: ContactSystem) -> str:
     return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"
 
 
-def point_name(point: Point) -> str:
-    """Display name of a point: ``B``, ``contact node 3``, ``(0.1, 0.02) m``."""
+def is_relative(point: Point, basis: ModalBasis) -> bool:
+    """Whether the motion of a point is that of a contact node relative to another body."""
+    return isinstance(point, int | np.integer) and not basis.ground_nodes[point]
+
+
+def point_name(point: Point, basis: ModalBasis | None = None) -> str:
+    """Display name of a point: ``B``, ``contact node 3``, ``(0.1, 0.02) m``.
+
+    In a basis of several bodies ``pad.tip``, and ``shoe: node 3`` of an interface.
+    """
     if isinstance(point, str):
         return point
     if isinstance(point, int | np.integer):
-        return f"contact node {point}"
+        return f"contact node {point}" if basis is None else node_name(basis, int(point))
     return f"({point[0]:g}, {point[1]:g}) m"

@@ -14,6 +14,7 @@ from fecontact.core.errors import AnalysisError, InputError, choices, nearest, r
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots import analysis
 from fecontact.output.plots import run as plots
+from fecontact.output.plots.contact_map import plot_contact_map
 from fecontact.output.plots.modes import plot_modes
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
 KINDS: dict[str, Draw] = {
     "history": lambda run, c, path: plots.plot_history(run, c.points, path=path),
     "phase": lambda run, c, path: plots.plot_phase(run, c.point, c.shown_component, path=path),
-    "contact_map": lambda run, c, path: plots.plot_contact_map(run, path=path),
+    "contact_map": lambda run, c, path: plot_contact_map(run, path=path),
     "energies": lambda run, c, path: plots.plot_energies(run, path=path),
     "modes": lambda run, c, path: plot_modes(run.system.basis, path=path),
     "spectrum": lambda run, c, path: analysis.plot_spectrum(

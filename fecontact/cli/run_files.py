@@ -52,6 +52,7 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
     """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
     from fecontact.analysis.histories import usual_component
     from fecontact.output.plots import run as plots
+    from fecontact.output.plots.contact_map import plot_contact_map
 
     system, points = trajectory.system, study.output.points
     middle = system.basis.contact_nodes // 2
@@ -61,7 +62,7 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
         for kind in ("history", "phase", "contact_map", "energies")]
     plots.plot_history(trajectory, points, path=history)
     plots.plot_phase(trajectory, point, usual_component(system), path=phase)
-    plots.plot_contact_map(trajectory, path=contact_map)
+    plot_contact_map(trajectory, path=contact_map)
     plots.plot_energies(trajectory, path=energies)
     return files
 

@@ -40,7 +40,6 @@ def run_table(trajectory: "Trajectory") -> Any:
     size, place = largest_displacement(trajectory)
     time, statistics = trajectory.time, trajectory.statistics
     seconds = statistics.get("seconds", 0.0)
-    shares = contact_shares(trajectory)
     rows = [
         ("time", f"{quantity(float(time[0]), 's')} ... {quantity(float(time[-1]), 's')}"),
         (("steps", f"{statistics['steps']} in {seconds:.1f} s") if "steps" in statistics else
@@ -48,9 +47,26 @@ def run_table(trajectory: "Trajectory") -> Any:
         ("energy imbalance", f"{trajectory.energies.imbalance:.1e}"),
         *(() if trajectory.events is None else (("events", _events(trajectory.events)),)),
         ("largest displacement", f"{quantity(size, 'm')} at {place}"),
-        *((f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()),
+        *_contact_rows(trajectory),
     ]
     return table("", "", rows=rows)
+
+
+def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
+    """Shares of the contact states, of several bodies for each interface with its nodes."""
+    from fecontact.reduction.contact_faces import contact_faces
+
+    basis = trajectory.system.basis
+    faces = contact_faces(basis)
+    if not faces[0].name:
+        shares = contact_shares(trajectory)
+        return [(f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()]
+    rows = [("bodies", dict(basis.summary()).get("bodies", "1"))]
+    for face in faces:
+        shares = contact_shares(trajectory, face.nodes)
+        rows.append((face.title, f"{len(face.abscissa)} nodes, " + ", ".join(
+            f"{100.0 * share:.1f} % {name}" for name, share in shares.items())))
+    return rows
 
 
 def complex_table(modes: "ComplexModes") -> Any:
@@ -69,7 +85,7 @@ def _events(events: "Events") -> str:
 
 
 def largest_displacement(trajectory: "Trajectory") -> tuple[float, str]:
-    """Largest displacement [m] of the body at all output times, and where it occurs."""
+    """Largest displacement [m] of the bodies at all output times, and where it occurs."""
     basis, q = trajectory.system.basis, trajectory.modal_coordinates
     if basis.mode_shapes is not None:
         shapes, places = basis.mode_shapes.shapes, basis.mode_shapes.nodes
@@ -82,15 +98,18 @@ def largest_displacement(trajectory: "Trajectory") -> tuple[float, str]:
         motion = np.linalg.norm((block @ rows).reshape(len(block), -1, 2), axis=2).max(axis=0)
         if motion.max() > best:
             best, node = float(motion.max()), int(motion.argmax())
-    return best, f"x = {places[node, 0]:.4g} m, y = {places[node, 1]:.4g} m"
+    body = [f" of {part.name}" for part in basis.parts
+            if basis.mode_shapes is not None and part.nodes[0] <= node < sum(part.nodes)]
+    return best, f"x = {places[node, 0]:.4g} m, y = {places[node, 1]:.4g} m" + "".join(body)
 
 
-def contact_shares(trajectory: "Trajectory") -> dict[str, float]:
-    """Fractions of time and contact length that are open, in stick and in slip."""
+def contact_shares(trajectory: "Trajectory", nodes: slice = slice(None)) -> dict[str, float]:
+    """Fractions of time and contact length of some nodes that are open, in stick and in slip."""
     from fecontact.integrate.trajectory import ContactState
 
-    weight = trajectory.system.share
-    return {state.name.lower(): float(((trajectory.contact_state == state) @ weight).mean())
+    weight = trajectory.system.basis.tributary[nodes]
+    states = trajectory.contact_state[:, nodes]
+    return {state.name.lower(): float(((states == state) @ (weight / weight.sum())).mean())
             for state in ContactState}
 
 

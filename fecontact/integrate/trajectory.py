@@ -220,7 +220,8 @@ class Trajectory(Summarised):
             *([] if steps is None else [("steps", f"{steps}")]),
             *([] if self.events is None else [("events", f"{len(self.events.time)}")]),
         ]
-        return [*facts, *self.system.summary()[:5]]
+        return [*facts, *(row for row in self.system.summary()
+                          if row[0] not in ("sliding", "ground", "drive", "load"))]
 
     @property
     def states(self) -> Array:

@@ -184,9 +184,10 @@ class ModalBasis(Summarised):
               [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
             *([] if self.rotation is None else
               [("rotation", quantity(self.rotation.speed, "rad/s"))]),
-            *([("bodies", listed([part.name for part in self.parts]))] if self.parts else []),
+            *([("bodies", listed([part.name + f" ({part.modes[1]} modes)" * (part.modes[1] > 0)
+                                  for part in self.parts]))] if self.parts else []),
             ("contact nodes", f"{self.contact_nodes}"
-             + (f" ({listed(groups)})" if len(groups) > 1 else "")),
+             + (f" ({listed(groups)})" if len(groups) > 1 or self.parts else "")),
             ("points", listed(["B", "C", *self.extra])),
             ("shapes over the body", "none" if self.mode_shapes is None
              else f"at {len(self.mode_shapes.nodes)} nodes"),

@@ -84,6 +84,9 @@ class BasisReport:
     @property
     def recommendation(self) -> str:
         """Recommendation in one or two sentences."""
+        if self.basis.parts:
+            return ("The basis is that of several bodies; the reports of their own bases judge "
+                    "the compliance at their faces.")
         if self.basis.quality is None:
             return ("The basis came without a body, so its compliance at the contact cannot be "
                     "judged; compare it with a static solution of the full model.")
@@ -133,12 +136,18 @@ class BasisReport:
         lines = [f"{'mode':>4s} {'frequency [Hz]':>15s} {'damping':>9s} {'mass x':>8s} "
                  f"{'mass y':>8s}  kind"]
         diagonal = np.diag(basis.damping)
+        first = {part.modes[0]: part.name for part in basis.parts if part.modes[1]}
+        number = 0
         for i, f in enumerate(basis.frequencies_hz):
+            if i in first:
+                number = 0
+                lines.append(f"body '{first[i]}':")
             w = basis.angular_frequencies[i]
             ratio = f"{diagonal[i] / (2.0 * w):9.3%}" if w > 0.0 else f"{'-':>9s}"
             shares = " ".join(f"{share:8.2%}" if np.isfinite(share) else f"{'-':>8s}"
                               for share in mass[:, i])
-            lines.append(f"{i:4d} {f:15.6g} {ratio} {shares}  {self._kind(i)}")
+            lines.append(f"{number:4d} {f:15.6g} {ratio} {shares}  {self._kind(i)}")
+            number += 1
         error = self.contact_error
         if np.isfinite(error).all() and error.size and basis.rigid_modes < basis.modes:
             lines += ["", "missing static compliance at the contact nodes: "

@@ -29,6 +29,7 @@ from fecontact.system.interfaces import (
     Interface,
     PrescribedMotion,
     Sliding,
+    SlidingRotation,
     checked_sliding,
     inner_name,
     motion_sources,
@@ -187,6 +188,9 @@ class ContactSystem(Summarised):
             *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
               if name in own),
             *((kind, _law_names(getattr(self, kind))) for kind in ("normal", "friction")),
+            *([("sliding", listed([f"{name} {_sliding_speed(one)}"
+                                   for name, one in self.sliding.items()]))]
+              if self.sliding else []),
             ("ground", quantity(ground.speed, "m/s")
              + (f", {quantity(high - low, 'm')} from valley to peak" if ground.wavy else "")),
             ("drive", listed(stiffness) + (f", {moved:.5g} Hz" if moved else "")),
@@ -395,6 +399,11 @@ class ContactSystem(Summarised):
         return InputError(f"The system has no parameter '{outer_name(self, name)}'"
                           f"{nearest(name, names)}; "
                           f"its parameters are: {choices(names)}.")
+
+
+def _sliding_speed(sliding: Sliding) -> str:
+    return quantity(sliding.speed, "rad/s" if isinstance(sliding, SlidingRotation) else "m/s") + (
+        "" if sliding.motion is None else " in time")
 
 
 def _load_summary(load: Load) -> str:

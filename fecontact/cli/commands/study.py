@@ -226,7 +226,7 @@ def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     described = read_study(study, set_)
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
-            described.system()
+            basis = described.system().basis
         history = described.wear_history(progress=True)
         from fecontact.output.files.wear import write_wear
         from fecontact.output.plots.wear import plot_wear
@@ -234,7 +234,7 @@ def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
         with waiting("Writing"):
             stored = write_wear(folder / f"{described.name}-wear.h5", history)
             picture = folder / f"{described.name}-wear.png"
-            plot_wear(history, path=picture)
+            plot_wear(history, basis=basis, path=picture)
         show(table("", "", rows=history.summary()))
         echo_written(stored, picture)
     return INTERRUPTED if history.status.name == "INTERRUPTED" else 0

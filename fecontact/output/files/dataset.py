@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.files.frames import contact_forces
+from fecontact.reduction.contact_faces import contact_faces, several_bodies
 
 if TYPE_CHECKING:
     import xarray
@@ -19,7 +21,10 @@ _NODES = {
 }
 # Where the name alone does not tell the sign.
 _TITLES = {"friction_force": "friction force on the body in -x"}
+# Between several bodies they act along the tangents of the contact nodes.
+_TITLES_OF_SEVERAL = {"friction_force": "friction force on the body in -t"}
 _AXES = ("x", "y", "phi")
+_RELATIVE = ("t", "n", "phi")
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +34,7 @@ class Variable:
     Attributes
     ----------
     dims : tuple of str
-        Names of dimensions: time, point, component, node, mode.
+        Names of dimensions: time, point, component, node, mode; of several bodies also direction.
     values : array
     unit : str
     """
@@ -40,10 +45,14 @@ class Variable:
 
 
 def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
-    """Coordinates of the dimensions: time, names of points, axes, nodes, modes."""
+    """Coordinates of the dimensions: time, names of points, axes, nodes, modes.
+
+    Of several bodies also the interface, place along it and directions of each node, and the body
+    of each mode. ``direction`` is along tangent t and normal n, which points out of the other side.
+    """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
     basis = trajectory.system.basis
-    return {
+    found = {
         "time": Variable(("time",), trajectory.time, "s"),
         "point": Variable(("point",), np.array(_points(trajectory)), "1"),
         "component": Variable(("component",), np.array(_AXES), "1"),
@@ -53,6 +62,26 @@ def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
         "mode": Variable(("mode",), np.arange(basis.modes), "1"),
         "mode_frequency": Variable(("mode",), basis.frequencies_hz, "Hz"),
     }
+    if not len(found["point"].values):
+        # The classic netCDF format takes a dimension of length zero for one that grows.
+        del found["point"]
+    if not several_bodies(basis):
+        return found
+    faces, normals = contact_faces(basis), basis.normals
+    found |= {
+        "direction": Variable(("direction",), np.array(_RELATIVE), "1"),
+        "node_y": Variable(("node",), basis.positions[2 : 2 + basis.contact_nodes, 1], "m"),
+        "node_interface": Variable(("node",), np.array(
+            [face.name for face in faces for _ in face.abscissa]), "1"),
+        "node_position": Variable(("node",), np.concatenate([face.abscissa for face in faces]),
+                                  "m"),
+        "node_normal_x": Variable(("node",), normals[:, 0], "1"),
+        "node_normal_y": Variable(("node",), normals[:, 1], "1"),
+    }
+    owners = [part.name for part in basis.parts for _ in range(part.modes[1])]
+    if len(owners) == basis.modes:  # modes of linked bodies have none
+        found["mode_body"] = Variable(("mode",), np.array(owners), "1")
+    return found
 
 
 def variables(trajectory: Trajectory) -> dict[str, Variable]:
@@ -60,19 +89,27 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
 
     Displacements and velocities [x, y, phi] of B, C, other named points and the contact nodes,
     forces and states of the contact nodes, their pressures if the basis has a thickness, energies,
-    modal coordinates.
+    modal coordinates. Contact nodes of several bodies move relative to the other side, [t, n, phi];
+    ``contact_force`` is what acts on the body of the node along x and y, reversed on the other one.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
     basis, q, rate = (trajectory.system.basis, trajectory.modal_coordinates,
                       trajectory.modal_velocities)
     points = [basis.point_index(name) for name in _points(trajectory)]
-    nodes = slice(2, 2 + basis.contact_nodes)
+    nodes, several = slice(2, 2 + basis.contact_nodes), several_bodies(basis)
+    node, axes = ("node_relative_", "direction") if several else ("node_", "component")
     found = {}
     for name, modal, unit in (("displacement", q, "m, m, rad"),
                               ("velocity", rate, "m/s, m/s, rad/s")):
-        for what, rows, dim in (("", basis.T[points], "point"), ("node_", basis.T[nodes], "node")):
-            found[what + name] = Variable(("time", dim, "component"), np.einsum(
+        for what, rows, dim, last in (("", basis.T[points], "point", "component"),
+                                      (node, basis.T[nodes], "node", axes)):
+            if not len(rows):
+                continue
+            found[what + name] = Variable(("time", dim, last), np.einsum(
                 "pam,tm->tpa", rows, modal), unit)
+    if several:
+        for axis, values in zip("xy", np.moveaxis(contact_forces(trajectory), 2, 0), strict=True):
+            found[f"contact_force_{axis}"] = Variable(("time", "node"), values, "N")
     for name, unit in _NODES.items():
         found[name] = Variable(("time", "node"), getattr(trajectory, name), unit)
     if basis.thickness is not None:
@@ -91,22 +128,27 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
     Modal coordinates are omitted: they have no meaning without the modes.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
+    several = several_bodies(trajectory.system.basis)
     names = {key: [str(value) for value in variable.values]
              for key, variable in coordinates(trajectory).items()}
+    titles = _titles(trajectory)
     found: dict[str, NDArray[Any]] = {"time [s]": trajectory.time}
     for name, variable in variables(trajectory).items():
-        title = _TITLES.get(name, name.removeprefix("node_").replace("_", " "))
+        title = titles.get(name, name.removeprefix("node_").replace("_", " "))
         if "mode" in variable.dims:
             continue
         if variable.dims == ("time",):
             found[f"{title} [{variable.unit}]"] = variable.values
             continue
-        units = variable.unit.split(", ") if "component" in variable.dims else [variable.unit]
+        axes = {"component": _AXES, "direction": _RELATIVE}.get(variable.dims[-1], ())
+        units = variable.unit.split(", ") if axes else [variable.unit]
         dim = variable.dims[1]
         for place, label in enumerate(names[dim]):
             owner = label if dim == "point" else f"node {label}"
+            if several and dim == "node":
+                owner = f"{names['node_interface'][place]}: {owner}"
             for component, unit in enumerate(units):
-                ending = f" {_AXES[component]}" if "component" in variable.dims else ""
+                ending = f" {axes[component]}" if axes else ""
                 values = variable.values[:, place]
                 found[f"{owner} {title}{ending} [{unit}]"] = (
                     values[:, component] if values.ndim > 1 else values)
@@ -116,8 +158,8 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
 def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
     """A run as an :class:`xarray.Dataset`, with coordinates and an attribute ``units`` each.
 
-    Dimensions are time, point, component, node and mode: ``ds.displacement.sel(point="B",
-    component="x")``.
+    Dimensions are time, point, component, node and mode, with several bodies also direction:
+    ``ds.displacement.sel(point="B", component="x")``.
 
     Raises
     ------
@@ -130,8 +172,10 @@ def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
         raise MissingLibraryError("xarray is not installed; install it with pip install "
                                   "'fecontact[xarray]'.") from None
 
+    titles = _titles(trajectory)
+
     def array(name: str, variable: Variable) -> Any:
-        named = {"long_name": _TITLES[name]} if name in _TITLES else {}
+        named = {"long_name": titles[name]} if name in titles else {}
         return DataArray(variable.values, dims=variable.dims,
                          attrs={"units": variable.unit, **named})
 
@@ -139,6 +183,10 @@ def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
         {name: array(name, variable) for name, variable in variables(trajectory).items()},
         coords={name: array(name, variable) for name, variable in coordinates(trajectory).items()},
         attrs={"title": "fecontact run", "status": trajectory.status.value})
+
+
+def _titles(trajectory: Trajectory) -> dict[str, str]:
+    return _TITLES_OF_SEVERAL if several_bodies(trajectory.system.basis) else _TITLES
 
 
 def _points(trajectory: Trajectory) -> list[str]:

@@ -10,6 +10,8 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.reduction.contact_faces import contact_directions
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 
 
@@ -62,6 +64,15 @@ def require_field(trajectory: Trajectory) -> ModeShapes:
     return field
 
 
+def body_numbers(basis: ModalBasis) -> NDArray[np.int32]:
+    """Number (N,) of the body of each mesh node, in the order of ``basis.parts``."""
+    assert basis.mode_shapes is not None
+    found = np.zeros(len(basis.mode_shapes.nodes), dtype=np.int32)
+    for number, part in enumerate(basis.parts):
+        found[part.nodes[0] : sum(part.nodes)] = number
+    return found
+
+
 def displacement(field: ModeShapes, q: Array) -> Array:
     """Displacements (F, N, 2) of the nodes [m] at modal coordinates q (F, m)."""
     nodes, _, modes = field.shapes.shape
@@ -78,24 +89,36 @@ def von_mises(field: ModeShapes, q: Array) -> Array:
 
 
 def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
-    """Forces (F, n, 2) of the ground on the contact nodes, [-R - F y_R', F] [N].
+    """Forces (F, n, 2) of the other side on the contact nodes, along x and y [N].
 
-    y_R' is the slope of the ground below a node, or zero for contact forces that stay vertical.
+    ``F n - R t`` with normal and tangent of each node: [-R - F y_R', F] on the ground, where y_R'
+    is the slope of the ground below a node, or zero for contact forces that stay vertical.
     """
+    tangents, normals = contact_directions(trajectory.system.basis)
+    forces = _local_forces(trajectory, which)
+    return np.asarray(forces[..., :1] * tangents + forces[..., 1:] * normals)
+
+
+def _local_forces(trajectory: Trajectory, which: Any) -> Array:
+    """Forces (F, n, 2) on the contact nodes along tangents and normals [N]."""
     normal, along = trajectory.normal_force[which], -trajectory.friction_force[which]
     ground, basis = trajectory.system.ground, trajectory.system.basis
     if ground.wavy and ground.normal == "surface":
         places = basis.contact_x + trajectory.modal_coordinates[which] @ basis.contact_T[:, 0].T
-        along = along - normal * np.array([
+        along = along - basis.ground_nodes * normal * np.array([
             ground.slope(place, time)
             for place, time in zip(places, trajectory.time[which], strict=True)])
     return np.stack([along, normal], axis=-1)
 
 
 def nodal_contact_force(trajectory: Trajectory, which: Any = slice(None)) -> Array:
-    """Contact forces (F, N, 2) distributed over the body nodes [N]; the total is preserved."""
+    """Contact forces (F, N, 2) along x and y, distributed over the mesh nodes [N].
+
+    What acts on one body acts reversed on the other one, at the feet of its contact nodes; the
+    total is preserved.
+    """
     field = require_field(trajectory)
-    forces = contact_forces(trajectory, which)
+    forces = _local_forces(trajectory, which)
     n = forces.shape[1]
     rows = field.restriction.tocsr()[6 : 6 + 3 * n]
     moments = np.zeros((*forces.shape[:2], 1))

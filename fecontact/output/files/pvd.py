@@ -10,6 +10,7 @@ from fecontact.core.files.atomic_write import output_folder, replaced, replaced_
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.case import Case, read_case
 from fecontact.output.files.frames import (
+    body_numbers,
     displacement,
     frame_indices,
     nodal_contact_force,
@@ -25,7 +26,8 @@ def export_pvd(
     """Write frames of a run into a folder of VTU files, and a PVD file that lists them.
 
     Each frame holds ``displacement`` [m], ``von_mises`` [Pa] and ``contact_force`` [N] at the
-    nodes of the undeformed body, as in :func:`fecontact.write_case`.
+    nodes of the undeformed body, as in :func:`fecontact.write_case`, and with several bodies the
+    number ``body`` of each.
 
     Parameters
     ----------
@@ -65,6 +67,8 @@ def export_pvd(
     _require_free(folder)
     from fecontact.fem.mesh_files import write_fields
 
+    basis = trajectory.system.basis
+    body = {"body": body_numbers(basis)} if basis.parts else {}
     with output_folder(folder.parent), replaced_folder(folder) as part:
         names = []
         for number, index in enumerate(indices):
@@ -75,6 +79,7 @@ def export_pvd(
                 "von_mises": von_mises(field, q)[0].astype(np.float32),
                 "contact_force": nodal_contact_force(
                     trajectory, slice(index, index + 1))[0].astype(np.float32),
+                **body,
             })
         times = trajectory.time[indices].tolist()
         if not beside:

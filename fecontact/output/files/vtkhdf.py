@@ -9,6 +9,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.frames import (
     blocks,
+    body_numbers,
     displacement,
     nodal_contact_force,
     require_field,
@@ -23,8 +24,9 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     """Write the body and its fields at the chosen output times into a new group /VTKHDF.
 
     Point data of each step are ``displacement`` (3 components) [m], ``von_mises`` [Pa] and
-    ``contact_force`` (3 components) [N], the forces of the ground spread over the nodes of the
-    contact face, all in single precision. Points and cells are stored once.
+    ``contact_force`` (3 components) [N], the forces of the other side spread over the nodes of the
+    contact faces, all in single precision. Points and cells are stored once; those of several
+    bodies hold their number ``body``, counted from 0 as the names in its attribute.
 
     Parameters
     ----------
@@ -48,6 +50,13 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     _write_grid(group, field.nodes, field.cells)
     _write_steps(group.create_group("Steps"), trajectory.time[indices], nodes)
 
+    parts = trajectory.system.basis.parts
+    if parts:
+        body = body_numbers(trajectory.system.basis)
+        for kind, numbers in (("Point", body), ("Cell", body[field.cells[:, 0]])):
+            group[f"{kind}Data/body"] = numbers
+            group[f"{kind}Data/body"].attrs["names"] = [part.name for part in parts]
+            group[f"Steps/{kind}DataOffsets/body"] = np.zeros(steps, dtype=np.int64)
     data = {}
     for name, components, unit in _POINT_DATA:
         shape = (steps * nodes, 3) if components == 3 else (steps * nodes,)

@@ -16,14 +16,11 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import count, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.plots.face_panels import abscissa_unit, face_panels
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import thinned
-from fecontact.output.plots.style import (
-    COLOURS,
-    DASHES,
-    add_note,
-    distinct_colours,
-)
+from fecontact.output.plots.style import COLOURS, DASHES, add_note, distinct_colours
+from fecontact.reduction.contact_faces import contact_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -203,12 +200,14 @@ def plot_poincare(
         plane.set_xlabel(f"displacement {component} [{symbol}]")
         plane.set_ylabel(f"velocity {component} [{rate_symbol}]")
         plane.legend(loc="best")
-        plane.set_title(f"{point_name(point)}, {count(len(found.time), 'point')}")
+        plane.set_title(f"{point_name(point, basis)}, {count(len(found.time), 'point')}")
     return figure
 
 
 def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
     """Plot friction work per length [J/m] and slip distance [m] along the contact face.
+
+    Of several bodies along each interface, in columns of one scale.
 
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
     constant coefficient is the friction work over that coefficient.
@@ -226,25 +225,26 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     require_kind("plot_friction_work", Trajectory, trajectory=trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    basis = trajectory.system.basis
-    x, length = basis.contact_x, basis.tributary
-    work = trajectory.friction_work[-1] / length
+    faces = contact_faces(trajectory.system.basis)
+    work = trajectory.friction_work[-1] / trajectory.system.basis.tributary
     touching = trajectory.normal_force != 0.0
     speed = np.abs(trajectory.slip_velocity) * touching
     slip = np.trapezoid(speed, trajectory.time, axis=0)
-    with new_figure(9.0, 5.6, path) as figure:
+    with new_figure(max(9.0, 4.5 * len(faces)), 5.6, path) as figure:
         add_note(figure, drawn)
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        unit, symbol = suitable_unit(float(np.abs(x).max() or length.max()), "m")
-        for panel, values, name, base in ((upper, work, "friction work per length", "N"),
-                                          (lower, slip, "slip in contact", "m")):
+        panels = face_panels(figure, faces, 2)
+        for row, (values, name, base) in enumerate(((work, "friction work per length", "N"),
+                                                    (slip, "slip in contact", "m"))):
             factor, label = suitable_unit(float(np.abs(values).max()), base)
-            panel.bar(x / unit, values / factor, width=0.92 * length / unit, color=COLOURS[0])
+            for face, panel in zip(faces, panels[row], strict=True):
+                unit = abscissa_unit(face)
+                panel.bar(face.abscissa / unit, values[face.nodes] / factor,
+                          width=0.92 * face.tributary / unit, color=COLOURS[0])
+            # Not before all of a row are drawn: its panels share their scale.
+            panels[row, 0].set_ylim(bottom=min(0.0, float(values.min()) / factor))
             label = label.replace("N", "J/m") if base == "N" else label
-            panel.set_ylabel(f"{name} [{label}]")
-            panel.set_ylim(bottom=min(0.0, float(values.min()) / factor))
-        lower.set_xlabel(f"contact position x [{symbol}]")
-        figure.align_ylabels([upper, lower])
+            panels[row, 0].set_ylabel(f"{name} [{label}]")
+        figure.align_ylabels(panels[:, 0])
     return figure
 
 

@@ -1,5 +1,6 @@
 """Plots of the modes of a body: shapes and convergence."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,9 +9,10 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.output.plots.figure import new_figure
+from fecontact.reduction.contact_faces import mode_names
 from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.mode_shapes import ModeShapes
+from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +28,7 @@ def plot_modes(
 ) -> "Figure":
     """Plot the first modes: deformed body, coloured by amplitude, over its undeformed outline.
 
-    Each is scaled to the same largest displacement.
+    Of several bodies, the first modes of each. Each is scaled to the same largest displacement.
 
     Parameters
     ----------
@@ -56,17 +58,28 @@ def plot_modes(
     columns = min(shown, 6, int(np.ceil(np.sqrt(1.8 * shown / aspect))))
     rows = -(-shown // columns)
     height = min(_WIDTH / columns / aspect, 3.5)
-    with new_figure(_WIDTH, rows * (height + 0.4) + 0.8, path) as figure:
+    titles = 0.6 if basis.parts else 0.4
+    with new_figure(_WIDTH, rows * (height + titles) + 0.8, path) as figure:
         grid = figure.subplots(rows, columns, squeeze=False)
         for axis in grid.flat:
             axis.set_axis_off()
-        for mode, axis in enumerate(grid.flat[:shown]):
-            drawn = _draw_mode(axis, field, mode, reach)
+        names = mode_names(basis)
+        for mode, axis in zip(_first_modes(basis, shown), grid.flat, strict=False):
+            drawn = _draw_mode(axis, field, mode, reach, basis.parts)
             hertz = basis.frequencies_hz[mode]
-            axis.set_title(f"mode {mode}: " + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
+            axis.set_title(names[mode] + ("\n" if basis.parts else ": ")
+                           + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
         figure.colorbar(drawn, ax=grid, location="bottom", aspect=50, shrink=0.5, pad=0.02,
                         label="amplitude, relative to the largest")
     return figure
+
+
+def _first_modes(basis: ModalBasis, count: int) -> list[int]:
+    """Numbers of as many modes, of several bodies evenly from each."""
+    ranks = np.arange(basis.modes)
+    for part in basis.parts:
+        ranks[part.modes[0] : sum(part.modes)] = np.arange(part.modes[1])
+    return sorted(np.argsort(ranks, kind="stable")[:count].tolist())
 
 
 def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None) -> "Figure":
@@ -108,7 +121,9 @@ def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None)
     return figure
 
 
-def _draw_mode(axis: "Axes", field: ModeShapes, mode: int, reach: float) -> Any:
+def _draw_mode(
+    axis: "Axes", field: ModeShapes, mode: int, reach: float, parts: Sequence[BodyPart]
+) -> Any:
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
 
@@ -116,12 +131,17 @@ def _draw_mode(axis: "Axes", field: ModeShapes, mode: int, reach: float) -> Any:
     amplitude = np.linalg.norm(shape, axis=1)
     largest = float(amplitude.max()) or 1.0
     places = field.nodes + reach / largest * shape
-    cells = field.cells
-    if cells.shape[1] == 4:
-        cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), amplitude / largest,
-                           shading="gouraud", cmap="viridis", vmin=0.0, vmax=1.0,
-                           rasterized=True)
+    # One body after the other, where they overlap; those that move above those that do not.
+    ranges = [(part.nodes[0], sum(part.nodes)) for part in parts] or [(0, len(places))]
+    for first, end in sorted(ranges, key=lambda one: bool(amplitude[slice(*one)].any())):
+        cells = field.cells[(first <= field.cells[:, 0]) & (field.cells[:, 0] < end)]
+        if not len(cells):
+            continue
+        if cells.shape[1] == 4:
+            cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+        drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells),
+                               amplitude / largest, shading="gouraud", cmap="viridis", vmin=0.0,
+                               vmax=1.0, rasterized=True)
     for nodes, colour in ((field.nodes, "#8c8c8c"), (places, "#303030")):
         axis.add_collection(LineCollection(list(nodes[field.outline]), colors=colour,
                                            linewidths=0.8))

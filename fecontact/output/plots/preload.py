@@ -1,7 +1,7 @@
 """Plots of quasi-static loading: shear and slip along the face, force loops."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,8 +9,10 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import quantity, suitable_unit
+from fecontact.output.plots.face_panels import abscissa_unit, face_panels
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS
+from fecontact.reduction.contact_faces import contact_faces
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES
 
@@ -35,7 +37,8 @@ def plot_shear(
 
     The forces of each node are divided by its tributary length [N/m]; shear acts on the body in -x
     and lies within plus and minus mu times the normal force. Slip is the displacement relative to
-    the ground.
+    the ground. Of several bodies each interface has a column: there shear acts in the negative
+    direction of the tangents, and slip is relative to the other side.
 
     Parameters
     ----------
@@ -55,40 +58,41 @@ def plot_shear(
     require_kind("plot_shear", LoadHistory, history=history)
     early = vertex == -1 and history.status != "finished"
     row = len(history) - 1 if early else history.row(vertex)
-    basis = history.system.basis
-    x, length = basis.contact_x, basis.tributary
-    order = np.argsort(x, kind="stable")
+    length, faces = history.system.basis.tributary, contact_faces(history.system.basis)
     shear = history.friction_force[row] / length
     limit = history.friction_limit[row] / length
     slip, states = history.slip[row], history.state(row).contact_state
-    with new_figure(8.0, 6.4, path) as figure:
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        place, symbol = suitable_unit(float(np.abs(x).max()), "m")
-        _line(upper, x[order] / place, np.stack([limit, -limit, shear])[:, order], "N/m",
-              "friction force per length")
-        for code, name in enumerate(STATES):
-            at = order[states[order] == code]
-            factor = suitable_unit(float(max(np.abs(limit).max(), np.abs(shear).max())), "N/m")[0]
-            if len(at):
-                upper.plot(x[at] / place, shear[at] / factor, "o", color=_STATE_COLOURS[name],
-                           markersize=4.5, label=name)
-        factor, unit = suitable_unit(float(np.abs(slip).max()), "m")
-        lower.plot(x[order] / place, slip[order] / factor, color=COLOURS[0], marker="o",
-                   markersize=3.0)
-        lower.set_ylabel(f"displacement relative\nto the ground [{unit}]")
-        lower.set_xlabel(f"place along the face [{symbol}]")
-        figure.legend(*upper.get_legend_handles_labels(), loc="outside upper center", ncols=5)
-        figure.align_ylabels([upper, lower])
+    with new_figure(max(8.0, 4.5 * len(faces)), 6.4, path) as figure:
+        panels = face_panels(figure, faces, 2, label="place along the face")
+        largest = float(max(np.abs(limit).max(), np.abs(shear).max()))
+        (force, force_symbol), (factor, unit) = (
+            suitable_unit(largest, "N/m"), suitable_unit(float(np.abs(slip).max()), "m"))
+        legend: dict[str, Any] = {}
+        for face, upper, lower in zip(faces, *panels, strict=True):
+            order = np.argsort(face.abscissa, kind="stable")
+            x, nodes = face.abscissa[order] / abscissa_unit(face), face.nodes.start + order
+            _line(upper, x, np.stack([limit, -limit, shear])[:, nodes] / force)
+            for code, name in enumerate(STATES):
+                at = states[nodes] == code
+                if at.any():
+                    upper.plot(x[at], shear[nodes][at] / force, "o", color=_STATE_COLOURS[name],
+                               markersize=4.5, label=name)
+            lower.plot(x, slip[nodes] / factor, color=COLOURS[0], marker="o", markersize=3.0)
+            handles, names = upper.get_legend_handles_labels()
+            legend = dict(zip(names, handles, strict=True)) | legend
+        other = "ground" if not faces[0].name else "other side"
+        panels[0, 0].set_ylabel(f"friction force per length [{force_symbol}]")
+        panels[1, 0].set_ylabel(f"displacement relative\nto the {other} [{unit}]")
+        figure.legend(legend.values(), legend, loc="outside upper center", ncols=5)
+        figure.align_ylabels(panels[:, 0])
     return figure
 
 
-def _line(axis: "Axes", x: Array, curves: Array, unit: str, label: str) -> None:
+def _line(axis: "Axes", x: Array, curves: Array) -> None:
     """Limit on both sides, and the shear between."""
-    factor, symbol = suitable_unit(float(np.abs(curves).max()), unit)
-    axis.plot(x, curves[0] / factor, color="#6a6a6a", linestyle=DASHES, label="limit")
-    axis.plot(x, curves[1] / factor, color="#6a6a6a", linestyle=DASHES)
-    axis.plot(x, curves[2] / factor, color="#303030", linewidth=1.0)
-    axis.set_ylabel(f"{label} [{symbol}]")
+    axis.plot(x, curves[0], color="#6a6a6a", linestyle=DASHES, label="limit")
+    axis.plot(x, curves[1], color="#6a6a6a", linestyle=DASHES)
+    axis.plot(x, curves[2], color="#303030", linewidth=1.0)
 
 
 def plot_loop(

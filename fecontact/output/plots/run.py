@@ -1,13 +1,13 @@
-"""Plots of a run: histories, phase planes, contact along the face, energies."""
+"""Plots of a run: histories, phase planes, energies."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.analysis.histories import Point, point_name
+from fecontact.analysis.histories import Point, is_relative, point_name
 from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
@@ -18,22 +18,19 @@ from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import (
     COLOURS,
     ENERGY_COLOURS,
-    STATE_COLOURS,
     add_note,
     distinct_colours,
-    state_names,
 )
+from fecontact.reduction.contact_faces import contact_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-_MAP_COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
 _AXES = ("x", "y")
 
+_MOST_MIDDLES = 5  # of contact nodes shown without being asked for
 _LINE_BINS = 2000  # a long line is drawn by minimum and maximum of each
-_MAP_COLUMNS = 1500
 
 
 def plot_history(
@@ -46,7 +43,9 @@ def plot_history(
     trajectory : Trajectory
         The run.
     points : sequence of str, int or (x, y)
-        As for :meth:`Trajectory.displacement`; B and the contact node in the middle by default.
+        As for :meth:`Trajectory.displacement`; B and the contact node in the middle by default,
+        of several bodies that of each interface. Contact nodes between bodies show their relative
+        motion along tangent and normal.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -63,7 +62,8 @@ def plot_history(
     points = tuple(points) or _usual_points(trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    colours = distinct_colours(len(points))
+    colours, faces = distinct_colours(len(points)), contact_faces(trajectory.system.basis)
+    single = not faces[0].name
     with new_figure(10.0, 7.5, path) as figure:
         add_note(figure, drawn)
         axes = figure.subplots(3, 2, sharex=True)
@@ -79,13 +79,17 @@ def plot_history(
                 for number, (point, value) in enumerate(zip(points, values, strict=True)):
                     axes[row, column].plot(
                         *thinned(time, value[:, row] / factor), color=colours[number],
-                        linewidth=1.2 if number else 2.0, label=point_name(point))
+                        linewidth=1.2 if number else 2.0, label=_label(point, trajectory))
         for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
-                                   (axes[2, 1], "friction force in -x",
+                                   (axes[2, 1], f"friction force in -{'x' if single else 't'}",
                                     trajectory.friction_force)):
-            total = forces.sum(axis=1)
-            factor = _labelled(axis, f"total {name}", "N", total)
-            axis.plot(*thinned(time, total / factor), color="#303030")
+            totals = [forces[:, face.nodes].sum(axis=1) for face in faces]
+            factor = _labelled(axis, f"total {name}", "N", *totals)
+            for face, total, colour in zip(faces, totals, ["#303030"] if single else
+                                           distinct_colours(len(faces)), strict=True):
+                axis.plot(*thinned(time, total / factor), color=colour, label=face.name)
+            if not single:
+                axis.legend(loc="best")
         figure.align_ylabels(axes)
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center",
                       ncols=max(1, min(len(points), 6)))
@@ -143,75 +147,7 @@ def plot_phase(
             plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
                           label="ground")
         plane.legend(loc="best")
-        plane.set_title(point_name(point))
-    return figure
-
-
-def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
-    """Plot pressure [Pa] and state of the contact nodes over time and position.
-
-    For a basis without thickness, the line load [N/m] takes the place of the pressure. In runs with
-    more output times than columns of the picture, a column shows the largest pressure and the most
-    frequent state of its times. The band of a node is as wide as its tributary length; places
-    without contact face stay blank. States are open, stick and slip, or open and contact if all
-    friction forces of the run are zero.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        The run.
-    path : str or Path, optional
-        A .png, .pdf or .svg file to write too; it is replaced if it exists.
-
-    Raises
-    ------
-    InputError
-        For another suffix, or a file that cannot be written.
-    """
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-
-    require_kind("plot_contact_map", Trajectory, trajectory=trajectory)
-    drawn = resolved(trajectory)
-    trajectory = drawn.trajectory
-    with new_figure(10.0, 6.2, path) as figure:
-        add_note(figure, drawn)
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        columns = np.linspace(trajectory.time[0], trajectory.time[-1], _MAP_COLUMNS + 1)[:-1]
-        starts = np.unique(np.searchsorted(trajectory.time, columns))
-        edges = _time_edges(trajectory.time, starts)
-        time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
-        places, nodes, place_label = _place_edges(trajectory)
-
-        name, unit, load = (
-            ("line load", "N/m", trajectory.line_load) if trajectory.system.basis.thickness is None
-            else ("contact pressure", "Pa", trajectory.pressure))
-        highest = np.maximum.reduceat(load, starts, axis=0)
-        factor, load_symbol = suitable_unit(float(highest.max()), unit)
-        image = upper.pcolormesh(
-            edges / time_unit, places, _rows(highest / factor, nodes), cmap="viridis", vmin=0.0,
-            vmax=float(highest.max()) / factor or 1.0)
-        figure.colorbar(image, ax=upper, label=f"{name} [{load_symbol}]", pad=0.01)
-
-        states = state_names(trajectory)
-        state = np.minimum(trajectory.contact_state, len(states) - 1)
-        spans = _spans(trajectory.time)[:, None]
-        counts = np.stack([np.add.reduceat((state == k) * spans, starts, axis=0)
-                           for k in range(len(states))])
-        # A column of several times shows contact if any of them has it, as the pressure above does.
-        counts[0] *= counts[1:].sum(axis=0) == 0
-        image = lower.pcolormesh(edges / time_unit, places, _rows(counts.argmax(axis=0), nodes),
-                                 cmap=ListedColormap([_MAP_COLOURS[name] for name in states]),
-                                 norm=BoundaryNorm(np.arange(len(states) + 1) - 0.5, len(states)))
-        bar = figure.colorbar(image, ax=lower, label="state", pad=0.01, ticks=range(len(states)))
-        bar.ax.set_yticklabels(states)
-        bar.ax.tick_params(length=0)
-        figure.align_ylabels([upper, lower])
-        lower.set_xlabel(f"time [{symbol}]")
-        for axis in (upper, lower):
-            axis.set_ylabel(place_label)
-            axis.grid(False)
-            if len(places) == 2:
-                axis.set_yticks([0.5 * (places[0] + places[1])], ["0"])
+        plane.set_title(_label(point, trajectory))
     return figure
 
 
@@ -268,10 +204,16 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
 
 
 def _usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
-    """Point B, unless it is fixed, and the middle contact node."""
+    """Point B, unless it is fixed, and the middle contact node of each face."""
     basis = trajectory.system.basis
-    middle = basis.contact_nodes // 2
-    return ("B", middle) if basis.T[0].any() else (middle,)
+    middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)]
+    return (*(("B",) if basis.T[0].any() else ()), *middles[:_MOST_MIDDLES])
+
+
+def _label(point: Point, trajectory: Trajectory) -> str:
+    """Name of a point, and whether its motion is relative to another body."""
+    basis = trajectory.system.basis
+    return point_name(point, basis) + ", relative (t, n)" * is_relative(point, basis)
 
 
 def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:
@@ -318,74 +260,3 @@ def _places(extremes: Array, y: Array, starts: NDArray[np.intp]) -> NDArray[np.i
     met = np.flatnonzero(y == np.repeat(extremes, counts))
     columns = np.searchsorted(starts, met, side="right")
     return np.asarray(met[np.unique(columns, return_index=True)[1]])
-
-
-def _spans(time: Array) -> Array:
-    """Duration (N,) that each of the times represents."""
-    if len(time) == 1:
-        return np.ones(1)
-    edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
-    return np.asarray(np.diff(edges))
-
-
-def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:
-    """Borders (k + 1,) of the columns that begin at the given output times."""
-    if len(time) == 1:
-        return np.array([time[0] - 0.5, time[0] + 0.5])
-    between = 0.5 * (time[starts[1:] - 1] + time[starts[1:]])
-    return np.concatenate([time[:1], between, time[-1:]])
-
-
-def _place_edges(trajectory: Trajectory) -> tuple[Array, NDArray[np.intp], str]:
-    """Borders (k + 1,) of the rows of the map, their nodes (k,), and the label of their axis.
-
-    The node of a row without contact face is -1.
-    """
-    basis = trajectory.system.basis
-    x, n = basis.contact_x, basis.contact_nodes
-    low, high = _bands(trajectory)
-    order = np.argsort(low + high, kind="stable")
-    low, high, x = low[order], high[order], x[order]
-    tiny = 1e-6 * float(high.max() - low.min())
-    overlap = high[:-1] > low[1:] + tiny
-    middle = 0.5 * (x[:-1] + x[1:])
-    high[:-1] = np.where(overlap, middle, high[:-1])
-    low[1:] = np.where(overlap, middle, low[1:])
-    # Nodes one above the other share a band.
-    if n == 1 or (overlap & (np.diff(x) <= tiny)).any():
-        return np.arange(n + 1, dtype=np.float64) - 0.5, np.arange(n), "contact node"
-    apart = np.flatnonzero(low[1:] > high[:-1] + tiny) + 1
-    edges = np.insert(np.append(low, high[-1]), apart, high[apart - 1])
-    factor, symbol = suitable_unit(float(np.ptp(edges)), "m")
-    return edges / factor, np.insert(order, apart, -1), f"contact position x [{symbol}]"
-
-
-def _bands(trajectory: Trajectory) -> tuple[Array, Array]:
-    """Lower and upper ends (n,) of the tributary lengths along the face [m].
-
-    They lie centred about the nodes, but follow one another from end to end of a part whose
-    outer nodes lie on its ends, as they do where the displacement nodes are the contact nodes.
-    """
-    basis = trajectory.system.basis
-    x, length = basis.contact_x, basis.tributary
-    low, high = x - 0.5 * length, x + 0.5 * length
-    first = 0
-    for _, count in basis.groups:
-        group = first + np.argsort(x[first : first + count], kind="stable")
-        first += count
-        reach = length[group]
-        apart = np.diff(x[group]) > (1.0 + 1e-6) * (reach[1:] + reach[:-1])
-        for part in np.split(group, np.flatnonzero(apart) + 1):
-            ends = x[part[0]] + np.append(0.0, np.cumsum(length[part]))
-            beyond = abs(ends[-1] - x[part[-1]])
-            inside = np.minimum(x[part] - ends[:-1], ends[1:] - x[part])[1:-1]
-            if beyond < 0.05 * length[part].min() and (inside > 0.05 * length[part][1:-1]).all():
-                low[part], high[part] = ends[:-1], ends[1:]
-    return low, high
-
-
-def _rows(values: NDArray[Any], nodes: NDArray[np.intp]) -> "np.ma.MaskedArray[Any, Any]":
-    """Values (k, T) of the rows of the map from those of the nodes (T, n)."""
-    return np.ma.masked_where(np.repeat(nodes[:, None] < 0, len(values), axis=1),
-                              values.T[nodes])
-

@@ -2,27 +2,57 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.resolved import resolved
+from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
+from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.run import thinned
-from fecontact.output.plots.style import STATE_COLOURS
+from fecontact.output.plots.style import DASHES, STATE_COLOURS, distinct_colours
 from fecontact.output.render.frames_data import Motion
+from fecontact.reduction.contact_faces import contact_faces
 
 Image = NDArray[np.uint8]
 
 _DARK, _GRID, _CURSOR = "#303030", "#e4e2de", (178, 24, 43)
 
 
+class _Line(NamedTuple):
+    name: str
+    values: Array
+    colour: str
+    style: Any = "-"
+
+
+def _totals(trajectory: Trajectory, part: Any) -> list[_Line]:
+    """Sums of normal and friction forces over the chosen times; no friction without any."""
+    normal, friction = trajectory.normal_force, -trajectory.friction_force
+    faces = contact_faces(trajectory.system.basis)
+    if not faces[0].name:
+        lines = [_Line("normal force", normal[part].sum(axis=1), _DARK)]
+        if friction.any():
+            lines.append(_Line("friction on the body, +x", friction[part].sum(axis=1),
+                               STATE_COLOURS["slip"]))
+        return lines
+    lines = []
+    for face, colour in zip(faces, distinct_colours(len(faces)), strict=True):
+        lines.append(_Line(f"{face.name}: normal", normal[part, face.nodes].sum(axis=1), colour))
+        if friction[:, face.nodes].any():
+            lines.append(_Line(f"{face.name}: friction", friction[part, face.nodes].sum(axis=1),
+                               colour, DASHES))
+    return lines
+
+
 @dataclass(frozen=True, eq=False)
 class ForceChart:
     """A strip with the sums of the forces on the body over the time that is drawn.
 
-    The normal forces are positive in +y, friction in +x, as the arrows of the scene: -R.
+    The normal forces are positive in +y, friction in +x, as the arrows of the scene: -R. With
+    several bodies, sums of each interface along its normals and tangents.
 
     Attributes
     ----------
@@ -63,16 +93,13 @@ class ForceChart:
             trajectory = resolved(trajectory.between(first, last)).trajectory
         part = (first <= trajectory.time) & (trajectory.time <= last)
         time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
-        forces = {"normal force": (trajectory.normal_force, _DARK),
-                  "friction on the body, +x": (-trajectory.friction_force,
-                                               STATE_COLOURS["slip"])}
-        totals = {name: (force[part].sum(axis=1), colour)
-                  for name, (force, colour) in forces.items() if force.any() or name[0] == "n"}
-        largest = max(float(np.abs(total).max()) for total, _ in totals.values())
+        totals = _totals(trajectory, part)
+        largest = max(float(np.abs(line.values).max()) for line in totals)
         unit, force_symbol = suitable_unit(largest, "N")
-        for name, (total, colour) in totals.items():
-            axes.plot(*thinned(trajectory.time[part] / time_unit, total / unit), color=colour,
-                      linewidth=0.1 * self.font, label=name)
+        for line in totals:
+            axes.plot(*thinned(trajectory.time[part] / time_unit, line.values / unit),
+                      color=line.colour, linestyle=line.style, linewidth=0.1 * self.font,
+                      label=line.name)
         if len(motion.times) > 1:
             axes.set_xlim(motion.times[0] / time_unit, motion.times[-1] / time_unit)
         low, high = axes.get_ylim()
@@ -84,8 +111,8 @@ class ForceChart:
         axes.grid(color=_GRID)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(loc="upper right", ncols=2, fontsize=0.9 * self.font, frameon=False,
-                    borderaxespad=0.0)
+        axes.legend(loc="upper right", ncols=4 if len(totals) > 2 else 2,
+                    fontsize=0.9 * self.font, frameon=False, borderaxespad=0.0)
         canvas.draw()
         image = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
         box = axes.get_window_extent()

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_scale
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
-from fecontact.core.units import round_125
+from fecontact.core.units import quantity, round_125
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.ground.sliding import Sliding, SlidingRotation
 from fecontact.output.files.frames import (
     blocks,
     contact_forces,
@@ -20,6 +21,8 @@ from fecontact.output.files.frames import (
     von_mises,
 )
 from fecontact.output.plots.style import state_names
+from fecontact.reduction.contact_faces import contact_faces, contact_sides, several_bodies
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 
 Colour = Literal["displacement", "von_mises"]
@@ -27,6 +30,47 @@ Colour = Literal["displacement", "von_mises"]
 COLOURS = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
 
 _VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
+_LABEL_ROOM = 0.1  # of the extent of all bodies, from a body's name to the nearest contact node
+
+
+def _way(sliding: Sliding) -> str:
+    """Direction and speed of a prescribed sliding."""
+    speed = abs(sliding.speed)
+    if isinstance(sliding, SlidingRotation):
+        arrow, size = "↺" if sliding.speed > 0.0 else "↻", quantity(speed, "rad/s")
+    else:
+        x, y = np.sign(sliding.speed) * np.asarray(sliding.direction)
+        arrow = "→↗↑↖←↙↓↘"[round(np.arctan2(y, x) / (0.25 * np.pi)) % 8]
+        size = quantity(speed, "m/s")
+    return f"{arrow} {size}" if sliding.motion is None else f"{arrow} in time"
+
+
+def body_labels(basis: ModalBasis) -> tuple[tuple[str, int], ...]:
+    """Names of the bodies of an assembled basis, and for each the mesh node to write it at.
+
+    Well inside its body and, where there is room, away from the arrows of contact forces.
+    """
+    from scipy.spatial import KDTree
+
+    field, found = basis.mode_shapes, []
+    if field is None:
+        return ()
+    # Arrows of the ground's forces lie below a body, those of other bodies inside.
+    contacts = basis.positions[2 : 2 + basis.contact_nodes][~basis.ground_nodes]
+    for part in basis.parts:
+        first, count = part.nodes
+        nodes = field.nodes[first : first + count]
+        edge = np.unique(field.outline)
+        edge = edge[(first <= edge) & (edge < first + count)]
+        inside = KDTree(field.nodes[edge]).query(nodes)[0]
+        away = KDTree(contacts).query(nodes)[0] if len(contacts) else np.full(count, np.inf)
+        room = _LABEL_ROOM * float(np.linalg.norm(np.ptp(field.nodes, axis=0)))
+        centre = np.linalg.norm(nodes - 0.5 * (nodes.min(axis=0) + nodes.max(axis=0)), axis=1)
+        deep = np.flatnonzero(inside >= 0.8 * inside.max())
+        reach = np.minimum(away[deep], room)
+        deep = deep[reach >= reach.max() * (1.0 - 1e-6)]
+        found.append((part.name, first + int(deep[np.argmin(centre[deep])])))
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,13 +119,51 @@ class Motion:
 
     @cached_property
     def forces(self) -> Array:
-        """Forces (F, n, 2) of the ground on the contact nodes, along x and y [N]."""
-        return contact_forces(self.trajectory, self.indices)
+        """Forces (F, n + f, 2) on the contact nodes and on their feet, along x and y [N]."""
+        forces = contact_forces(self.trajectory, self.indices)
+        return np.concatenate([forces, -forces[:, self.footed]], axis=1)
 
     @cached_property
     def states(self) -> NDArray[np.int8]:
-        """States (F, n) of the contact nodes, as numbers of :attr:`state_names`."""
-        return np.minimum(self.trajectory.contact_state[self.indices], len(self.state_names) - 1)
+        """States (F, n + f) of contact nodes and feet, as numbers of :attr:`state_names`."""
+        states = np.minimum(self.trajectory.contact_state[self.indices],
+                            len(self.state_names) - 1)
+        return np.concatenate([states, states[:, self.footed]], axis=1)
+
+    @cached_property
+    def footed(self) -> NDArray[np.intp]:
+        """Contact nodes (f,) whose other side is a body, not the ground."""
+        return np.flatnonzero(~self.trajectory.system.basis.ground_nodes)
+
+    @cached_property
+    def has_ground(self) -> bool:
+        """Whether there is a ground under any of the bodies."""
+        return bool(self.trajectory.system.basis.ground_nodes.any())
+
+    @cached_property
+    def sliding(self) -> tuple[str, ...]:
+        """What slides by prescription, and which way, such as ``disc ↺ 3 rad/s``.
+
+        A body whose sliding varies in time has no number; it stands still in the picture.
+        """
+        system = self.trajectory.system
+        if not system.sliding:
+            return ()
+        feet = contact_sides(system.basis)[1]
+        found: dict[str, None] = {}
+        for face in contact_faces(system.basis):
+            if face.name not in system.sliding:
+                continue
+            nodes = feet[2 * face.nodes.start : 2 * face.nodes.stop].indices // 2
+            other = [part.name for part in system.basis.parts
+                     if len(nodes) and part.nodes[0] <= nodes[0] < sum(part.nodes)]
+            found[f"{other[0] if other else 'ground'} {_way(system.sliding[face.name])}"] = None
+        return tuple(found)
+
+    @cached_property
+    def labels(self) -> tuple[tuple[str, int], ...]:
+        """Names of the bodies of several, and the nodes at which they stand."""
+        return body_labels(self.trajectory.system.basis)
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
@@ -100,7 +182,7 @@ class Motion:
             return float(self.given_scale)
         extent = float(np.linalg.norm(np.ptp(self.mode_shapes.nodes, axis=0)))
         gap = self._gap
-        low, high = self.trajectory.system.ground.height_range
+        low, high = self.trajectory.system.ground.height_range if self.has_ground else (0.0, 0.0)
         size = max(self._largest["shape"], 0.5 * (high - low), gap)
         return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
 
@@ -119,8 +201,10 @@ class Motion:
     @cached_property
     def ground_level(self) -> float:
         """Drawn height of the flat ground: under the lowest contact node by its gap [m]."""
+        if not self.has_ground:
+            return self.box[2]
         basis = self.trajectory.system.basis
-        heights = basis.positions[2 : 2 + basis.contact_nodes, 1]
+        heights = basis.positions[2 : 2 + basis.contact_nodes, 1][basis.ground_nodes]
         return float(heights.min() - self.scale * self._gap)
 
     def body(self, frame: int) -> tuple[Array, Array]:
@@ -132,11 +216,10 @@ class Motion:
         return self.mode_shapes.nodes + self._scaled(motion[None], q)[0], colours
 
     def contact_places(self, frame: int) -> Array:
-        """Drawn positions (n, 2) of the contact nodes [m]."""
-        basis = self.trajectory.system.basis
+        """Drawn positions (n + f, 2) of the contact nodes and of their feet [m]."""
         q = self._q(frame)
-        motion = basis.contact_T[:, :2] @ q[0]
-        return basis.positions[2 : 2 + basis.contact_nodes] + self._scaled(motion[None], q)[0]
+        places, rows = self._contact_rows
+        return places + self._scaled((rows @ q[0])[None], q)[0]
 
     def ground(self, frame: int, x: Array) -> Array:
         """Drawn heights (k,) of the ground at the drawn abscissae x (k,) [m]."""
@@ -157,11 +240,28 @@ class Motion:
             return ground.velocity(float(first))
         return (ground.travel(float(last)) - ground.travel(float(first))) / float(last - first)
 
-    @property
+    @cached_property
+    def _contact_rows(self) -> tuple[Array, Array]:
+        """Places (n + f, 2) of contact nodes and feet, and their displacements (n + f, 2, m)."""
+        basis, field = self.trajectory.system.basis, self.mode_shapes
+        places = basis.positions[2 : 2 + basis.contact_nodes]
+        if not several_bodies(basis):
+            return places, basis.contact_T[:, :2]
+        own, feet = contact_sides(basis)
+        shapes = field.shapes.reshape(2 * len(field.nodes), basis.modes)
+        rows = [np.asarray(side @ shapes).reshape(-1, 2, basis.modes) for side in (own, feet)]
+        foot_places = np.asarray(feet @ field.nodes.reshape(-1)).reshape(-1, 2)
+        return (np.concatenate([places, foot_places[self.footed]]),
+                np.concatenate([rows[0], rows[1][self.footed]]))
+
+    @cached_property
     def _gap(self) -> float:
-        """Smallest gap of a contact node [m]."""
+        """Smallest gap of a contact node above the ground [m]."""
         gap = self.trajectory.system.gap
-        return min(gap) if isinstance(gap, tuple) else float(cast(float, gap))
+        if not isinstance(gap, tuple):
+            return float(cast(float, gap))
+        below = np.asarray(gap)[self.trajectory.system.basis.ground_nodes]
+        return float(below.min()) if len(below) else 0.0
 
     @property
     def _drift_scale(self) -> float:
@@ -170,11 +270,18 @@ class Motion:
         Both have the same factor, so that a node that sticks stays with the marks of the ground.
         Over waves, which are drawn in their true length, the factor is one.
         """
-        return 1.0 if self.trajectory.system.ground.wavy else self.scale
+        return 1.0 if self._wavy else self.scale
+
+    @property
+    def _wavy(self) -> bool:
+        return self.has_ground and self.trajectory.system.ground.wavy
 
     def _drift(self, q: Array) -> Array:
-        """Mean displacement (k,) of the contact nodes along the ground [m]."""
-        return np.asarray(q @ self.trajectory.system.basis.contact_T[:, 0].mean(axis=0))
+        """Mean displacement (k,) along the ground of the contact nodes on it [m]."""
+        if not self.has_ground:
+            return np.zeros(len(q))
+        basis = self.trajectory.system.basis
+        return np.asarray(q @ basis.contact_T[basis.ground_nodes, 0].mean(axis=0))
 
     def _scaled(self, motion: Array, q: Array) -> Array:
         """Drawn motion (k, N, 2) from displacements (k, N, 2) at coordinates q (k, m)."""
@@ -199,13 +306,12 @@ class Motion:
     @cached_property
     def _largest(self) -> dict[str, float]:
         largest = dict.fromkeys((*COLOURS, "shape"), 0.0)
-        wavy = self.trajectory.system.ground.wavy
         for which in blocks(self.indices, len(self.mode_shapes.nodes)):
             q = self.trajectory.modal_coordinates[which]
             motion = displacement(self.mode_shapes, q)
             size = np.linalg.norm(motion, axis=2).max()
             largest["displacement"] = max(largest["displacement"], float(size))
-            motion[..., 0] -= wavy * self._drift(q)[:, None]
+            motion[..., 0] -= self._wavy * self._drift(q)[:, None]
             size = np.linalg.norm(motion, axis=2).max()
             largest["shape"] = max(largest["shape"], float(size))
             if self.colour == "von_mises":

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.output.render.frames_data import body_labels
 from fecontact.output.render.movie import MOVING, Image, Progress, target, write_images
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Strips, pixels
 from fecontact.output.render.scene import COLOUR_MAPS, BodyScene
+from fecontact.reduction.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 from fecontact.system.complex_modes import ComplexModes
@@ -43,6 +45,7 @@ class ModeMotion:
     extent: float = _VISIBLE
     colour: str = "displacement"
     largest_colour: float = 1.0
+    labels: tuple[tuple[str, int], ...] = ()
 
     @cached_property
     def _unit_shape(self) -> ComplexArray:
@@ -157,7 +160,8 @@ def render_mode(
     # Numbered pictures of one period suffice for any number of them.
     count = frames * (periods if movie else 1)
     phases = 2.0 * np.pi * np.arange(count) / frames
-    motion = ModeMotion(field, field.shapes @ q, phases, _VISIBLE * scale)
+    motion = ModeMotion(field, field.shapes @ q, phases, _VISIBLE * scale,
+                        labels=body_labels(basis))
     require_rendering(size, MOVING)
     return write_images(_images(motion, size, words if title is None else title), count, path, fps,
                         size, progress)
@@ -188,7 +192,9 @@ def _chosen(
     if modes is None:
         hertz = basis.frequencies_hz[mode]
         words = "rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"
-        return np.eye(basis.modes, dtype=complex)[mode], f"mode {mode}: {words}"
+        name = mode_names(basis)[mode]
+        return (np.eye(basis.modes, dtype=complex)[mode],
+                f"{name}{', ' if basis.parts else ': '}{words}")
     if len(modes.right) < 2 * basis.modes:
         raise InputError(f"The complex modes have {len(modes.right)} states, but the basis has "
                          f"{basis.modes} modes; take the basis that they belong to.")

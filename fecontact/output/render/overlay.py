@@ -196,17 +196,21 @@ class Overlay(Strips):
             self._text(figure, x + 0.013, 0.80, name)
             x += 0.09
         force = self.motion.largest_force
-        self._text(figure, 0.49, 0.34, "force on body")
+        self._text(figure, 0.49, 0.34,
+                   "contact force" if self.motion.labels else "force on body")
         if force > 0.0:
             figure.add_artist(FancyArrow(
                 0.615, 0.34, 0.035, 0.0, width=0.05, head_width=0.2, head_length=0.013,
                 length_includes_head=True, color=FORCE_COLOUR, linewidth=0.0))
         self._text(figure, 0.66 if force > 0.0 else 0.615, 0.34,
                    f"up to {quantity(force, 'N')}" if force > 0.0 else "none")
-        if speed := self.motion.ground_speed:
+        moving = []
+        if self.motion.has_ground and (speed := self.motion.ground_speed):
             heading = "→" if speed > 0.0 else "←"
-            self._text(figure, 0.97, 0.34, f"ground {heading} {quantity(abs(speed), 'm/s')}",
-                       ha="right")
+            moving.append(f"ground {heading} {quantity(abs(speed), 'm/s')}")
+        moving += self.motion.sliding
+        if moving:
+            self._text(figure, 0.97, 0.34, "   ".join(moving), ha="right")
 
 
 def _short(value: float) -> str:

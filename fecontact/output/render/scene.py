@@ -9,6 +9,7 @@ from fecontact.core.types import Array
 from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.offscreen import known_window
+from fecontact.reduction.contact_faces import contact_faces
 from fecontact.reduction.mode_shapes import ModeShapes
 
 COLOUR_MAPS = {"displacement": "viridis", "von_mises": "cividis"}
@@ -26,6 +27,8 @@ _DEPTH = 0.20  # of the view's height, for the ground
 _ARROW = 0.15  # longest arrow, of the view's height (in portrait of half its width)
 _CORNERS = 20
 _COLUMNS, _MOST_COLUMNS = 2, 8  # of the ground per pixel
+_FOOT = 0.6  # radius of a foot on another body, of that of its contact node
+_LABEL_SIZE = 13.0  # height of the bodies' names, in thin lines
 _POINTS = 16  # per wave of the ground, to draw short waves smoothly
 
 
@@ -47,6 +50,10 @@ class BodyMotion(Protocol):
     @property
     def box(self) -> tuple[float, float, float, float]:
         """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
+
+    @property
+    def labels(self) -> tuple[tuple[str, int], ...]:
+        """Names of the bodies of several, and the nodes at which they stand."""
 
     def body(self, frame: int) -> tuple[Array, Array]:
         """Drawn positions (N, 2) of the nodes [m] and their colour values (N,)."""
@@ -75,6 +82,8 @@ class BodyScene:
             self._pyvista: Any = pyvista
             self._shown = motion
             self._fineness = fineness
+            self._names = [(_label_image(name, _LABEL_SIZE * line), node)
+                           for name, node in motion.labels]
             self._plotter: Any = self._pyvista.Plotter(
                 off_screen=True, window_size=[fineness * width, fineness * height])
             self._plotter.disable_anti_aliasing()
@@ -92,8 +101,18 @@ class BodyScene:
         """Picture (height, width, 3) of a frame."""
         self._draw(frame)
         self._plotter.render()
-        return _reduced(np.asarray(self._plotter.screenshot(None, return_img=True)),
-                        self._fineness)
+        image = _reduced(np.asarray(self._plotter.screenshot(None, return_img=True)),
+                         self._fineness)
+        for label, node in self._names:
+            _blend(image, label, *self._pixel(self._body.points[node, :2], image.shape))
+        return image
+
+    def _pixel(self, place: Array, shape: tuple[int, ...]) -> tuple[int, int]:
+        """Row and column of a place in a picture."""
+        size = self._height / shape[0]
+        middle = self._plotter.camera.focal_point[0]
+        return (round(shape[0] - (place[1] - self._bottom) / size),
+                round(0.5 * shape[1] + (place[0] - middle) / size))
 
     def _draw(self, frame: int) -> None:
         places, colours = self._shown.body(frame)
@@ -163,16 +182,22 @@ class Scene(BodyScene):
                  fineness: int = 2) -> None:
         self._motion = motion
         super().__init__(motion, width, height, line=line, fineness=fineness)
-        self._add_ground(width, fineness * line)
+        if motion.has_ground:
+            self._add_ground(width, fineness * line)
         self._add_contact(fineness * line)
 
     def _draw(self, frame: int) -> None:
         super()._draw(frame)
-        self._draw_ground(frame)
+        if self._motion.has_ground:
+            self._draw_ground(frame)
         self._draw_contact(frame)
 
     def _aim(self, aspect: float) -> None:
         """Place the camera so that body and ground fill the picture in all frames."""
+        if not self._motion.has_ground:
+            super()._aim(aspect)
+            self._unit = self._height * min(1.0, 0.5 * aspect)
+            return
         left, right, _, _ = self._motion.box
         level = self._motion.ground_level
         body, below = _reach(self._motion)
@@ -228,9 +253,13 @@ class Scene(BodyScene):
 
     def _add_contact(self, line: float) -> None:
         basis = self._motion.trajectory.system.basis
-        n, pixel = basis.contact_nodes, self._height / self._plotter.window_size[1]
-        spacing = np.ptp(basis.contact_x) / max(n - 1, 1) or self._height
-        self._radius = float(np.clip(0.42 * spacing, 2.0 * line * pixel, 4.5 * line * pixel))
+        feet, pixel = len(self._motion.footed), self._height / self._plotter.window_size[1]
+        n = basis.contact_nodes + feet
+        spacing = min(np.ptp(face.abscissa) / max(len(face.abscissa) - 1, 1) or self._height
+                      for face in contact_faces(basis))
+        radius = float(np.clip(0.42 * spacing, 2.0 * line * pixel, 4.5 * line * pixel))
+        # Feet are smaller than the nodes that they belong to.
+        self._radius = radius * np.append(np.ones(n - feet), np.full(feet, _FOOT))[:, None]
         self._slim = float(np.clip(spacing / (14.0 * line * pixel), 0.35, 1.0))
         angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
         self._circle = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -252,7 +281,7 @@ class Scene(BodyScene):
     def _draw_contact(self, frame: int) -> None:
         centres = self._motion.contact_places(frame)
         for mesh, radius in ((self._nodes, self._radius), (self._rims, self._radius + self._rim)):
-            self._move(mesh, (centres[:, None] + radius * self._circle).reshape(-1, 2))
+            self._move(mesh, (centres[:, None] + radius[:, None] * self._circle).reshape(-1, 2))
         self._nodes.cell_data["colour"][:] = self._state_colours[self._motion.states[frame]]
         self._nodes.GetCellData().GetScalars().Modified()
         if self._motion.largest_force > 0.0:
@@ -261,7 +290,7 @@ class Scene(BodyScene):
                 self._move(mesh, corners)
 
     def _arrow_corners(self, tips: Array, forces: Array) -> Array:
-        """Corners (7 n, 2) of arrows that end at the contact nodes: four of the shaft, the head."""
+        """Corners (7 k, 2) of arrows that end at k places: four of the shaft, then the head."""
         size = np.linalg.norm(forces, axis=1, keepdims=True)
         along = np.divide(forces, size, out=np.zeros_like(forces), where=size > 0.0)
         across = np.column_stack([-along[:, 1], along[:, 0]])
@@ -277,7 +306,9 @@ class Scene(BodyScene):
 
 def needed_height(motion: Motion) -> float:
     """Height of the scene that body and ground need, as a part of its width."""
-    left, right, _, _ = motion.box
+    left, right, bottom, top = motion.box
+    if not motion.has_ground:
+        return (top - bottom) / (right - left)
     return _needed(*_reach(motion)) * (1.0 - 2.0 * _MARGIN) / (right - left)
 
 
@@ -291,6 +322,38 @@ def _reach(motion: Motion) -> tuple[float, float]:
 
 def _needed(body: float, below: float) -> float:
     return max(body / (1.0 - _DEPTH - _MARGIN), (body + below) / (1.0 - 3.0 * _MARGIN))
+
+
+def _label_image(text: str, size: float) -> NDArray[np.float64]:
+    """A name in dark letters with a pale rim, (h, w, 4) from 0 to 1; ``size`` in pixels."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.patheffects import withStroke
+
+    rim = 0.28 * size
+    figure = Figure(figsize=((len(text) + 2) * size / 100.0, 2.0 * size / 100.0), dpi=100)
+    figure.patch.set_alpha(0.0)
+    canvas = FigureCanvasAgg(figure)
+    figure.text(0.5, 0.5, text, ha="center", va="center", color=DARK, family="DejaVu Sans",
+                fontsize=0.72 * size,
+                path_effects=[withStroke(linewidth=0.72 * rim, foreground="white", alpha=0.8)])
+    canvas.draw()
+    drawn = np.asarray(canvas.buffer_rgba()) / 255.0
+    rows, columns = (np.flatnonzero(drawn[..., 3].any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return drawn
+    return drawn[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+def _blend(image: NDArray[np.uint8], label: NDArray[np.float64], row: int, column: int) -> None:
+    """Draw a label into a picture, centred at a pixel and moved inside where it would leave it."""
+    height, width = (min(given, room) for given, room in zip(label.shape, image.shape[:2],
+                                                             strict=False))
+    top = int(np.clip(row - height // 2, 0, image.shape[0] - height))
+    left = int(np.clip(column - width // 2, 0, image.shape[1] - width))
+    part, drawn = image[top : top + height, left : left + width], label[:height, :width]
+    alpha = drawn[..., 3:]
+    part[:] = np.round((1.0 - alpha) * part + 255.0 * alpha * drawn[..., :3])
 
 
 def _reduced(image: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:

@@ -1,0 +1,200 @@
+"""Plot of pressure and state of contact nodes over time and place, one map an interface."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.analysis.resolved import resolved
+from fecontact.core.checks import require_kind
+from fecontact.core.types import Array
+from fecontact.core.units import suitable_unit
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import STATE_COLOURS, add_note, state_names
+from fecontact.reduction.contact_faces import ContactFace, contact_faces
+from fecontact.reduction.modal_basis import ModalBasis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
+_COLUMNS = 1500
+_COMMON_SCALE = 0.2  # of the largest load, above which all maps have the same scale
+
+
+def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
+    """Plot pressure [Pa] and state of the contact nodes over time and position.
+
+    For a basis without thickness, the line load [N/m] takes the place of the pressure. In runs with
+    more output times than columns of the picture, a column shows the largest pressure and the most
+    frequent state of its times. The band of a node is as wide as its tributary length; places
+    without contact face stay blank. States are open, stick and slip, or open and contact if all
+    friction forces of the run are zero.
+
+    Of several bodies each interface has a row of its own: over x on the ground and on faces along
+    x, else over the arc length of the face, which increases along its tangents. Maps of similar
+    loads share one scale.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_contact_map", Trajectory, trajectory=trajectory)
+    drawn = resolved(trajectory)
+    trajectory = drawn.trajectory
+    basis = trajectory.system.basis
+    faces = contact_faces(basis)
+    single = not faces[0].name
+    size = (10.0, 6.2) if single else (12.0, 0.9 + 2.6 * len(faces))
+    with new_figure(*size, path) as figure:
+        add_note(figure, drawn)
+        grid = figure.subplots(2, 1, sharex=True).reshape(1, 2) if single else (
+            figure.subplots(len(faces), 2, sharex=True, squeeze=False))
+        columns = np.linspace(trajectory.time[0], trajectory.time[-1], _COLUMNS + 1)[:-1]
+        starts = np.unique(np.searchsorted(trajectory.time, columns))
+        edges = _time_edges(trajectory.time, starts)
+        time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
+        rows = [_face_rows(face, basis) for face in faces]
+
+        name, unit, load = ("line load", "N/m", trajectory.line_load) if (
+            basis.thickness is None) else ("contact pressure", "Pa", trajectory.pressure)
+        highest = np.maximum.reduceat(load, starts, axis=0)
+        limits = [float(highest[:, face.nodes].max()) for face in faces]
+        common = min(limits) >= _COMMON_SCALE * max(limits)
+        for number, (face, row) in enumerate(zip(faces, rows, strict=True)):
+            limit = max(limits) if common else limits[number]
+            factor, load_symbol = suitable_unit(limit, unit)
+            image = grid[number, 0].pcolormesh(
+                edges / time_unit, row.edges, _masked(highest[:, face.nodes] / factor, row.nodes),
+                cmap="viridis", vmin=0.0, vmax=limit / factor or 1.0)
+            if not common or number == 0:
+                figure.colorbar(image, ax=grid[:, 0].tolist() if common else grid[number, 0],
+                                label=f"{name} [{load_symbol}]", pad=0.01)
+
+        states, spans = state_names(trajectory), _spans(trajectory.time)
+        for number, (face, row) in enumerate(zip(faces, rows, strict=True)):
+            shown = _frequent_states(trajectory.contact_state[:, face.nodes], len(states), spans,
+                                     starts)
+            image = _draw_states(grid[number, 1], edges / time_unit, row, shown, states)
+        bar = figure.colorbar(image, ax=grid[:, 1].tolist(), label="state", pad=0.01,
+                              ticks=range(len(states)))
+        bar.ax.set_yticklabels(states)
+        bar.ax.tick_params(length=0)
+        figure.align_ylabels(grid.reshape(-1) if single else grid[:, 0])
+        for axis in grid[-1] if not single else grid[-1, 1:]:
+            axis.set_xlabel(f"time [{symbol}]")
+        for face, row, axes in zip(faces, rows, grid, strict=True):
+            for axis in axes:
+                axis.grid(False)
+                if single or axis is axes[0]:
+                    axis.set_ylabel(row.label)
+                    axis.set_title(face.title, loc="left")
+                if len(row.edges) == 2:
+                    axis.set_yticks([0.5 * (row.edges[0] + row.edges[1])], ["0"])
+    return figure
+
+
+class _FaceRows(NamedTuple):
+    """Rows of a map: borders (k + 1,), their nodes (k,), -1 without contact face; the label."""
+
+    edges: Array
+    nodes: NDArray[np.intp]
+    label: str
+
+
+def _frequent_states(
+    state: NDArray[np.int8], count: int, spans: Array, starts: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """States (k, n) of the columns of a map, of those (N, n) of all times."""
+    state = np.minimum(state, count - 1)
+    counts = np.stack([np.add.reduceat((state == k) * spans[:, None], starts, axis=0)
+                       for k in range(count)])
+    # A column of several times shows contact if any of them has it, as the pressure does.
+    counts[0] *= counts[1:].sum(axis=0) == 0
+    return np.asarray(counts.argmax(axis=0))
+
+
+def _draw_states(
+    axis: "Axes", edges: Array, row: _FaceRows, shown: NDArray[np.intp], names: Sequence[str]
+) -> Any:
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    return axis.pcolormesh(edges, row.edges, _masked(shown, row.nodes),
+                           cmap=ListedColormap([_COLOURS[name] for name in names]),
+                           norm=BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names)))
+
+
+def _spans(time: Array) -> Array:
+    """Duration (N,) that each of the times represents."""
+    if len(time) == 1:
+        return np.ones(1)
+    edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
+    return np.asarray(np.diff(edges))
+
+
+def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:
+    """Borders (k + 1,) of the columns that begin at the given output times."""
+    if len(time) == 1:
+        return np.array([time[0] - 0.5, time[0] + 0.5])
+    between = 0.5 * (time[starts[1:] - 1] + time[starts[1:]])
+    return np.concatenate([time[:1], between, time[-1:]])
+
+
+def _face_rows(face: ContactFace, basis: ModalBasis) -> _FaceRows:
+    x, n = face.abscissa, len(face.abscissa)
+    groups = [n] if face.name else [count for _, count in basis.groups]
+    low, high = _bands(x, face.tributary, groups)
+    order = np.argsort(low + high, kind="stable")
+    low, high, x = low[order], high[order], x[order]
+    tiny = 1e-6 * float(high.max() - low.min())
+    overlap = high[:-1] > low[1:] + tiny
+    middle = 0.5 * (x[:-1] + x[1:])
+    high[:-1] = np.where(overlap, middle, high[:-1])
+    low[1:] = np.where(overlap, middle, low[1:])
+    # Nodes one above the other share a band.
+    if n == 1 or (overlap & (np.diff(x) <= tiny)).any():
+        return _FaceRows(np.arange(n + 1, dtype=np.float64) - 0.5, np.arange(n), "contact node")
+    apart = np.flatnonzero(low[1:] > high[:-1] + tiny) + 1
+    edges = np.insert(np.append(low, high[-1]), apart, high[apart - 1])
+    factor, symbol = suitable_unit(float(np.ptp(edges)), "m")
+    return _FaceRows(edges / factor, np.insert(order, apart, -1), f"{face.label} [{symbol}]")
+
+
+def _bands(x: Array, length: Array, groups: Sequence[int]) -> tuple[Array, Array]:
+    """Lower and upper ends (n,) of the tributary lengths along the face [m].
+
+    They lie centred about the nodes, but follow one another from end to end of a part whose
+    outer nodes lie on its ends, as they do where the displacement nodes are the contact nodes.
+    """
+    low, high = x - 0.5 * length, x + 0.5 * length
+    first = 0
+    for count in groups:
+        group = first + np.argsort(x[first : first + count], kind="stable")
+        first += count
+        reach = length[group]
+        apart = np.diff(x[group]) > (1.0 + 1e-6) * (reach[1:] + reach[:-1])
+        for part in np.split(group, np.flatnonzero(apart) + 1):
+            ends = x[part[0]] + np.append(0.0, np.cumsum(length[part]))
+            beyond = abs(ends[-1] - x[part[-1]])
+            inside = np.minimum(x[part] - ends[:-1], ends[1:] - x[part])[1:-1]
+            if beyond < 0.05 * length[part].min() and (inside > 0.05 * length[part][1:-1]).all():
+                low[part], high[part] = ends[:-1], ends[1:]
+    return low, high
+
+
+def _masked(values: NDArray[Any], nodes: NDArray[np.intp]) -> "np.ma.MaskedArray[Any, Any]":
+    """Values (k, T) of the rows of the map from those of the nodes (T, n)."""
+    return np.ma.masked_where(np.repeat(nodes[:, None] < 0, len(values), axis=1),
+                              values.T[nodes])

@@ -1,0 +1,183 @@
+"""Contact faces of a basis: places along each interface, directions, and the bodies on both sides.
+
+For what shows or stores results: systems of several bodies have contact nodes on faces of any
+direction, whose rows in ``T`` are those of the motion relative to the other side.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from fecontact.core.types import Array
+from fecontact.reduction.modal_basis import ModalBasis
+
+_FLAT = 1e-6  # largest slope of a face that counts as one along x
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFace:
+    """The contact nodes of one interface, or of a single body on the ground.
+
+    Attributes
+    ----------
+    name : str
+        Name of the interface; empty for all nodes of a single body.
+    bodies : tuple of str
+        Names of the bodies that meet there, and 'ground'; empty for a single body.
+    nodes : slice
+        Its nodes among those of the basis.
+    abscissa : (k,) array
+        Places of the nodes [m]: x on the ground and on faces along x, else the arc length from the
+        beginning of the face, which increases along the tangents.
+    axis : 'x' or 's'
+        Which of them.
+    tributary : (k,) array
+        Lengths of the face that the nodes represent [m].
+    """
+
+    name: str
+    bodies: tuple[str, ...]
+    nodes: slice
+    abscissa: Array
+    axis: Literal["x", "s"]
+    tributary: Array
+
+    @property
+    def title(self) -> str:
+        """``shoe: pad and disc``; empty for a single body."""
+        bodies = " and ".join(self.bodies) if len(self.bodies) > 1 else (
+            f"{self.bodies[0]} with itself" if self.bodies else "")
+        return f"{self.name}: {bodies}" if bodies else self.name
+
+    @property
+    def label(self) -> str:
+        """Label of an axis along the face, without its unit."""
+        return "contact position x" if self.axis == "x" else "position along the face s"
+
+
+def several_bodies(basis: ModalBasis) -> bool:
+    """Whether the basis has interfaces, rather than contact nodes of one body on the ground."""
+    return bool(basis.parts) or basis.contact_normals is not None or basis.on_ground is not None
+
+
+def contact_directions(basis: ModalBasis) -> tuple[Array, Array]:
+    """Tangents (n, 2) and normals (n, 2) of the contact nodes in global axes.
+
+    Normals point out of the other side; a tangent is its normal turned clockwise by 90 degrees.
+    """
+    normals = basis.normals
+    return np.column_stack([normals[:, 1], -normals[:, 0]]), normals
+
+
+def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
+    """One face for each interface; for a single body one of all its contact nodes, along x."""
+    x, length = basis.contact_x, basis.tributary
+    if not several_bodies(basis):
+        return (ContactFace("", (), slice(0, len(x)), x, "x", length),)
+    ground, (tangents, normals) = basis.ground_nodes, contact_directions(basis)
+    places = basis.positions[2 : 2 + len(x)]
+    found, first = [], 0
+    for name, count in basis.groups:
+        nodes = slice(first, first + count)
+        first += count
+        flat = bool(ground[nodes].all() or np.abs(normals[nodes, 0]).max(initial=0.0) < _FLAT)
+        abscissa = x[nodes] if flat else _arc_length(places[nodes], normals[nodes],
+                                                     tangents[nodes], length[nodes])
+        bodies = _bodies_at(basis, nodes) + ["ground"] * bool(ground[nodes].any())
+        found.append(ContactFace(name, tuple(bodies), nodes, abscissa, "x" if flat else "s",
+                                 length[nodes]))
+    return tuple(found)
+
+
+def node_name(basis: ModalBasis, node: int) -> str:
+    """``contact node 3``, or ``shoe: node 3`` with its interface; numbers as in the basis."""
+    if not several_bodies(basis):
+        return f"contact node {node}"
+    ends = np.cumsum([count for _, count in basis.groups])
+    return f"{basis.groups[int(np.searchsorted(ends, node, side='right'))][0]}: node {node}"
+
+
+def mode_names(basis: ModalBasis) -> list[str]:
+    """``mode 3`` for each mode, or with its body and counted there, ``pad: mode 3``.
+
+    Modes of linked bodies are those of all of them.
+    """
+    if sum(part.modes[1] for part in basis.parts) < basis.modes:
+        return [f"mode {mode}" for mode in range(basis.modes)]
+    return [f"{part.name}: mode {mode}" for part in basis.parts for mode in range(part.modes[1])]
+
+
+def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
+    """Displacements of the contact nodes and of their feet from those of the mesh nodes.
+
+    Returns
+    -------
+    (sparse (2 n, 2 N), sparse (2 n, 2 N))
+        Along x and y, node by node. What lies on the other side enters the relative rows with
+        weights of sum -1; rows of feet on the ground are zero.
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
+    field, n = basis.mode_shapes, basis.contact_nodes
+    assert field is not None
+    rows = field.restriction.tocsr()[6 : 6 + 3 * n]
+    local = rows[np.flatnonzero(np.arange(3 * n) % 3 < 2)]
+    tangents, normals = contact_directions(basis)
+    turned = sp.bsr_array((np.stack([tangents, normals], axis=2), np.arange(n), np.arange(n + 1)),
+                          shape=(2 * n, 2 * n))
+    both = sp.csr_array(turned @ local)
+    weights = sp.coo_array(both[::2][:, ::2])
+    weights.sum_duplicates()
+    row, node = weights.coords
+    # Mesh nodes of one side hang together along the outline, also where a body touches itself.
+    entry = sp.csr_array((np.arange(1, len(row) + 1), (row, node)), shape=weights.shape)
+    start, end = field.outline.T
+    used = sp.csr_array((np.ones(len(row)), (row, node)), shape=weights.shape)
+    at, edge = (used[:, start] * used[:, end]).nonzero()
+    links = sp.coo_array((np.ones(len(at)), (np.asarray(entry[at, start[edge]]).ravel() - 1,
+                                             np.asarray(entry[at, end[edge]]).ravel() - 1)),
+                         shape=(len(row), len(row)))
+    _, side = connected_components(links, directed=False)
+    own = np.bincount(side, weights.data)[side] > 0.0
+    masks = [sp.kron(sp.coo_array((chosen.astype(float), (row, node)), shape=weights.shape),
+                     np.ones((2, 2))) for chosen in (own, ~own)]
+    return sp.csr_array(both * masks[0]), sp.csr_array(-(both * masks[1]))
+
+
+def _bodies_at(basis: ModalBasis, nodes: slice) -> list[str]:
+    """Names of the bodies with a part in the motion of some contact nodes."""
+    moving: Any = ()
+    if basis.mode_shapes is not None:
+        rows = basis.mode_shapes.restriction.tocsr()[6 + 3 * nodes.start : 6 + 3 * nodes.stop]
+        moving = np.unique(rows.indices[rows.data != 0.0] // 2)
+    found = []
+    for part in basis.parts:
+        if part.nodes[1]:
+            touches = np.searchsorted(moving, part.nodes[0]) < np.searchsorted(
+                moving, sum(part.nodes))
+        else:
+            touches = basis.contact_T[nodes, :, part.modes[0] : sum(part.modes)].any()
+        if touches:
+            found.append(part.name)
+    return found
+
+
+def _arc_length(places: Array, normals: Array, tangents: Array, tributary: Array) -> Array:
+    """Arc lengths (k,) of nodes in the order of the face, which may be either way.
+
+    Between two nodes the face is taken for a circle's arc that turns as its normals do.
+    """
+    steps = np.diff(places, axis=0)
+    chord = np.linalg.norm(steps, axis=1)
+    cosine = (normals[1:] * normals[:-1]).sum(axis=1)
+    sine = normals[:-1, 0] * normals[1:, 1] - normals[:-1, 1] * normals[1:, 0]
+    half = 0.5 * np.abs(np.arctan2(sine, cosine))
+    # Normals of a corner turn without an arc between them.
+    half[half > 0.25 * np.pi] = 0.0
+    s = np.append(0.0, np.cumsum(chord / np.sinc(half / np.pi)))
+    if (steps * (tangents[1:] + tangents[:-1])).sum() < 0.0:
+        s = s[-1] - s
+    # Outer nodes lie on the ends of the face, or half of their length away from them.
+    return s + max(0.5 * (float(tributary.sum()) - float(np.ptp(s))), 0.0)
