@@ -213,11 +213,21 @@ def check_rotation(names, printed, folder):
     assert first[1] == pytest.approx(5.049 * unit, rel=2e-2)
 
 
+def check_bodies(names, printed, folder):
+    lines = printed.splitlines()
+    pressed = next(float(line) for line in lines if re.fullmatch(r"[\d.]+", line))
+    assert pressed == pytest.approx(2000.0, rel=1e-6)
+    ends = {line.split()[0]: float(line.split()[1]) for line in lines if line[1:3] == ".p"}
+    assert ends == pytest.approx({"a.p": 1.0 / 3.0, "b.p": -2.0 / 3.0}, rel=1e-6)
+    # The joint gives way a little, and takes as much from the bolt's tension.
+    assert 4500.0 < float(lines[-1]) < 5000.0
+
+
 CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,
-          "preload.md": check_preload, "rotation.md": check_rotation}
+          "preload.md": check_preload, "rotation.md": check_rotation, "bodies.md": check_bodies}
 
 
 def test_every_page_with_code_is_known():

@@ -220,7 +220,7 @@ def reduce_bodies(
         given: dict[str, Any] = {"contact": (), "reduction": "residual", **options,
                                  **each.get(name, {}), **ends[name]}
         with located(f"Body '{name}':"):
-            given["points"], joints = _joints(name, body, given.get("points") or {}, links)
+            given["points"], joints = _joints(name, body, given, links)
             rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + joints
             found[name] = modal_basis(body, counts[name], rows=rows, **given)
     return found
@@ -264,17 +264,18 @@ def _given_rows(body: ElasticBody, given: Any) -> Any:
     return rows
 
 
-def _joints(name: str, body: ElasticBody, points: Mapping[str, Place], links: Sequence[Link]
-            ) -> tuple[dict[str, Place], list[Any]]:
+def _joints(
+    name: str, body: ElasticBody, options: Mapping[str, Any], links: Sequence[Link]
+) -> tuple[dict[str, Place], list[Any]]:
     """Points of a body with those of its links, and the rows on which their forces act."""
-    known, rows = dict(points), []
+    known, rows = dict(options.get("points") or {}), []
     for link in links:
         for end in (link.first, link.second):
             owner, _, point = (end or "").partition(".")
             if owner == name:
-                if point not in ("B", "C"):
-                    known.setdefault(point, point)
-                matrix = place_rows(body, known.get(point, point), point).matrix
+                place = options.get(point) if point in ("B", "C") else known.setdefault(
+                    point, point)
+                matrix = place_rows(body, point if place is None else place, point).matrix
                 rows.append(matrix if isinstance(link, Weld | Bushing) else matrix[:2])
     return known, rows
 
