@@ -275,7 +275,8 @@ def _joints(
             if owner == name:
                 place = options.get(point) if point in ("B", "C") else known.setdefault(
                     point, point)
-                matrix = place_rows(body, point if place is None else place, point).matrix
+                where = point if place is None or _nowhere(place) else place
+                matrix = place_rows(body, where, point).matrix
                 rows.append(matrix if isinstance(link, Weld | Bushing) else matrix[:2])
     return known, rows
 
