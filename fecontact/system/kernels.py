@@ -10,9 +10,8 @@ With x = Tx q and y = Ty q at the n contact nodes, per node j
 
 where K and C hold the modes' own stiffness and damping and the springs and dashpots at B, and s is
 the variation of friction along the ground. T has no second part where contact forces stay vertical.
-Rows of nodes between two bodies are those of their relative motion along and across the face: y_R
-is zero there. The other side of node j moves on by a factor of one motion, travel_j = c_j travel
-and V_j = c_j V.
+Rows of nodes between two bodies are those of their relative motion; y_R is zero there. One motion
+moves all other sides, by a factor each: travel_j = c_j travel, V_j = c_j V.
 """
 
 from typing import NamedTuple
@@ -20,17 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import (
-    block,
-    borrowed,
-    f8,
-    helper,
-    i8,
-    integers,
-    kernel,
-    matrix,
-    vector,
-)
+from fecontact.core.compiled import block, borrowed, f8, helper, i8, integers, kernel, matrix, vector
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 
@@ -38,10 +27,9 @@ from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_
 class SystemArrays(NamedTuple):
     """A contact system as the kernels see it: arrays, and laws by address.
 
-    ``drive_damping`` (2,) is that of relative dashpots; ``sliding`` (n,) are the factors c_j, and
-    ``on_ground`` (n,) is 0 for nodes between bodies, else 1; ``bristle_stiffness`` (2, n, s) are a
-    and b of the stored ``(a + b |F|) z^2 / 2``; ``leans`` is 0 where contact forces stay vertical,
-    else 1.
+    ``drive_damping`` (2,) is that of relative dashpots; ``sliding`` (n,) are the factors c_j;
+    ``bristle_stiffness`` (2, n, s) are a and b of the stored ``(a + b |F|) z^2 / 2``; ``on_ground``
+    is 0 for nodes between bodies, ``leans`` where contact forces stay vertical, else 1.
     """
 
     stiffness: Array
