@@ -59,6 +59,9 @@ def contact_system(study: Described, basis: ModalBasis, title: str) -> ContactSy
         For laws, loads or a gap that do not fit the basis; the message names the section.
     """
     groups = dict(basis.groups)
+    if not groups:
+        raise InputError(f"{title}: [basis]: contact = [] leaves the body without contact nodes; "
+                         f"name the boundary that touches the ground.")
     for name in study.interfaces:
         if name not in groups:
             raise InputError(f"{title}: [interfaces.{name}]: the basis has no interface '{name}'"
