@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact import ContactSystem, Ground, ModalBasis, basis_from_matrices, simulate
+from fecontact import ContactSystem, Ground, ModalBasis, simulate
 from fecontact.bifurcation import (
     Axis,
     Basins,
@@ -37,6 +37,7 @@ from fecontact.bifurcation import (
 from fecontact.integrate import Crossing
 from fecontact.laws import PrescribedForce, ProductFriction
 from fecontact.plot import COLOURS, new_figure, plot_basins, plot_branches
+from fecontact.reduction import point_masses
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,11 +48,9 @@ SMALL, LARGE = np.full(4, 2.0), np.full(4, 8.0)
 
 def basis(D: float = 0.1) -> ModalBasis:
     """The masses, moving along the belt only."""
-    rows = np.zeros((2, 3, 2))
-    rows[:, 0] = np.eye(2)
-    return basis_from_matrices(
-        np.diag([2.5, 1.0]), [[3.0, -1.0], [-1.0, 1.0]], {"contact": rows},
-        damping=2.0 * D * np.array([[2.0, -1.0], [-1.0, 1.0]]))
+    return point_masses({"1": 2.5, "2": 1.0}, {("1", None): 2.0, ("1", "2"): 1.0},
+                        dashpots={("1", None): 2.0 * D, ("1", "2"): 2.0 * D},
+                        components="x", contact=["1", "2"])
 
 
 def oscillator(B: float = 1.0, v0: float = 1.0, D: float = 0.1) -> ContactField:

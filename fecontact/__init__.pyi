@@ -31,12 +31,10 @@ from .reduction.reduce_body import modal_basis
 from .study.study import Study
 from .sweeps.sweep import sweep
 from .system.contact_system import ContactSystem
-from .system.forcing_period import forcing_period
 from .system.gap import Crown
 from .system.interfaces import Interface
 from .system.quasistatic.loading import load_history
 from .system.quasistatic.path import LoadPath
-from .system.quasistatic.prestressed_modes import prestressed_modes
 from .system.static_solution import static_solution
 from .system.statics import static_equilibrium
 
@@ -82,7 +80,6 @@ __all__ = [
     "ensemble",
     "event",
     "fem",
-    "forcing_period",
     "generate",
     "integrate",
     "io",
@@ -90,7 +87,6 @@ __all__ = [
     "load_history",
     "modal_basis",
     "plot",
-    "prestressed_modes",
     "read_case",
     "read_mesh",
     "reduction",

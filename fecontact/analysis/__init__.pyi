@@ -1,3 +1,5 @@
+from ..system.forcing_period import forcing_period
+from ..system.quasistatic.prestressed_modes import prestressed_modes
 from .complex_modes import ComplexModes, complex_modes
 from .histories import history
 from .impacts import Impacts, Rest, find_impacts, find_rests
@@ -17,9 +19,11 @@ __all__ = [
     "count_periods",
     "find_impacts",
     "find_rests",
+    "forcing_period",
     "history",
     "periodicity",
     "power_spectral_density",
+    "prestressed_modes",
     "receptance",
     "spectrogram",
     "strobed_states",

@@ -13,10 +13,10 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.friction_memory import settled
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.statics import equilibrium
-from fecontact.system.steady_memory import settled
 
 
 @dataclass(frozen=True)

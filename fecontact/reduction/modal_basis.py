@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite, require_positive
 from fecontact.core.types import Array, ArrayLike
-from fecontact.core.units import Summarised, listed, quantity, span
+from fecontact.core.units import Summarised, count, listed, quantity, span
 from fecontact.fem.fields import BodyFields
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
@@ -161,10 +161,10 @@ class ModalBasis(Summarised):
             raise InputError(f"Modal basis: the bodies {listed(names)} must have different names.")
         nodes = 0 if self.mode_shapes is None else len(self.mode_shapes.nodes)
         for part in self.parts:
-            for what, (first, count), total in (("modes", part.modes, self.modes),
-                                                ("nodes", part.nodes, nodes)):
-                if not 0 <= first <= first + count <= total:
-                    raise InputError(f"Modal basis: body '{part.name}' has {count} {what} from "
+            for what, (first, size), total in (("modes", part.modes, self.modes),
+                                               ("nodes", part.nodes, nodes)):
+                if not 0 <= first <= first + size <= total:
+                    raise InputError(f"Modal basis: body '{part.name}' has {size} {what} from "
                                      f"{first}, but there are {total}.")
 
     def summary(self) -> list[tuple[str, str]]:
@@ -184,8 +184,9 @@ class ModalBasis(Summarised):
               [("stiffness", "full matrix" + _skew(self.stiffness, ", in part circulatory"))]),
             *([] if self.rotation is None else
               [("rotation", quantity(self.rotation.speed, "rad/s"))]),
-            *([("bodies", listed([part.name + f" ({part.modes[1]} modes)" * (part.modes[1] > 0)
-                                  for part in self.parts]))] if self.parts else []),
+            *([("bodies", listed([
+                part.name + f" ({count(part.modes[1], 'mode')})" * (part.modes[1] > 0)
+                for part in self.parts]))] if self.parts else []),
             ("contact nodes", f"{self.contact_nodes}"
              + (f" ({listed(groups)})" if len(groups) > 1 or self.parts else "")),
             ("points", listed(["B", "C", *self.extra])),

@@ -61,9 +61,11 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
     """
     basis, several = reduced.basis, reduced.gaps is not None
     groups = dict(basis.groups)
-    if not basis.contact_nodes:
-        raise InputError(f"{title}: there are no contact nodes; name a boundary as contact in "
-                         f"[basis], or of several bodies a face in [interfaces.NAME].")
+    if not groups:
+        raise InputError(f"{title}: there are no contact nodes; name the faces that touch in "
+                         f"[interfaces.NAME]." if several else
+                         f"{title}: [basis]: contact = [] leaves the body without contact nodes; "
+                         f"name the boundary that touches the ground.")
     for name in study.interfaces:
         if name not in groups:
             raise InputError(f"{title}: [interfaces.{name}]: the basis has no interface '{name}'"

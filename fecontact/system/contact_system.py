@@ -24,6 +24,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
 from fecontact.system.arrays import system_arrays
+from fecontact.system.friction_memory import bristle_history
 from fecontact.system.gap import Gap, gap_values
 from fecontact.system.interfaces import (
     Interface,
@@ -337,8 +338,8 @@ class ContactSystem(Summarised):
         """
         out = np.zeros((2, len(times), self.basis.contact_nodes))
         if self.memory:
-            kernels.bristle_history(np.ascontiguousarray(times, dtype=float),
-                                    np.ascontiguousarray(states, dtype=float), self.arrays, out)
+            bristle_history(np.ascontiguousarray(times, dtype=float),
+                            np.ascontiguousarray(states, dtype=float), self.arrays, out)
         return out[0], out[1]
 
     def with_(self, **changes: Any) -> "ContactSystem":

@@ -12,9 +12,9 @@ from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.friction_memory import settled
 from fecontact.system.jacobian import jacobian
 from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
-from fecontact.system.steady_memory import settled
 
 # Largest out-of-balance fraction of the load, regardless of the rounding of other forces.
 _UNBALANCED = 1e-6

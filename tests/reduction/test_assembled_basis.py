@@ -177,7 +177,7 @@ def test_selecting_modes_keeps_the_bodies_apart(pair):
     some = whole.select([0, 2, m - 1, m + 1])
     assert [part.modes for part in some.parts] == [(0, 3), (3, 1)]
     assert (some.contact_T == whole.contact_T[:, :, [0, 2, m - 1, m + 1]]).all()
-    assert dict(some.summary())["bodies"] == "pad, disc"
+    assert dict(some.summary())["bodies"] == "pad (3 modes), disc (1 mode)"
     assert some.rigid_modes == 2  # of the pad, first of its block
 
 

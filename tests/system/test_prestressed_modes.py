@@ -15,9 +15,8 @@ from fecontact import (
     PointLoad,
     basis_from_matrices,
     load_history,
-    prestressed_modes,
 )
-from fecontact.analysis import complex_modes
+from fecontact.analysis import complex_modes, prestressed_modes
 from fecontact.laws import (
     Constant,
     ConstantFriction,

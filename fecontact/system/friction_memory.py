@@ -1,9 +1,9 @@
-"""Internal variables of friction with memory at rest in steady sliding."""
+"""Internal variables of friction with memory: what they store, and steady ones."""
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, kernel, vector
+from fecontact.core.compiled import block, f8, kernel, matrix, vector
 from fecontact.core.types import Array
 from fecontact.system.kernels import (
     SYSTEM,
@@ -12,7 +12,26 @@ from fecontact.system.kernels import (
     memory_of,
     node_forces,
     node_motion,
+    storing_power,
 )
+
+
+@kernel(types.void(vector, matrix, SYSTEM, block))
+def bristle_history(times, states, s, out):
+    """Fill out (2, N, n): what the bristles store, and the power into it at constant force."""
+    count = s.memory.max()
+    force, rates = np.empty(3 + count), np.empty((count, 3 + count))
+    for i in range(len(times)):
+        y, moved = states[i], ground_motion(times[i], s)
+        for j in range(len(s.Tx)):
+            z = memory_of(j, y, s)
+            F = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)[0]
+            stored = 0.0
+            for k in range(s.memory[j]):
+                stored += (s.bristle_stiffness[0, j, k]
+                           + s.bristle_stiffness[1, j, k] * abs(F)) * z[k] * z[k]
+            out[0, i, j] = 0.5 * stored
+            out[1, i, j] = storing_power(j, F, z, rates, s)
 
 
 @kernel(types.void(f8, vector, SYSTEM))
