@@ -12,7 +12,6 @@ from .fem.generate import Beam, Block, Pendulum, generate
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
 from .fem.points import Patch
-from .fem.rotation import Rotation
 from .integrate.ensemble import ensemble
 from .integrate.events import Event, event
 from .integrate.initial_state import RigidStart
@@ -31,6 +30,7 @@ from .reduction.reduce_body import modal_basis
 from .study.study import Study
 from .sweeps.sweep import sweep
 from .system.contact_system import ContactSystem
+from .system.forcing_period import forcing_period
 from .system.gap import Crown
 from .system.interfaces import Interface
 from .system.quasistatic.loading import load_history
@@ -69,7 +69,6 @@ __all__ = [
     "PointLoad",
     "Rayleigh",
     "RigidStart",
-    "Rotation",
     "Status",
     "Study",
     "Trajectory",
@@ -80,6 +79,7 @@ __all__ = [
     "ensemble",
     "event",
     "fem",
+    "forcing_period",
     "generate",
     "integrate",
     "io",

@@ -1,6 +1,4 @@
-from ..system.forcing_period import forcing_period
-from ..system.quasistatic.prestressed_modes import prestressed_modes
-from .complex_modes import ComplexModes, complex_modes
+from .complex_modes import ComplexModes, complex_modes, prestressed_modes
 from .histories import history
 from .impacts import Impacts, Rest, find_impacts, find_rests
 from .periodicity import Periodicity, count_periods, periodicity, strobed_states
@@ -19,7 +17,6 @@ __all__ = [
     "count_periods",
     "find_impacts",
     "find_rests",
-    "forcing_period",
     "history",
     "periodicity",
     "power_spectral_density",

@@ -8,6 +8,7 @@ from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.complex_modes import ComplexModes as ComplexModes
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.quasistatic.prestressed_modes import prestressed_modes as prestressed_modes
 
 
 def complex_modes(

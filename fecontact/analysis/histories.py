@@ -8,7 +8,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.reduction.contact_faces import node_name
+from fecontact.reduction.assembly.contact_faces import node_name
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 

@@ -54,7 +54,7 @@ def run_table(trajectory: "Trajectory") -> Any:
 
 def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
     """Shares of the contact states, of several bodies for each interface with its nodes."""
-    from fecontact.reduction.contact_faces import contact_faces
+    from fecontact.reduction.assembly.contact_faces import contact_faces
 
     basis = trajectory.system.basis
     faces = contact_faces(basis)

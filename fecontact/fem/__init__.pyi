@@ -1,9 +1,11 @@
 from .pairing import Pairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
+from .rotation import Rotation
 
 __all__ = [
     "Pairing",
     "PairingReport",
+    "Rotation",
     "finer_face",
     "pair_both_faces",
     "pair_faces",

@@ -1,8 +1,8 @@
-from .assembled_basis import PointPairing, assembled_basis
+from .assembly.assembled_basis import PointPairing, assembled_basis
+from .assembly.links import Bushing, Hinge, Spring, Weld, linked
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
-from .links import Bushing, Hinge, Spring, Weld, linked
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from .point_masses import point_masses
 from .reduce_body import reduce_bodies

@@ -17,9 +17,9 @@ from fecontact.fem.fields import body_elements, linear_cells, stress_of
 from fecontact.fem.pairing import Pairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
+from fecontact.reduction.assembly.links import Bushing, Link, Weld
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
-from fecontact.reduction.links import Bushing, Link, Weld
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import modal_rotation

@@ -17,8 +17,8 @@ from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing, pair_faces
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
-from fecontact.reduction.assembled_basis import assembled_basis
-from fecontact.reduction.links import Bushing, Hinge, Link, Spring, Weld
+from fecontact.reduction.assembly.assembled_basis import assembled_basis
+from fecontact.reduction.assembly.links import Bushing, Hinge, Link, Spring, Weld
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (

@@ -10,7 +10,7 @@ from fecontact.core.tables import located
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing
-from fecontact.reduction.links import Link
+from fecontact.reduction.assembly.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import (
     BodySections,

@@ -29,7 +29,7 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES, with_folder
-from fecontact.reduction.links import Link
+from fecontact.reduction.assembly.links import Link
 from fecontact.study.assembly import contact_system
 from fecontact.study.bodies_section import (
     BodySections,

@@ -18,8 +18,8 @@ from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
+from fecontact.reduction.assembly.links import Link
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
-from fecontact.reduction.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels

@@ -23,8 +23,8 @@ from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
-from fecontact.reduction.assembled_basis import PointPairing, assembled_basis
-from fecontact.reduction.links import Link
+from fecontact.reduction.assembly.assembled_basis import PointPairing, assembled_basis
+from fecontact.reduction.assembly.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from systems import impact_oscillator
 
-from fecontact import InputError, Status, ensemble, simulate
-from fecontact.analysis import forcing_period
+from fecontact import InputError, Status, ensemble, forcing_period, simulate
 from fecontact.integrate import strobe
 from fecontact.integrate.rodas5p import driver
 

@@ -17,9 +17,8 @@ from fecontact import (
     modal_basis,
     static_equilibrium,
 )
-from fecontact.fem import pair_faces
+from fecontact.fem import Rotation, pair_faces
 from fecontact.fem.body_forces import inertia_forces
-from fecontact.fem.rotation import Rotation
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.reduction import BasisReport, PointPairing, assembled_basis, reduce_bodies

@@ -7,7 +7,7 @@ import pytest
 from joined_bodies import Touch, joined, moved, stack
 from synthetic import basis
 
-from fecontact.reduction.contact_faces import (
+from fecontact.reduction.assembly.contact_faces import (
     contact_directions,
     contact_faces,
     contact_sides,

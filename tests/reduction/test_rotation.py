@@ -12,7 +12,6 @@ from fecontact import (
     Material,
     Mesh,
     Pendulum,
-    Rotation,
     Study,
     basis_from_matrices,
     generate,
@@ -22,6 +21,7 @@ from fecontact import (
 )
 from fecontact.analysis import complex_modes
 from fecontact.bifurcation import contact_field, stability_map
+from fecontact.fem import Rotation
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import Constant, ConstantFriction, LinearContact
 from fecontact.reduction import BasisReport

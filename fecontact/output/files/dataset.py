@@ -10,7 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.frames import contact_forces
-from fecontact.reduction.contact_faces import contact_faces, several_bodies
+from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
 
 if TYPE_CHECKING:
     import xarray
@@ -166,6 +166,7 @@ def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
     MissingLibraryError
         If xarray is not installed.
     """
+    require_kind("to_xarray", Trajectory, trajectory=trajectory)
     try:
         from xarray import DataArray, Dataset
     except ImportError:

@@ -10,7 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.reduction.contact_faces import contact_directions
+from fecontact.reduction.assembly.contact_faces import contact_directions
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 

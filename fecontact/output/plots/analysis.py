@@ -20,7 +20,7 @@ from fecontact.output.plots.face_panels import abscissa_unit, face_panels
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import COLOURS, DASHES, add_note, distinct_colours
-from fecontact.reduction.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,7 +14,7 @@ from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import STATE_COLOURS, add_note, state_names
-from fecontact.reduction.contact_faces import ContactFace, contact_faces
+from fecontact.reduction.assembly.contact_faces import ContactFace, contact_faces
 from fecontact.reduction.modal_basis import ModalBasis
 
 if TYPE_CHECKING:

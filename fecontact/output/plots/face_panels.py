@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.units import suitable_unit
-from fecontact.reduction.contact_faces import ContactFace
+from fecontact.reduction.assembly.contact_faces import ContactFace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

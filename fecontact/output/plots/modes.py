@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.output.plots.figure import new_figure
-from fecontact.reduction.contact_faces import mode_names
+from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes

@@ -12,7 +12,7 @@ from fecontact.core.units import quantity, suitable_unit
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS
-from fecontact.reduction.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES
 

@@ -21,7 +21,7 @@ from fecontact.output.plots.style import (
     add_note,
     distinct_colours,
 )
-from fecontact.reduction.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

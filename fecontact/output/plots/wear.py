@@ -11,7 +11,7 @@ from fecontact.core.units import suitable_unit
 from fecontact.integrate.wear import WearHistory
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS
-from fecontact.reduction.contact_faces import ContactFace, contact_faces
+from fecontact.reduction.assembly.contact_faces import ContactFace, contact_faces
 from fecontact.reduction.modal_basis import ModalBasis
 
 if TYPE_CHECKING:

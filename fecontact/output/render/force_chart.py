@@ -14,7 +14,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import DASHES, STATE_COLOURS, distinct_colours
 from fecontact.output.render.frames_data import Motion
-from fecontact.reduction.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces
 
 Image = NDArray[np.uint8]
 

@@ -21,7 +21,7 @@ from fecontact.output.files.frames import (
     von_mises,
 )
 from fecontact.output.plots.style import state_names
-from fecontact.reduction.contact_faces import contact_faces, contact_sides, several_bodies
+from fecontact.reduction.assembly.contact_faces import contact_faces, contact_sides, several_bodies
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 

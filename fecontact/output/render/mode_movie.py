@@ -16,7 +16,7 @@ from fecontact.output.render.movie import MOVING, Image, Progress, target, write
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Strips, pixels
 from fecontact.output.render.scene import COLOUR_MAPS, BodyScene
-from fecontact.reduction.contact_faces import mode_names
+from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
 from fecontact.system.complex_modes import ComplexModes

@@ -9,7 +9,7 @@ from fecontact.core.types import Array
 from fecontact.output.plots.style import STATE_COLOURS
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.offscreen import known_window
-from fecontact.reduction.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces
 from fecontact.reduction.mode_shapes import ModeShapes
 
 COLOUR_MAPS = {"displacement": "viridis", "von_mises": "cividis"}

@@ -16,7 +16,7 @@ from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array, ArrayLike
 from fecontact.fem.pairing import Pairing
-from fecontact.reduction.links import Link, linked
+from fecontact.reduction.assembly.links import Link, linked
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
 
@@ -150,7 +150,7 @@ def assembled_basis(
         The interfaces.
     links : sequence of links, optional
         Welds, hinges, bushings and springs; with any, the modes are those of the linked bodies
-        instead of blocks, see :func:`fecontact.reduction.links.linked`.
+        instead of blocks, see :func:`fecontact.reduction.assembly.links.linked`.
 
     Raises
     ------
