@@ -60,6 +60,8 @@ class Pairing(Summarised):
         Displacement x, y and rotation of each node from the nodal displacements of ``body``, and of
         its foot from those of ``other`` (None for the ground).
     report : PairingReport
+    swapped : bool
+        Whether the nodes lie on the face that was given as the other one, because it is finer.
     """
 
     body: str
@@ -73,6 +75,7 @@ class Pairing(Summarised):
     feet: Any
     feet_places: Array
     report: PairingReport
+    swapped: bool = False
 
     def summary(self) -> list[tuple[str, str]]:
         """That of the report."""
@@ -125,7 +128,7 @@ def pair_faces(
     second = _face(bodies, other, "other")
     _check_apart(first, second)
     if nodes_on == "finer" and finer_face(bodies, face, other) == other:
-        first, second = second, first
+        return replace(_paired(second, first, nodes, reach, overlap), swapped=True)
     return _paired(first, second, nodes, reach, overlap)
 
 
@@ -144,7 +147,7 @@ def pair_both_faces(
     one, two = (_paired(*pair, nodes, reach, overlap)
                 for pair in ((first, second), (second, first)))
     return (replace(one, tributary=0.5 * one.tributary),
-            replace(two, tributary=0.5 * two.tributary))
+            replace(two, tributary=0.5 * two.tributary, swapped=True))
 
 
 def finer_face(bodies: Mapping[str, ElasticBody], face: str, other: str) -> str:

@@ -143,8 +143,9 @@ class InterfaceSettings:
         'BODY.BOUNDARY' of the other face, or 'ground'.
     nodes : int or 'all'
         Every displacement node, or so many segments of equal length.
-    nodes_on : 'finer' or 'face'
-        Which face has the contact nodes: the finer of the two, or ``face``.
+    nodes_on : 'finer' or 'face', optional
+        Which face has the contact nodes: the finer of the two, or ``face``; by default the finer
+        one, and ``face`` where the other side slides.
     reach : float, optional
         Largest distance between partners [m]; by default the extent of the larger face.
     overlap : float
@@ -161,7 +162,7 @@ class InterfaceSettings:
     face: str | None = None
     other: str = "ground"
     nodes: int | Literal["all"] = "all"
-    nodes_on: Literal["finer", "face"] = "finer"
+    nodes_on: Literal["finer", "face"] | None = None
     reach: Annotated[float | None, Unit("m")] = None
     overlap: float = 0.01
     gap: Annotated[Gap, Unit("m")] = 0.0
@@ -170,7 +171,12 @@ class InterfaceSettings:
     @property
     def pairing_keys(self) -> tuple[Any, ...]:
         """Values on which the pairing of the faces depends."""
-        return tuple(getattr(self, key) for key in PAIRING_KEYS)
+        return (*(getattr(self, key) for key in PAIRING_KEYS), self.side_of_nodes)
+
+    @property
+    def side_of_nodes(self) -> Literal["finer", "face"]:
+        """``nodes_on``, or its default."""
+        return self.nodes_on or ("finer" if self.sliding is None else "face")
 
 
 class Bodies(Protocol):
@@ -362,7 +368,11 @@ def pairings(
                                      f"{nearest(boundary, known)}; its boundaries are: "
                                      f"{choices(known)}.")
             found[name] = pair_faces(bodies, one.face, one.other, nodes=one.nodes,
-                                     nodes_on=one.nodes_on, reach=one.reach, overlap=one.overlap)
+                                     nodes_on=one.side_of_nodes, reach=one.reach,
+                                     overlap=one.overlap)
+            if one.sliding is not None and found[name].swapped:
+                raise InputError(f"sliding is that of {one.other}, but with nodes_on = 'finer' "
+                                 f"the contact nodes lie on it; leave nodes_on out.")
     return found
 
 

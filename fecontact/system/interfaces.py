@@ -56,7 +56,7 @@ class Interface:
     Raises
     ------
     InputError
-        For parts of another type.
+        For parts of another type, and sliding where the contact nodes lie on the side that slides.
     """
 
     name: str
@@ -74,6 +74,10 @@ class Interface:
         require_kind(owner, (FrictionLaw, type(None)), friction=self.friction)
         require_kind(owner, (SlidingTranslation, SlidingRotation, type(None)),
                      sliding=self.sliding)
+        if self.sliding is not None and isinstance(self.pairing, Pairing) and self.pairing.swapped:
+            raise InputError(f"{owner}: sliding is that of the other side, but the contact nodes "
+                             f"lie on it, the finer face '{self.pairing.report.face}'; pair the "
+                             f"faces with nodes_on='face'.")
 
 
 def system_fields(

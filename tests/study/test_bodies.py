@@ -10,7 +10,7 @@ import fecontact as fc
 from fecontact.cli import execute
 from fecontact.cli.templates import template
 from fecontact.fem.pairing import pair_faces
-from fecontact.laws import ConstantFriction, RoughSurface
+from fecontact.laws import ConstantFriction, RoughSurface, SlidingTranslation
 from fecontact.reduction import Spring, assembled_basis, reduce_bodies
 from fecontact.sweeps.case import of_basis
 
@@ -346,3 +346,21 @@ def test_load_and_drive_points_are_those_of_one_body():
     alone = fc.modal_basis(bodies["a"], 3, B="", C="top")
     assert not alone.T[0].any()
     assert alone.T[1].any()
+
+
+def test_what_slides_is_the_other_face_however_fine(study):
+    """A block that slides to +x draws the pad along, with contact nodes on the pad."""
+    fine = {"bodies.block.geometry.element_size": 0.004, "interfaces.lining.nodes": "all"}
+    assert study.with_(**fine).pairings()["lining"].body == "block"
+    slid = study.with_(**fine, **{"interfaces.lining.sliding": {"speed": 0.3}})
+    assert slid.pairings()["lining"].body == "pad"
+    q = fc.static_equilibrium(slid.system(), friction=True)
+    basis = slid.system().basis
+    assert basis.T[basis.point_index("pad.B"), 0] @ q > 0.0
+    with pytest.raises(fc.InputError, match="nodes_on = 'finer' the contact nodes lie on it"):
+        slid.with_(**{"interfaces.lining.nodes_on": "finer"}).system()
+    bodies = study.with_(**fine).elastic_bodies()
+    pairing = pair_faces(bodies, "pad.contact", "block.top")
+    with pytest.raises(fc.InputError, match="'lining': sliding is that of the other side, but"):
+        fc.Interface("lining", pairing, RoughSurface(2e7, 1e-5), ConstantFriction(0.4),
+                     SlidingTranslation(0.3))
