@@ -5,6 +5,7 @@ from scripts_for_tests import ROOT, check_numbers, run_script
 
 # Arguments, and patterns, numbers and tolerances of what does not depend on the machine.
 BENCHMARKS = {
+    "bodies": ((), [(r"^ (2) bodies of 20 modes", 2.0, 0.0)]),
     "contact_kernels": ((), [(r"^ +400 +(\d+)", 40.0, 0.0)]),
     "continuation": ((), [(r"^ +50 .* (\S+) +\S+$", 0.0, 1e-9),
                            (r"^ +50 .* \S+ +(\S+)$", 0.0, 1e-6)]),
