@@ -3,11 +3,16 @@
 VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
+RUNS   := $(VENV)/.compiled-for-runs
+ALL    := $(VENV)/.compiled
 SYSTEM := $(VENV)/.system-libraries
 
-# What is compiled beside the integrator, on another core.
-SECOND := fecontact.bifurcation.linalg.bordered, fecontact.bifurcation.linalg.periodic_schur, \
-  fecontact.system.quasistatic.march, fecontact.fem.mesh_files, fecontact.integrate.nonsmooth.driver
+# What tests and benchmarks need compiled, on two cores.
+FIRST  := fecontact.integrate.rodas5p.driver, fecontact.bifurcation.linalg.bordered, \
+  fecontact.bifurcation.linalg.periodic_schur, fecontact.system.quasistatic.march, \
+  fecontact.bifurcation.orbits.branches, fecontact.bifurcation.fields.function_field
+SECOND := fecontact.fem.mesh_files, fecontact.integrate.nonsmooth.driver, \
+  fecontact.integrate.nonsmooth.event_driven, fecontact.integrate.nonsmooth.time_stepping
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-slow check bench validation clean
@@ -16,28 +21,28 @@ help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
 	  while IFS='|' read -r name what; do printf '  %-16s %s\n' "$$name" "$$what"; done
 
-setup: $(READY) $(SYSTEM) ## install everything into .venv
+setup: $(READY) $(ALL) $(SYSTEM) ## install everything into .venv
 
-demo: $(READY) $(SYSTEM) ## two studies from geometry to movie, into demo-output/
+demo: $(READY) $(RUNS) $(SYSTEM) ## two studies from geometry to movie, into demo-output/
 	@$(BIN)/fecontact demo demo-output
 
-test-fast: $(READY) $(SYSTEM) ## run the tests that take seconds
+test-fast: $(READY) $(ALL) $(SYSTEM) ## run the tests that take seconds
 	@$(BIN)/python -m pytest -q -n auto -m 'not slow and not long'
 
-test: $(READY) $(SYSTEM) ## run all tests but the slow ones
+test: $(READY) $(ALL) $(SYSTEM) ## run all tests but the slow ones
 	@$(BIN)/python -m pytest -q -n auto
 
-test-slow: $(READY) $(SYSTEM) ## run the documents, and what is killed on purpose
+test-slow: $(READY) $(ALL) $(SYSTEM) ## run the documents, and what is killed on purpose
 	@$(BIN)/python -m pytest -q -n auto -m slow
 
 check: $(READY) ## ruff and mypy
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
-bench: $(READY) $(SYSTEM) ## run the benchmarks
+bench: $(READY) $(ALL) $(SYSTEM) ## run the benchmarks
 	@for file in benchmarks/[a-z]*.py; do echo "$$file"; $(BIN)/python "$$file" || exit 1; done
 
-validation: $(READY) $(SYSTEM) ## compute docs/validation.md and its pictures again
+validation: $(READY) $(ALL) $(SYSTEM) ## compute docs/validation.md and its pictures again
 	@$(BIN)/python docs/validation/build.py
 
 clean: ## remove .venv, demo-output and caches
@@ -66,11 +71,19 @@ $(BIN)/python:
 $(READY): pyproject.toml | $(BIN)/python
 	@echo "Installing fecontact and what it needs"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
-	@echo "Compiling its kernels"
-	@$(BIN)/python -c 'import fecontact.integrate.rodas5p.driver' & first=$$!; \
+	@touch $@
+
+$(RUNS): | $(READY)
+	@echo "Compiling its kernels for runs"
+	@$(BIN)/python -c 'import fecontact.integrate.rodas5p.driver, fecontact.study.study'
+	@touch $@
+
+$(ALL): | $(READY)
+	@echo "Compiling all its kernels, on two cores"
+	@$(BIN)/python -c 'import $(FIRST)' & first=$$!; \
 	  $(BIN)/python -c 'import $(SECOND)' && wait $$first
 	@$(BIN)/python -c 'import fecontact.study.study'
-	@touch $@
+	@touch $@ $(RUNS)
 
 $(SYSTEM): .ci/system-libraries fecontact/core/system_libraries.py | $(BIN)/python
 	@$(BIN)/python .ci/system-libraries
