@@ -25,7 +25,7 @@ def point_masses(
     """Modal basis of one or several masses with springs to the base and between each other.
 
     ``point_masses({"a": 1.0, "b": 2.0}, {("a", "b"): 1e4, ("a", None): 2e4})``; each mass is a
-    named point, for a :class:`PointPairing` or loads.
+    named point, for a :class:`fecontact.reduction.PointPairing` or loads.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def modal_basis(
     rotation : Rotation, optional
         The body rotates; displacements are those in its frame, modes those at rest.
     rows : sequence of sparse (k, 2 N) arrays
-        Further motions on which forces act; see :func:`.reduce_bodies`.
+        Further motions on which forces act; see :func:`fecontact.reduction.reduce_bodies`.
 
     Raises
     ------

@@ -27,7 +27,7 @@ class PreloadSettings(LoadPath):
     motion_x, motion_y : float or list, optional
         Displacements of the driven ends of the springs at B [m]; by default their constant parts.
     travel : float or list
-        Travel of the ground in +x [m].
+        Travel of the ground in +x [m], or of the one interface that slides [m], [rad].
     steps : int or list
         Increments between two vertices, of each of the sections if it is a list.
     tangential_ratio : float

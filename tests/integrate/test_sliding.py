@@ -6,10 +6,13 @@ import pytest
 from fecontact import (
     ContactSystem,
     Ground,
+    InputError,
     Interface,
     Load,
+    LoadPath,
     PointLoad,
     basis_from_matrices,
+    load_history,
     simulate,
 )
 from fecontact.bifurcation import contact_field
@@ -154,3 +157,24 @@ def test_derivatives_to_the_state_and_to_each_speed(friction):
                                                  strict=True))).rhs(0.013, y)
                          for sign in (1.0, -1.0))
         assert given == pytest.approx((ahead - behind) / 2e-6, abs=1e-5 * np.abs(given).max())
+
+
+def test_quasi_static_travel_is_that_of_the_side_that_slides():
+    """A mass dragged along a leaning side as along the ground; the travel's work too."""
+    angle, path = 0.7, LoadPath(travel=(0.0, 2e-3, -1e-3), steps=40)
+    side = ContactSystem(
+        bodies={"b": oscillator(angle), "wall": wall()},
+        interfaces=[Interface("side", PointPairing(
+            "b", "p", "wall", "side", normals=(-np.sin(angle), np.cos(angle))), NORMAL, FRICTION,
+            SlidingTranslation(0.0, along(angle)))], load=Load(0.0, pressing("b", angle)))
+    belt = load_history(alone(Ground()), path, tangential_ratio=0.5)
+    found = load_history(side, path, tangential_ratio=0.5)
+    # It sticks, slips, turns round and slips back.
+    assert set(belt.contact_state[1:, 0].tolist()) == {1, 2}
+    assert np.abs(belt.friction_force).max() > 30.0
+    assert found.friction_force == pytest.approx(belt.friction_force, abs=1e-9 * 80.0)
+    assert found.loss[-1] == pytest.approx(belt.loss[-1], rel=1e-9)
+    assert found.work[-1] == pytest.approx(belt.work[-1], rel=1e-9)
+    both = together(SlidingTranslation(0.0, along(angle)), Ground())
+    with pytest.raises(InputError, match="travel moves one side, but the system has the ground, "):
+        load_history(both, path, tangential_ratio=0.5)

@@ -9,6 +9,7 @@ from fecontact import InputError, RigidStart, Study, sweep
 from fecontact.integrate import strobe
 from fecontact.io import read_table
 from fecontact.plot import plot_strobed
+from fecontact.study.bodies_section import Reduced
 
 STUDY = """
 geometry = { shape = "pendulum" }
@@ -31,7 +32,7 @@ drive.angular_frequency = [64.32, 30.84, 37.41, 23.63]
 def study(tmp_path):
     """The impact oscillator of two modes, with a modal basis of numbers."""
     study = Study.from_toml(STUDY, tmp_path / "impact.toml")
-    vars(study)["_basis"] = impact_oscillator().basis
+    vars(study)["_reduced"] = Reduced(impact_oscillator().basis)
     return study
 
 

@@ -150,7 +150,7 @@ def assembled_basis(
         The interfaces.
     links : sequence of links, optional
         Welds, hinges, bushings and springs; with any, the modes are those of the linked bodies
-        instead of blocks, see :func:`fecontact.reduction.assembly.links.linked`.
+        instead of blocks, see :func:`fecontact.reduction.linked`.
 
     Raises
     ------

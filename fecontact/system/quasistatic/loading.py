@@ -10,9 +10,10 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.types import Array
-from fecontact.core.units import count
+from fecontact.core.units import count, listed
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.interfaces import motion_sources
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.increment import (
@@ -67,7 +68,8 @@ def load_history(
     Raises
     ------
     InputError
-        For bristle laws, which have no quasi-static limit of springs; values out of range.
+        For bristle laws, which have no quasi-static limit of springs; values out of range; a travel
+        where several sides move.
     AnalysisError
         If the first vertex has no equilibrium.
 
@@ -82,6 +84,7 @@ def load_history(
         raise InputError(f"load_history: rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_sliders(system)
     given = _given(system, path)
+    _require_one_motion(system, given[:, -1])
     if start is None:
         m = system.basis.modes
         balance, q = resting(system, given[0, :m], given[0, m : m + 2], given[0, -1])
@@ -205,6 +208,15 @@ def _slope_under_preload(
         raise AnalysisError("There is no equilibrium under the largest load of the path, even if "
                             "all nodes stuck; check the sign and place of the loads.")
     return balance.normal(found.node[1, :, PENETRATION].copy())[1]
+
+
+def _require_one_motion(system: ContactSystem, travel: Array) -> None:
+    """Raise InputError for a travel (N,) that could be that of several sides."""
+    sources = motion_sources(system.basis, system.ground, system.sliding)
+    if travel.any() and len(sources) > 1:
+        raise InputError(f"load_history: travel moves one side, but the system has "
+                         f"{listed([source.what for source in sources])}; leave out the sliding of "
+                         f"interfaces that rest.")
 
 
 def _penetration(system: ContactSystem, given: Array, q: Array) -> Array:

@@ -33,7 +33,7 @@ class LoadPath:
     motion_x, motion_y : float or list, optional
         Displacements of the driven ends of the springs at B [m].
     travel : float or list
-        Travel s of the ground in +x [m].
+        Travel s of the ground in +x [m], or of the one interface that slides [m], [rad].
     steps : int or list
         Increments between two vertices, of each of the sections if it is a list. They are the
         points at which results are given; increments are cut further where accuracy needs it.
