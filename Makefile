@@ -32,7 +32,7 @@ test-fast: $(READY) $(ALL) $(SYSTEM) ## run the tests that take seconds
 test: $(READY) $(ALL) $(SYSTEM) ## run all tests but the slow ones
 	@$(BIN)/python -m pytest -q -n auto
 
-test-slow: $(READY) $(ALL) $(SYSTEM) ## run the documents, and what is killed on purpose
+test-slow: $(READY) $(ALL) $(SYSTEM) ## run documents and examples, and what takes a minute or more
 	@$(BIN)/python -m pytest -q -n auto -m slow
 
 check: $(READY) ## ruff and mypy
