@@ -8,8 +8,8 @@ import pytest
 # Small matrices: threads of the linear algebra would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# Files that run all pages, examples and benchmarks, kill processes on purpose, or follow branches of
-# whole examples: a minute or more each.
+# Files that run all pages, examples and benchmarks, kill processes on purpose, or follow branches
+# of whole examples: a minute or more each.
 SLOW = {"test_documentation", "test_examples", "test_benchmarks",
         "test_sweep_killed", "test_ending_signals",
         "test_two_mass_example", "test_shooting_of_beam", "test_branch_command",
@@ -24,11 +24,11 @@ LONG = {
     "test_bernstein",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
     "test_set_valued_beam", "test_friction_oscillator",
-    "test_sweep", "test_sweep_command", "test_sweep_strobed",
-    "test_sweep_summaries",
+    "test_sweep", "test_sweep_command", "test_sweep_strobed", "test_sweep_summaries",
     "test_movie", "test_analysis_plots", "test_trust", "test_damaged_files", "test_whole_files",
     "test_cli", "test_cli_stop", "test_locks", "test_bad_input",
-    "test_poincare_scan", "test_branch_study",     "test_orbits_by_shooting", "test_squeal",     "test_convergence", "test_mode_convergence",
+    "test_poincare_scan", "test_branch_study", "test_orbits_by_shooting", "test_squeal",
+    "test_convergence", "test_mode_convergence",
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",
     "test_receptance", "test_references", "test_eigen", "test_set_valued_search",
 }
