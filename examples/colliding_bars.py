@@ -109,7 +109,7 @@ def collision(second: float = LENGTH, modes: int = 60, lag: float = 0.01) -> Col
               "second": bar(LENGTH, second, round(elements * second / LENGTH))}
     touch = pair_faces(bodies, "first.right", "second.left", nodes=1, nodes_on="face")
     bases = reduce_bodies(bodies, [touch], modes={
-        "first": modes, "second": round(modes * second / LENGTH)}, reduction="vibration")
+        "first": modes, "second": round(modes * second / LENGTH)}, tolerance=0.0)
     system = ContactSystem(bodies=bases, interfaces=[
         Interface("ends", touch, LinearContact(stiffness), ConstantFriction(0.0))])
     count = bases["first"].modes
