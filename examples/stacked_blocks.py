@@ -83,3 +83,19 @@ def pressed(
     # xx, yy, zz, xy
     error = np.abs(stress - [0.0, -1.0, 0.0, 0.0]).max()
     return Patch(system, q, system.contact_history(np.zeros(1), state[None])[0, :, 0], float(error))
+
+
+CASES: tuple[tuple[str, tuple[int, int], tuple[int, int], Literal["all"] | int], ...] = (
+    ("matching meshes", (8, 3), (8, 4), "all"),
+    ("9 elements on 6, contact nodes at mesh nodes", (9, 3), (6, 3), "all"),
+    ("9 elements on 6, 5 segments", (9, 3), (6, 3), 5))
+
+
+def main() -> None:
+    """Print the error of the stress."""
+    for name, above, below, nodes in CASES:
+        print(f"{name}: stress to {pressed(above, below, nodes).stress_error:.1e} of the pressure")
+
+
+if __name__ == "__main__":
+    main()
