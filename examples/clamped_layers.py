@@ -8,7 +8,8 @@ a slider of the limit F on a spring 3 k, and a cycle loses
 
     W = 4 F (P - 4/3 F) / k = 8 F L^3 (P - 4/3 F) / (E b h^3)
 
-with the maximum 3/2 P^2 L^3 / (E b h^3) where F = 3/8 P.
+with the maximum 3/2 P^2 L^3 / (E b h^3) where F = 3/8 P. Both layers bend alike, so the pressure
+between them stays p: the normal law is a prescribed force.
 
 Usage: python examples/clamped_layers.py [OUTPUT_FOLDER] [--quick]
 
@@ -35,7 +36,7 @@ from fecontact import (
     load_history,
 )
 from fecontact.fem import pair_faces
-from fecontact.laws import Constant, ConstantFriction, LinearContact
+from fecontact.laws import Constant, ConstantFriction, PrescribedForce
 from fecontact.reduction import reduce_bodies
 from fecontact.system.quasistatic.history import LoadHistory
 
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LENGTH, HEIGHT, WIDTH, MU, END_LOAD = 0.5, 0.01, 0.02, 0.3, 300.0
+STUCK = 1e14  # tangential stiffness of stuck contacts [N/m^3]
 STEEL = Material(210e9, 0.3, 7850.0)
 STIFFNESS = STEEL.youngs_modulus * WIDTH * HEIGHT**3 / (2.0 * LENGTH**3)
 
@@ -74,8 +76,7 @@ def layers(columns: int = 40, nodes: int = 20) -> ContactSystem:
         each={"upper": {"loads": ["top", "end"]}, "lower": {"loads": ["bottom", "end"]}})
     return ContactSystem(
         bodies=bases,
-        interfaces=[Interface("joint", pairing, LinearContact(1e10 * LENGTH * WIDTH),
-                              ConstantFriction(MU))],
+        interfaces=[Interface("joint", pairing, PrescribedForce(1.0), ConstantFriction(MU))],
         load=Load(
             boundaries=tuple(BoundaryLoad(name, pressure=1.0)
                              for name in ("upper.top", "lower.bottom")),
@@ -85,12 +86,13 @@ def layers(columns: int = 40, nodes: int = 20) -> ContactSystem:
 def cycle(system: ContactSystem, limit: float, steps: int = 10) -> LoadHistory:
     """Loaded to P, then a cycle to -P and back, under the pressure with mu p b h = ``limit``.
 
-    Stuck contacts have 1e12 N/m^3, hundred times the stiffness of the normal law, so that the layers
-    alone give way.
+    Stuck contacts are so stiff that the layers alone give way.
     """
+    pressure = limit / (MU * WIDTH * HEIGHT)
+    pressed = system.with_(**{"interfaces.joint.normal.force": pressure * LENGTH * WIDTH})
     half = [0.0, 0.5 * END_LOAD, -0.5 * END_LOAD, 0.5 * END_LOAD]
-    path = LoadPath(load_scale=limit / (MU * WIDTH * HEIGHT), forces=[half, half], steps=steps)
-    return load_history(system, path, tangential_stiffness=1e12 * LENGTH * WIDTH, rtol=1e-4)
+    path = LoadPath(load_scale=pressure, forces=[half, half], steps=steps)
+    return load_history(pressed, path, tangential_stiffness=STUCK * LENGTH * WIDTH, rtol=1e-4)
 
 
 def loss(history: LoadHistory) -> float:
@@ -114,6 +116,7 @@ def figure(parts: np.ndarray, losses: np.ndarray, path: Path | None = None) -> "
         axis.plot(fine, slip_theory(fine * END_LOAD), color=COLOURS[0], label="slip theory")
         axis.plot(parts, losses, "o", color=COLOURS[1], label="two bodies")
         axis.set(xlabel="mu p b h / P", ylabel="loss per cycle [J]", xlim=(0.0, 0.8))
+        axis.set_ylim(bottom=0.0)
         axis.legend()
     return drawn
 
