@@ -3,8 +3,8 @@
 Goodman and Klumpp's cantilever of two layers, each h high, b wide and L long, under the pressure p
 and the end load +-P. In beam theory the shear stress in the interface is the same everywhere: it
 slips as a whole at P_s = 4/3 F with F = mu p b h. Stuck, the end moves by L^3 / (2 E b h^3) per
-load, slipping four times as much. Thus the end is a spring of stiffness k = E b h^3 / (2 L^3) beside
-a slider of the limit F on a spring 3 k, and a cycle loses
+load, slipping four times as much. Thus the end is a spring k = E b h^3 / (2 L^3) beside a slider of
+the limit F on a spring 3 k, and a cycle loses
 
     W = 4 F (P - 4/3 F) / k = 8 F L^3 (P - 4/3 F) / (E b h^3)
 
@@ -19,7 +19,7 @@ Journal of Applied Mechanics 23 (1956).
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -67,7 +67,7 @@ def layer(y: float, columns: int, rows: int) -> ElasticBody:
     return ElasticBody(mesh, STEEL, thickness=WIDTH, fixed={"clamp": "xy"})
 
 
-def layers(columns: int = 40, nodes: int = 20) -> ContactSystem:
+def layers(columns: int = 40, nodes: Literal["all"] | int = 20) -> ContactSystem:
     """Both layers, pressed from above and below, with half of the end load at each."""
     bodies = {"upper": layer(HEIGHT, columns, 2), "lower": layer(0.0, columns, 2)}
     pairing = pair_faces(bodies, "upper.bottom", "lower.top", nodes=nodes)
@@ -100,9 +100,9 @@ def loss(history: LoadHistory) -> float:
     return float(history.loss[-1] - history.loss[history.row(1)])
 
 
-def curve(parts: np.ndarray, columns: int = 40, nodes: int = 20) -> np.ndarray:
+def curve(parts: np.ndarray) -> np.ndarray:
     """Losses [J] at limits F that are these parts of the end load."""
-    system = layers(columns, nodes)
+    system = layers()
     return np.array([loss(cycle(system, part * END_LOAD)) for part in parts])
 
 

@@ -1,7 +1,7 @@
 """Two elastic bars collide end to end: longitudinal waves decide how they part.
 
 A bar hits another one of the same section that rests. With equal lengths L they exchange their
-velocities and touch for 2 L / c. A short bar that hits a long one stops, when its wave returns after
+velocities and touch for 2 L / c. A short bar that hits a long one stops as its wave returns, after
 2 L_1 / c, and the long one goes on with a wave in it: the coefficient of restitution of the mean
 velocities is L_1 / L_2, without any loss. A stiff spring between the ends makes all this last a
 little longer, by parts of tau = Z / (2 k) with the impedance Z = E A / c of a bar.
@@ -47,7 +47,7 @@ class Collision:
 
     @property
     def lag(self) -> float:
-        """tau = Z / (2 k) [s]."""
+        """Time constant tau = Z / (2 k) of the force [s]."""
         return IMPEDANCE / (2.0 * self.stiffness)
 
     @cached_property

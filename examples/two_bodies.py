@@ -1,9 +1,9 @@
 """A cylinder on a block, both elastic: Hertz's pressure, and partial slip under a tangential load.
 
 A cylinder of 50 mm is pressed on a block with 1 MN per metre in plane strain, steel on steel and
-steel on aluminium. Then half of the tangential force at which everything would slide moves the steel
-cylinder along the steel block: for equal materials normal and tangential contact are not coupled,
-and a strip of half-width b sqrt(1 - Q/(mu P)) sticks. The gap between both faces is that of their
+steel on aluminium. Then the steel cylinder is moved along the steel block by half of the tangential
+force at which it slides: for equal materials normal and tangential contact are not coupled, and a
+strip of half-width b sqrt(1 - Q/(mu P)) sticks. The gap between both faces is that of their
 meshes.
 
 Usage: python examples/two_bodies.py [OUTPUT_FOLDER] [--quick]

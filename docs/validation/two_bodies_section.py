@@ -34,7 +34,7 @@ strip sticks; for equal materials normal and tangential contact are not coupled.
 
 {comparisons(line)}
 
-![Pressure and shear of a cylinder on a block beside the closed forms](images/validation/two-bodies.png)
+![Pressure and shear between two bodies beside closed forms](images/validation/two-bodies.png)
 
 Two blocks under uniform pressure, without friction (`examples/stacked_blocks.py`): largest error of
 a stress component over the pressure. At mesh nodes of meshes that do not match, the other face is

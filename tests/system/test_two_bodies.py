@@ -1,4 +1,4 @@
-"""Elastic bodies in contact beside closed forms: Hertz, a patch test, waves in bars, slip damping."""
+"""Elastic bodies beside closed forms: Hertz, a patch test, waves in bars, slip damping."""
 
 import clamped_layers
 import colliding_bars
@@ -7,6 +7,8 @@ import pytest
 import stacked_blocks
 import two_bodies
 from two_bodies import ALUMINIUM, STEEL
+
+from fecontact.system.quasistatic.sliders import sliders_of
 
 
 @pytest.mark.parametrize("block", [STEEL, ALUMINIUM], ids=["steel", "aluminium"])
@@ -48,8 +50,8 @@ def test_uniform_pressure_passes_through_both_blocks(above, below, nodes, error)
     upper, lower = (on_nodes[part.nodes[0] : sum(part.nodes)].sum(axis=0) for part in basis.parts)
     assert upper == pytest.approx((0.0, total), abs=1e-12 * total)
     assert lower == pytest.approx(-upper, abs=1e-12 * total)
-    assert on_modes == pytest.approx(
-        np.einsum("nij,ni->j", basis.mode_shapes.shapes, on_nodes), abs=1e-9 * np.abs(on_modes).max())
+    assert on_modes == pytest.approx(np.einsum("nij,ni->j", basis.mode_shapes.shapes, on_nodes),
+                                     abs=1e-9 * np.abs(on_modes).max())
 
 
 @pytest.mark.parametrize("second", [1.0, 2.0])
@@ -108,3 +110,12 @@ def test_the_maximum_of_the_loss_is_where_slip_theory_has_it():
     losses = clamped_layers.slip_theory(limits)
     assert losses.max() == pytest.approx(best, rel=1e-6)
     assert limits[np.argmax(losses)] == pytest.approx(0.375 * P, rel=1e-9)
+
+
+def test_contact_nodes_on_supports_stick_rigidly():
+    """The node at the clamp moves in no mode: its penalty is finite all the same."""
+    system = clamped_layers.layers(10, "all")
+    assert not system.basis.contact_T[0, :2].any()
+    sliders = sliders_of(system, np.inf, None, np.zeros(system.basis.contact_nodes))
+    assert np.isfinite(sliders.stiffness).all()
+    assert (sliders.stiffness > 0.0).all()
