@@ -30,6 +30,13 @@ EXAMPLES = {
                           (r"at (\S+) Hz,", 646.0, 0.1)],
                {"out/squeal_map.png", "out/squeal_modes.png"}),
     # As printed by Sextro: 7.09 and 8.09; the others see the example itself.
+    "disc_and_pads": (("out",), [(r"coefficient of (\S+) on", 0.1988, 2e-4),
+                                 (r"at (\S+) Hz, supercritical", 4688.1, 0.2),
+                                 (r"grows by (\S+) 1/s;", 1012.95, 0.5),
+                                 (r"; a run by (\S+) 1/s", 1012.95, 1.0),
+                                 (r"^limit cycle at (\S+) Hz", 4550.0, 40.0)],
+                      {f"out/{name}.png" for name in ("squeal_of_disc", "contact_of_pad",
+                                                      "disc_and_pad")}),
     "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
                                      (r"fold at B = (\S+)", 0.890687, 1e-4),
                                      (r"doubling at B = (\S+)", 8.092192, 1e-4)],
