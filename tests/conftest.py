@@ -20,7 +20,7 @@ LONG = {
     "test_bernstein",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
     "test_set_valued_beam", "test_friction_oscillator", "test_disc_and_pads",
-    "test_friction_damper",
+    "test_friction_damper", "test_lap_joint",
     "test_sweep", "test_sweep_command", "test_sweep_killed", "test_sweep_strobed",
     "test_sweep_summaries",
     "test_movie", "test_analysis_plots", "test_trust", "test_damaged_files", "test_whole_files",

@@ -40,6 +40,12 @@ EXAMPLES = {
     "friction_damper": (("out",), [(r"^free: .* at (\S+) Hz", 92.80, 0.01),
                                    (r"^stuck: .* at (\S+) Hz", 113.18, 0.02),
                                    (r"^best load (\S+) N", 5.0, 0.5)], {"out/friction_damper.png"}),
+    # Two bolts of 2e8 N/m, shortened by 10 um: at most 4 kN.
+    "lap_joint": (("out",), [(r"^the bolts press with (\S+) N", 3250.0, 2.0),
+                             (r"^stuck: (\S+) Hz", 79.206, 0.01),
+                             (r"^struck, 0.10 mm: (\S+) Hz", 79.206, 0.01),
+                             (r"^struck, 2.01 mm: (\S+) Hz", 78.631, 0.02)],
+                  {"out/lap_joint_loop.png", "out/lap_joint_frequency.png"}),
     "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
                                      (r"fold at B = (\S+)", 0.890687, 1e-4),
                                      (r"doubling at B = (\S+)", 8.092192, 1e-4)],
