@@ -275,6 +275,11 @@ def _joints(
             if owner == name:
                 place = options.get(point) if point in ("B", "C") else known.setdefault(
                     point, point)
+                if _nowhere(place) and _has(body, point):
+                    raise InputError(f"a link names the point '{point}', which is that of no body, "
+                                     f"as several meshes have one; name it, each={{'{name}': "
+                                     f"{{'points': {{'end': '{point}'}}}}}}, and link "
+                                     f"'{name}.end'.")
                 matrix = place_rows(body, point if place is None else place, point).matrix
                 rows.append(matrix if isinstance(link, Weld | Bushing) else matrix[:2])
     return known, rows
