@@ -10,7 +10,7 @@ Usage: python examples/lap_joint.py [FOLDER] [--quick]
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -26,7 +26,8 @@ STIFFNESS, RATIO = 2e9, 0.8  # of the interface [N/m], and that along it over th
 COEFFICIENT, BOLT = 0.3, 2e8  # of friction; stiffness of each bolt [N/m]
 
 
-def joint(shortening: float = 1e-5, component: str = "x", nodes: int = 8) -> fc.ContactSystem:
+def joint(shortening: float = 1e-5, component: Literal["x", "y"] = "x",
+          nodes: int = 8) -> fc.ContactSystem:
     """Two lapped beams and bolts that are tightened by a shortening [m]; loaded at the end."""
     beam = fc.generate(fc.Beam(LENGTH, HEIGHT, 0.5 * HEIGHT))
     start = LENGTH - OVERLAP

@@ -275,7 +275,7 @@ def _joints(
             if owner == name:
                 place = options.get(point) if point in ("B", "C") else known.setdefault(
                     point, point)
-                if _nowhere(place) and _has(body, point):
+                if place is not None and _nowhere(place) and _has(body, point):
                     raise InputError(f"a link names the point '{point}', which is that of no body, "
                                      f"as several meshes have one; name it, each={{'{name}': "
                                      f"{{'points': {{'end': '{point}'}}}}}}, and link "
