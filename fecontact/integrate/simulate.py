@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, ModelWarning
+from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.memory import require_memory
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike
@@ -166,13 +166,27 @@ def _row_size(system: ContactSystem) -> float:
 
 
 def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
-    """Warn of an initial penetration so deep that a wrong unit is likely."""
-    depth = float(system.contact_history(np.array([time]), state[None])[0, :, PENETRATION].max())
-    scale = system.penetration_scale
-    if depth > _DEEP * scale:
-        warnings.warn(f"The initial state is {depth:.3g} m deep in the ground, {depth / scale:.2g} "
+    """Warn of an initial penetration so deep that a wrong unit is likely.
+
+    What loads and bolts press together may be far beyond the scale of its law.
+    """
+    depth, scale = _depth(system, state, time), system.penetration_scale
+    if depth > _DEEP * scale and depth > 10.0 * _depth_at_rest(system, time):
+        where = "the ground" if system.basis.ground_nodes.all() else "the other side"
+        warnings.warn(f"The initial state is {depth:.3g} m deep in {where}, {depth / scale:.2g} "
                       f"times the {scale:.3g} m over which the normal law rises: the body will be "
                       f"thrown off.", stacklevel=3)
+
+
+def _depth(system: ContactSystem, state: Array, time: float) -> float:
+    return float(system.contact_history(np.array([time]), state[None])[0, :, PENETRATION].max())
+
+
+def _depth_at_rest(system: ContactSystem, time: float) -> float:
+    try:
+        return _depth(system, initial_state(system, "rest", time), time)
+    except AnalysisError:
+        return 0.0
 
 
 def require_max_step(max_step: Any) -> None:

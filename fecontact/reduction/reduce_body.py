@@ -275,6 +275,11 @@ def _joints(
             if owner == name:
                 place = options.get(point) if point in ("B", "C") else known.setdefault(
                     point, point)
+                if place is not None and _nowhere(place) and _has(body, point):
+                    raise InputError(f"a link names the point '{point}', which is that of no body, "
+                                     f"as several meshes have one; name it, each={{'{name}': "
+                                     f"{{'points': {{'end': '{point}'}}}}}}, and link "
+                                     f"'{name}.end'.")
                 where = point if place is None or _nowhere(place) else place
                 matrix = place_rows(body, where, point).matrix
                 rows.append(matrix if isinstance(link, Weld | Bushing) else matrix[:2])

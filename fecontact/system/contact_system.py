@@ -359,14 +359,15 @@ class ContactSystem(Summarised):
                   if name.startswith("basis.")}
         if inside:
             changes["basis"] = with_basis_parameters(changes.get("basis", self.basis), inside)
+        inner = {inner_name(name): name for name in changes}
         for name in changes:
             if "." in name and inner_name(name).partition(".")[0] not in PARTS:
                 raise self._unknown(name)
         try:
             return cast("ContactSystem", with_parameters(self, {
-                inner_name(name): value for name, value in changes.items()}))
+                name: changes[given] for name, given in inner.items()}))
         except KeyError as error:
-            raise self._unknown(error.args[0]) from None
+            raise self._unknown(inner.get(error.args[0], error.args[0])) from None
 
     def parameters(self) -> dict[str, Any]:
         """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.

@@ -135,7 +135,8 @@ def _require_joined(
         if basis.rigid_modes and name not in ends and not basis.T[0].any():
             free = np.abs(basis.T[:, :, basis.angular_frequencies == 0.0]).max(axis=(0, 2))
             ways = [way for way, moved in zip(("x", "y", "rotation"), free, strict=True) if moved]
-            raise InputError(f"ContactSystem: body '{name}' is free in {listed(ways)}, but no "
+            how = f" in {listed(ways)}" if ways else ""
+            raise InputError(f"ContactSystem: body '{name}' is free{how}, but no "
                              f"interface and no link touches it; join it to another body, support "
                              f"it, or leave it out.")
 

@@ -7,22 +7,27 @@ from test_events import START, drop
 
 from fecontact import (
     ContactSystem,
+    Interface,
     Load,
     ModelWarning,
+    PointLoad,
     RigidStart,
     Status,
     basis_from_matrices,
     simulate,
     static_equilibrium,
 )
-from fecontact.integrate import CVODE, SetValued, smoothing_cost
+from fecontact.integrate import CVODE, SetValued, initial_state, smoothing_cost
 from fecontact.laws import (
+    Constant,
     ConstantFriction,
     ExponentialFriction,
+    LinearContact,
     NormalLaw,
     RoughSurface,
     normal_law,
 )
+from fecontact.reduction import PointPairing, point_masses
 
 
 def test_cvode_agrees():
@@ -87,6 +92,21 @@ def test_a_deep_start_is_warned_of():
     with pytest.warns(UserWarning, match=r"0\.0033 m deep in the ground"):
         simulate(system, 1e-4, initial=np.array([-1e-3, 0.0, 0.0, 0.0]), outputs=2)
     simulate(system, 1e-4, initial=np.array([-1e-6, 0.0, 0.0, 0.0]), outputs=2)
+
+
+def test_a_start_at_the_depth_of_the_load_is_none_to_warn_of():
+    """A stiff linear contact under a high load is far beyond its scale, the depth under 1 N."""
+    system = ContactSystem(
+        bodies={"block": point_masses({"p": 1.0})},
+        interfaces=[Interface("floor", PointPairing("block", "p"),
+                              LinearContact(1e9), ConstantFriction(0.0))],
+        load=Load(forces=(PointLoad("block.p", "y", signal=Constant(-1000.0)),)))
+    rest = initial_state(system, "rest", 0.0)
+    simulate(system, 1e-6, initial=rest, outputs=2)
+    deep = rest.copy()
+    deep[: system.basis.modes] *= 20.0
+    with pytest.warns(UserWarning, match="deep in the ground"):
+        simulate(system, 1e-6, initial=deep, outputs=2)
 
 
 @normal_law

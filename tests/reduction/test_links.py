@@ -5,6 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 
 from fecontact import (
+    Block,
     ContactSystem,
     ElasticBody,
     InputError,
@@ -13,6 +14,7 @@ from fecontact import (
     Material,
     Mesh,
     basis_from_matrices,
+    generate,
     modal_basis,
     static_equilibrium,
 )
@@ -192,3 +194,15 @@ def test_bad_links_are_named():
     still = basis_from_matrices(np.eye(1), np.eye(1), {"p": np.zeros((3, 1))})
     with pytest.raises(InputError, match="The Hinge between 'p' and the base has no effect"):
         linked(still, [Hinge("p")])
+
+
+def test_links_at_a_point_that_several_meshes_have():
+    """C of all generated shapes is that of none, but may be had by another name."""
+    block = generate(Block(0.1, 0.02, element_size=0.02))
+    bodies = {"base": ElasticBody(block, fixed={"contact": "xy"}),
+              "pad": ElasticBody(block.placed((0.0, 0.02)))}
+    with pytest.raises(InputError, match=r"each={'pad': {'points': {'end': 'C'}}}, and link "):
+        reduce_bodies(bodies, (), [Spring("pad.C", direction=(0, 1), stiffness=1e6)], modes=4)
+    spring = Spring("pad.end", direction=(0, 1), stiffness=1e6)
+    bases = reduce_bodies(bodies, (), [spring], modes=4, each={"pad": {"points": {"end": "C"}}})
+    assert bases["pad"].positions[bases["pad"].point_index("end")] == pytest.approx([0.05, 0.04])

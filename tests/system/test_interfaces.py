@@ -1,5 +1,7 @@
 """Contact systems of several bodies against one body, momentum and closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -243,11 +245,23 @@ def test_bad_input_is_named():
         ContactSystem(a, law)
 
 
+def test_unknown_parameters_are_named_as_they_were_given():
+    touch = Interface("touch", PointPairing("a", "p"), LinearContact(1e5), NO_FRICTION)
+    system = ContactSystem(bodies={"a": mass(1.0)}, interfaces=[touch])
+    for name, meant in (("interfaces.tuch.normal.stiffness", "interfaces.touch.normal.stiffness"),
+                        ("interfaces.touch.normal.stifness", "interfaces.touch.normal.stiffness")):
+        with pytest.raises(InputError, match=f"no parameter '{name}' .did you mean '{meant}'"):
+            system.with_(**{name: 1e6})
+
+
 def test_bodies_that_nothing_holds_are_named():
     law, a, b = LinearContact(1e5), mass(1.0), mass(2.0)
     touch = Interface("touch", PointPairing("a", "p"), law, NO_FRICTION)
     with pytest.raises(InputError, match="body 'b' is free in x, y, but no interface"):
         ContactSystem(bodies={"a": a, "b": b}, interfaces=[touch])
+    unseen = replace(b, T=np.zeros_like(b.T))
+    with pytest.raises(InputError, match="body 'b' is free, but no interface"):
+        ContactSystem(bodies={"a": a, "b": unseen}, interfaces=[touch])
     up = ContactSystem(bodies={"a": a}, interfaces=[touch], load=Load(gravity=(1.0, -9.81)))
     with pytest.raises(AnalysisError, match="nothing holds body 'a' against a translation in x"):
         static_equilibrium(up)
