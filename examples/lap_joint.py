@@ -68,7 +68,7 @@ def struck(system: fc.ContactSystem, amplitude: float) -> tuple[float, float]:
     vibration.
     """
     rest = bolted(system)
-    modes = fc.prestressed_modes(system, rest)
+    modes = fc.analysis.prestressed_modes(system, rest)
     m, basis = system.basis.modes, system.basis
     row = basis.T[basis.point_index("upper.end"), 1]
     shape = modes.right[m : 2 * m, 0].real
@@ -97,7 +97,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     plot_loop(history, path=folder / "lap_joint_loop.png")
 
     across = joint(component="y")
-    stuck = fc.prestressed_modes(across, bolted(across)).frequencies_hz[0]
+    stuck = fc.analysis.prestressed_modes(across, bolted(across)).frequencies_hz[0]
     amplitudes = np.array([0.1e-3, 2e-3] if quick else [0.1e-3, 0.3e-3, 0.5e-3, 0.7e-3, 1e-3,
                                                         1.5e-3, 2e-3, 3e-3])
     found = np.array([struck(across, amplitude) for amplitude in amplitudes])

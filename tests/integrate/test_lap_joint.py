@@ -4,7 +4,8 @@ import lap_joint as example
 import numpy as np
 import pytest
 
-from fecontact import LoadPath, load_history, prestressed_modes
+from fecontact import LoadPath, load_history
+from fecontact.analysis import prestressed_modes
 
 
 @pytest.fixture(scope="module")
