@@ -99,6 +99,17 @@ def as_pair(values: Any, what: str) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
+def as_unit_pair(values: Any, what: str) -> tuple[float, float]:
+    """A direction (x, y) of length one; InputError for one of length zero."""
+    direction = np.array(as_pair(values, what))
+    length = float(np.hypot(*direction))
+    if not 0.0 < length < np.inf:
+        raise InputError(f"{what} = {shown(values)} must be longer than zero.")
+    # What has length one stays the same when it is written to a file and read back.
+    x, y = direction if abs(length - 1.0) <= 1e-12 else direction / length
+    return float(x), float(y)
+
+
 def as_integers(values: Any, what: str) -> Integers:
     """Convert to an array of integers; InputError if a value is not a whole number."""
     found = as_floats(values, what)

@@ -206,3 +206,13 @@ def test_links_at_a_point_that_several_meshes_have():
     spring = Spring("pad.end", direction=(0, 1), stiffness=1e6)
     bases = reduce_bodies(bodies, (), [spring], modes=4, each={"pad": {"points": {"end": "C"}}})
     assert bases["pad"].positions[bases["pad"].point_index("end")] == pytest.approx([0.05, 0.04])
+
+
+def test_directions_stay_the_same_when_written_and_read():
+    rng = np.random.default_rng(0)
+    for pair in rng.normal(size=(200, 2)):
+        once = Spring("a.p", "b.p", stiffness=1.0, direction=tuple(pair)).direction
+        assert np.hypot(*once) == pytest.approx(1.0, abs=1e-15)
+        assert Spring("a.p", "b.p", stiffness=1.0, direction=once).direction == once
+    with pytest.raises(InputError, match=r"Spring: direction = \(0, 0\) must be longer than zero"):
+        Spring("a.p", "b.p", stiffness=1.0, direction=(0, 0))

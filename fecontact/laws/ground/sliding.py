@@ -5,8 +5,8 @@ from typing import Annotated
 
 import numpy as np
 
-from fecontact.core.checks import as_pair, require_kind
-from fecontact.core.errors import InputError, require_finite
+from fecontact.core.checks import as_pair, as_unit_pair, require_kind
+from fecontact.core.errors import require_finite
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.ground.motion import GroundMotion
@@ -41,14 +41,8 @@ class SlidingTranslation:
 
     def __post_init__(self) -> None:
         _check("SlidingTranslation", self.speed, self.motion)
-        x, y = as_pair(self.direction, "SlidingTranslation: direction")
-        length = float(np.hypot(x, y))
-        if not 0.0 < length < np.inf:
-            raise InputError(f"SlidingTranslation: direction = {self.direction!r} must be finite "
-                             f"and longer than zero.")
-        if abs(length - 1.0) > 1e-12:  # written to a file and read back it stays the same
-            x, y = x / length, y / length
-        object.__setattr__(self, "direction", (x, y))
+        object.__setattr__(self, "direction", as_unit_pair(
+            self.direction, "SlidingTranslation: direction"))
 
     def along(self, places: Array, tangents: Array) -> Array:
         """V_tj / V (n,) at places (n, 2) with tangents (n, 2)."""

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, as_pair, require_kind
+from fecontact.core.checks import as_floats, as_unit_pair, require_kind
 from fecontact.core.errors import (
     InputError,
     require_finite,
@@ -73,11 +73,8 @@ class Spring:
         require_not_negative("Spring", stiffness=self.stiffness, damping=self.damping)
         require_finite("Spring", preload=self.preload, shortening=self.shortening)
         if self.direction is not None:
-            x, y = as_pair(self.direction, "Spring: direction")
-            length = float(np.hypot(x, y))
-            if not length > 0.0:
-                raise InputError("Spring: direction = (0, 0) must be longer than zero.")
-            object.__setattr__(self, "direction", (x / length, y / length))
+            object.__setattr__(self, "direction", as_unit_pair(
+                self.direction, "Spring: direction"))
         elif self.second is None:
             raise InputError("Spring: a spring to the base needs direction = (x, y).")
 
