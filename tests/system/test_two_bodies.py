@@ -1,5 +1,7 @@
 """Elastic bodies beside closed forms: Hertz, a patch test, waves in bars, slip damping."""
 
+from dataclasses import replace
+
 import clamped_layers
 import colliding_bars
 import numpy as np
@@ -8,6 +10,8 @@ import stacked_blocks
 import two_bodies
 from two_bodies import ALUMINIUM, STEEL
 
+from fecontact import LoadPath, load_history
+from fecontact.laws import LinearContact
 from fecontact.system.quasistatic.sliders import sliders_of
 
 
@@ -119,3 +123,22 @@ def test_contact_nodes_on_supports_stick_rigidly():
     sliders = sliders_of(system, np.inf, None, np.zeros(system.basis.contact_nodes))
     assert np.isfinite(sliders.stiffness).all()
     assert (sliders.stiffness > 0.0).all()
+
+
+@pytest.mark.parametrize("part", [0.2, 0.3, 0.375])
+def test_stiff_normal_law_between_slender_layers(part):
+    """At every reversal all sliders are at their limits; nothing jumps, and the loss is that of
+    slip theory but for what the normal law gives way."""
+    L, W = clamped_layers.LENGTH, clamped_layers.WIDTH
+    limit = part * clamped_layers.END_LOAD
+    pressure = limit / (clamped_layers.MU * W * clamped_layers.HEIGHT)
+    system = replace(clamped_layers.layers(), normal={"joint": LinearContact(1e10 * L * W)})
+    half = [0.0, 0.5 * clamped_layers.END_LOAD, -0.5 * clamped_layers.END_LOAD,
+            0.5 * clamped_layers.END_LOAD]
+    history = load_history(system, LoadPath(load_scale=pressure, forces=[half, half], steps=10),
+                           tangential_stiffness=1e12 * L * W, rtol=1e-4)
+    assert history.status == "finished"
+    assert history.statistics["jumps"] == 0
+    assert history.statistics["solved"] < 200
+    assert clamped_layers.loss(history) == pytest.approx(
+        float(clamped_layers.slip_theory(limit)), rel=0.012)

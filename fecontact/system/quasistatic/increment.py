@@ -41,10 +41,14 @@ from fecontact.system.kernels import (
 # Out-of-balance force that counts as rounding, relative to the forces that cancel, and the most
 # that is accepted where it falls no further.
 _FINE, _ROUGH = 1e-13, 1e-10
+# Part of the forces themselves that is never accepted, however far springs would have to stretch.
+_WRONG = 1e-6
 # Part of what the displacements of friction springs would do alone that counts among these forces.
 _SPRINGS = 1e-2
-# Newton steps, and shifts tried in each.
-_TRIES, _SHIFTS = 60, 15
+# Newton steps in full, steps that must lead closer to balance, and shifts tried in each of these.
+_HASTY, _TRIES, _SHIFTS = 12, 60, 15
+# Part of the typical stiffness of a mode below which rounding alone resists its motion.
+_LOOSE = 1e-13
 # Repetitions of the augmented Lagrangian, and the part of the force that may change in the last.
 _REPEATS, _SETTLED = 100, 1e-11
 # Columns of `Node`.
@@ -83,9 +87,14 @@ POSE = types.NamedTuple([vector, matrix, matrix, matrix], Pose)
 
 
 class Room(NamedTuple):
-    """Room for Newton's method; ``scale`` (m,) are typical stiffnesses of the modes."""
+    """Room for Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
+
+    ``acting`` (m,) sums the magnitudes of the forces on each mode.
+    """
 
     scale: Array
+    start: Array
+    acting: Array
     residual: Array
     step: Array
     before: Array
@@ -98,7 +107,7 @@ class Room(NamedTuple):
 
 
 ROOM = types.NamedTuple(
-    [vector, vector, vector, vector, matrix, matrix, matrix, matrix, matrix, integers], Room)
+    [vector] * 6 + [matrix] * 5 + [integers], Room)
 
 
 def pose_for(m: int, n: int, sliders: int) -> Pose:
@@ -109,7 +118,7 @@ def pose_for(m: int, n: int, sliders: int) -> Pose:
 
 def room_for(m: int, n: int, sliders: int, scale: Array) -> Room:
     """Room for a body of m modes and n contact nodes."""
-    return Room(np.ascontiguousarray(scale, dtype=float), np.zeros(m), np.zeros(m), np.zeros(m),
+    return Room(np.ascontiguousarray(scale, dtype=float), *np.zeros((5, m)),
                 np.zeros((n, sliders)), np.zeros((n, m)), np.zeros((n, m)), np.zeros((m, m)),
                 np.zeros((3, 4)), np.zeros(m, np.int64))
 
@@ -153,7 +162,7 @@ def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
             total -= part
             size += abs(part)
         residual[i] = total
-        room.before[i] = size
+        room.before[i] = room.acting[i] = size
     for j in range(n):
         x, height = 0.0, 0.0
         for i in range(m):
@@ -178,6 +187,7 @@ def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
             tx, ty = s.Tx[j, i], s.Ty[j, i]
             residual[i] += ty * F - tx * T
             room.before[i] += abs(ty * F) + abs(tx) * rounding
+            room.acting[i] += abs(ty * F) + abs(tx * T)
             if derive:
                 room.along[j, i] = out[1, 0] * tx + out[1, 1] * ty
                 room.away[j, i] = out[0, 0] * tx + out[0, 1] * ty
@@ -200,8 +210,57 @@ def _size(room):
 
 
 @helper
+def _balanced(size, terms, part, room):
+    """Whether an out-of-balance force is rounding, up to a part of the forces that cancel."""
+    acting = 0.0
+    for i in range(len(room.scale)):
+        acting += room.acting[i] ** 2 / room.scale[i]
+    return size <= part * terms and size <= _WRONG * np.sqrt(acting)
+
+
+@helper
+def _step(q, room):
+    """Take the Newton step of the matrix, in place; False where nothing resists some motion."""
+    m = len(q)
+    room.step[:] = room.residual
+    factorise(room.matrix, m, room.pivots)
+    for i in range(m):
+        # The diagonal holds the inverse pivots.
+        if not abs(room.matrix[i, i]) * _LOOSE * room.scale[i] < 1.0:
+            return False
+    solve(room.matrix, room.pivots, room.step)
+    for i in range(m):
+        q[i] += room.step[i]
+    return True
+
+
+@helper
+def _hasty_newton(load, travel, sliders, s, pose, room):
+    """Newton's method in full steps; whether it succeeded, else the pose is as before.
+
+    On its way to the set of sliders that slide, the balance may become worse for a step: at a
+    reversal all of them are at their limits, and rounding decides which of them count as sliding.
+    """
+    q, last = pose.q, np.inf
+    room.start[:] = q
+    for _ in range(_HASTY):
+        terms = _evaluate(load, travel, sliders, s, pose, room, 1)
+        size = _size(room)
+        if _balanced(size, terms, _FINE, room) or (
+                _balanced(size, terms, _ROUGH, room) and size >= 0.5 * last):
+            return True
+        if not np.isfinite(size) or not _step(q, room):
+            break
+        last = size
+    q[:] = room.start
+    return False
+
+
+@helper
 def _newton(load, travel, sliders, s, pose, room):
     """Newton's method with a shift that grows after failed steps; whether it succeeded."""
+    if _hasty_newton(load, travel, sliders, s, pose, room):
+        return True
     m = len(pose.q)
     shift, q = 0.0, pose.q
     for _ in range(_TRIES):
@@ -209,31 +268,30 @@ def _newton(load, travel, sliders, s, pose, room):
         size = _size(room)
         if not np.isfinite(size):
             return False
-        if size <= _FINE * terms:
+        if _balanced(size, terms, _FINE, room):
             return True
         better = False
         # The matrix is factorised in place and made again for another shift.
         for _ in range(_SHIFTS):
-            room.step[:] = room.residual
             for i in range(m):
                 room.matrix[i, i] += shift * room.scale[i]
-            factorise(room.matrix, m, room.pivots)
-            solve(room.matrix, room.pivots, room.step)
-            for i in range(m):
-                q[i] += room.step[i]
+            if not _step(q, room):
+                shift = max(30.0 * shift, 1e-10)
+                _evaluate(load, travel, sliders, s, pose, room, 1)
+                continue
             _evaluate(load, travel, sliders, s, pose, room, 0)
             if _size(room) < size:
                 better = True
                 break
             for i in range(m):
                 q[i] -= room.step[i]
-            if size <= _ROUGH * terms and shift == 0.0:
+            if shift == 0.0 and _balanced(size, terms, _ROUGH, room):
                 break
             shift = max(30.0 * shift, 1e-10)
             _evaluate(load, travel, sliders, s, pose, room, 1)
         if not better:
             _evaluate(load, travel, sliders, s, pose, room, 0)
-            return size <= _ROUGH * terms
+            return _balanced(size, terms, _ROUGH, room)
         shift = 0.0 if shift <= 1e-9 else 0.1 * shift
     return False
 
