@@ -7,13 +7,6 @@ RUNS   := $(VENV)/.compiled-for-runs
 ALL    := $(VENV)/.compiled
 SYSTEM := $(VENV)/.system-libraries
 
-# What tests and benchmarks need compiled, on two cores.
-FIRST  := fecontact.integrate.rodas5p.driver, fecontact.bifurcation.linalg.bordered, \
-  fecontact.bifurcation.linalg.periodic_schur, fecontact.system.quasistatic.march, \
-  fecontact.bifurcation.orbits.branches, fecontact.bifurcation.fields.function_field
-SECOND := fecontact.fem.mesh_files, fecontact.integrate.nonsmooth.driver, \
-  fecontact.integrate.nonsmooth.event_driven, fecontact.integrate.nonsmooth.time_stepping
-
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-slow check bench validation clean
 
@@ -75,14 +68,13 @@ $(READY): pyproject.toml | $(BIN)/python
 
 $(RUNS): | $(READY)
 	@echo "Compiling its kernels for runs"
-	@$(BIN)/python -c 'import fecontact.integrate.rodas5p.driver, fecontact.study.study'
+	@$(BIN)/python .ci/compile runs
 	@touch $@
 
 $(ALL): | $(READY)
 	@echo "Compiling all its kernels, on two cores"
-	@$(BIN)/python -c 'import $(FIRST)' & first=$$!; \
-	  $(BIN)/python -c 'import $(SECOND)' && wait $$first
-	@$(BIN)/python -c 'import fecontact.study.study'
+	@$(BIN)/python .ci/compile first & first=$$!; \
+	  $(BIN)/python .ci/compile second && wait $$first
 	@touch $@ $(RUNS)
 
 $(SYSTEM): .ci/system-libraries fecontact/core/system_libraries.py | $(BIN)/python
