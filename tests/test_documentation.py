@@ -268,13 +268,20 @@ TABLES = [(page, text) for page in PAGES for text in blocks(page, "toml")]
                          ids=[f"{page}-{number}" for number, (page, _) in enumerate(TABLES)])
 def test_tables_of_the_pages_are_understood(page, text):
     shape = '[geometry]\nshape = "beam"\n'
-    study = Study.from_toml(text if "[geometry]" in text else text + shape, "study.toml")
+    whole = "geometry]" in text
+    study = Study.from_toml(text if whole else text + shape, "study.toml")
     given = tomllib.loads(text)
     written = study.tables()
     for section, keys in given.items():
         for key, value in keys.items():
             if not isinstance(value, dict | list):
                 assert written[section][key] == value
+    for name, sections in given.get("bodies", {}).items():
+        assert study.bodies[name].geometry is not None
+        for section, keys in sections.items():
+            for key, value in keys.items():
+                if not isinstance(value, dict | list):
+                    assert written["bodies"][name][section][key] == value
 
 
 COMMAND_LINES = [(page, line) for page, text in TEXTS.items()
