@@ -292,6 +292,12 @@ class Study(Summarised, StudyModels):
         tables = self.tables(defaults=False)
         for name, value in changes.items():
             *sections, key = name.split(".")
+            if self.bodies and len(sections) > 1 and sections[0] == "interfaces" and (
+                    sections[1] not in self.interfaces
+                    and f"interfaces.{sections[1]}.face" not in changes):
+                raise InputError(f"{self.title}: {name} names the interface '{sections[1]}'"
+                                 f"{nearest(sections[1], self.interfaces)}; there are: "
+                                 f"{choices(self.interfaces)}.")
             table: Any = tables
             for depth, section in enumerate(sections, 1):
                 if isinstance(table, list):

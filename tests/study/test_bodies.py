@@ -364,3 +364,9 @@ def test_what_slides_is_the_other_face_however_fine(study):
     with pytest.raises(fc.InputError, match="'lining': sliding is that of the other side, but"):
         fc.Interface("lining", pairing, RoughSurface(2e7, 1e-5), ConstantFriction(0.4),
                      SlidingTranslation(0.3))
+
+
+def test_changes_of_unknown_interfaces_name_the_nearest(study):
+    name = "interfaces.linng.friction.friction_coefficient"
+    with pytest.raises(fc.InputError, match=r"interface 'linng' .*'lining'.*; there are: 'l"):
+        study.with_(**{name: 0.5})
