@@ -161,7 +161,7 @@ def test_derivatives_to_the_state_and_to_each_speed(friction):
 
 def test_quasi_static_travel_is_that_of_the_side_that_slides():
     """A mass dragged along a leaning side as along the ground; the travel's work too."""
-    angle, path = 0.7, LoadPath(travel=(0.0, 2e-3, -1e-3), steps=40)
+    angle, path = 0.7, LoadPath(travel=(0.0, 2e-3, -1e-3, 2e-3), steps=40)
     side = ContactSystem(
         bodies={"b": oscillator(angle), "wall": wall()},
         interfaces=[Interface("side", PointPairing(
@@ -175,6 +175,11 @@ def test_quasi_static_travel_is_that_of_the_side_that_slides():
     assert found.friction_force == pytest.approx(belt.friction_force, abs=1e-9 * 80.0)
     assert found.loss[-1] == pytest.approx(belt.loss[-1], rel=1e-9)
     assert found.work[-1] == pytest.approx(belt.work[-1], rel=1e-9)
+    # The loop of the travel encloses what the cycle loses.
+    cycle = found.loop(1, 3, action="travel")
+    lost = found.loss[found.row(3)] - found.loss[found.row(1)]
+    assert lost > 0.05
+    assert cycle.area == pytest.approx(lost, rel=1e-3)
     both = together(SlidingTranslation(0.0, along(angle)), Ground())
     with pytest.raises(InputError, match="travel moves one side, but the system has the ground, "):
         load_history(both, path, tangential_ratio=0.5)
