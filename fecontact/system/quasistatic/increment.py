@@ -118,7 +118,8 @@ def pose_for(m: int, n: int, sliders: int) -> Pose:
 
 def room_for(m: int, n: int, sliders: int, scale: Array) -> Room:
     """Room for a body of m modes and n contact nodes."""
-    return Room(np.ascontiguousarray(scale, dtype=float), *np.zeros((5, m)),
+    start, acting, residual, step, before = np.zeros((5, m))
+    return Room(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step, before,
                 np.zeros((n, sliders)), np.zeros((n, m)), np.zeros((n, m)), np.zeros((m, m)),
                 np.zeros((3, 4)), np.zeros(m, np.int64))
 
