@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fecontact.core.compiled import borrowed
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p.blocks import Blocks, blocks_of
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
 
@@ -44,28 +45,30 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     """Compiled ``rate(t, y, out)`` and ``jacobian(t, y, out)``, and what must outlive them."""
     arrays = problem.system.arrays
     n, m = arrays.Tx.shape
-    room = {"shapes": np.vstack([arrays.Tx, arrays.Ty]).T.copy(), "given": np.zeros(dynamics.GIVEN),
-            "pull": np.zeros(m), "nodes": np.zeros((3, 2 * n))}
+    room = {"given": np.zeros(dynamics.GIVEN), "pull": np.zeros(m),
+            "nodes": np.zeros((3, 2 * n))}
     scratch = run_arrays.gradients_for(n, problem.system.memory)
     held = {**room, **{f"g{k}": item for k, item in enumerate(scratch)},
+            **{f"b{k}": item for k, item in enumerate(blocks_of(problem.system.basis, arrays))},
             **{f"s{k}": item for k, item in enumerate(arrays) if isinstance(item, np.ndarray)}}
     lines = [f"    {name} = carray(pointer({item.ctypes.data}), {item.shape}, "
              f"{'i8' if item.dtype == np.int64 else 'f8'})" for name, item in held.items()]
     system = ", ".join(f"s{k}" if isinstance(item, np.ndarray) else str(int(item))
                        for k, item in enumerate(arrays))
+    blocks = ", ".join(f"b{k}" for k in range(len(Blocks._fields)))
     source = "\n".join([
         "def rate(t, y, out):", *lines,
         f"    s = System({system})",
         "    set_given(t, s, given, pull)",
-        "    set_rate(borrowed(y), s, shapes, given, pull, nodes, Gradients(g0, g1, g2), "
-        "borrowed(out))",
+        f"    set_rate(borrowed(y), s, Blocks({blocks}), given, pull, nodes, "
+        "Gradients(g0, g1, g2), borrowed(out))",
         "def jacobian(t, y, out):", *lines,
         f"    fill(t, y, System({system}), out)",
     ])
     space: dict[str, Any] = {
         "carray": carray, "f8": np.float64, "i8": np.int64, "pointer": _pointer,
         "borrowed": borrowed, "set_given": dynamics.set_given, "set_rate": dynamics.set_rate,
-        "System": kernels.SystemArrays, "Gradients": dynamics.Gradients,
+        "System": kernels.SystemArrays, "Blocks": Blocks, "Gradients": dynamics.Gradients,
         "fill": contact_jacobian.jacobian}
     exec(source, space)
     options = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}

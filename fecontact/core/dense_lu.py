@@ -9,6 +9,8 @@ eliminated. The factors of the rows take the place of these, and the inverse piv
 diagonal.
 """
 
+import numpy as np
+
 from fecontact.core.compiled import helper
 
 
@@ -109,3 +111,70 @@ def reduce_row(a, count, row, weights):
         weights[k] = factor
         for c in range(k + 1, columns):
             row[c] -= factor * a[k, c]
+
+
+@helper
+def factorise_within(a, reach, starts, pivots):
+    """As :func:`factorise` for a (k, k) whose columns and rows end early.
+
+    ``reach`` (2, k) holds the ends of the columns, which must not descend, and of the rows with
+    fill-in: a row ends where the rows that may be its pivot row end. ``starts`` (k,) is filled with
+    the first column of the factors of each row, for :func:`solve_within`.
+    """
+    count = len(pivots)
+    known = 0
+    for k in range(count):
+        end, until = reach[0, k], reach[1, k]
+        for i in range(known, end):
+            starts[i] = k
+        known = end
+        row, largest = k, abs(a[k, k])
+        for i in range(k + 1, end):
+            if abs(a[i, k]) > largest:
+                row, largest = i, abs(a[i, k])
+        pivots[k] = row
+        if row != k:
+            for c in range(min(starts[k], starts[row]), until):
+                a[k, c], a[row, c] = a[row, c], a[k, c]
+            starts[k], starts[row] = starts[row], starts[k]
+        inverse = 1.0 / a[k, k]
+        a[k, k] = inverse
+        # Four rows at a time: the pivot row is read a quarter as often.
+        i = k + 1
+        while i + 3 < end:
+            f0, f1 = a[i, k] * inverse, a[i + 1, k] * inverse
+            f2, f3 = a[i + 2, k] * inverse, a[i + 3, k] * inverse
+            a[i, k], a[i + 1, k], a[i + 2, k], a[i + 3, k] = f0, f1, f2, f3
+            for c in range(k + 1, until):
+                pivot = a[k, c]
+                a[i, c] -= f0 * pivot
+                a[i + 1, c] -= f1 * pivot
+                a[i + 2, c] -= f2 * pivot
+                a[i + 3, c] -= f3 * pivot
+            i += 4
+        while i < end:
+            factor = a[i, k] * inverse
+            a[i, k] = factor
+            for c in range(k + 1, until):
+                a[i, c] -= factor * a[k, c]
+            i += 1
+
+
+@helper
+def solve_within(a, reach, starts, pivots, x):
+    """Replace the right side x (k,) by the solution; see :func:`factorise_within`."""
+    count = len(pivots)
+    for k in range(count):
+        row = pivots[k]
+        x[k], x[row] = x[row], x[k]
+    for i in range(1, count):
+        total = x[i]
+        # Unsigned: loops over indices that might be negative are not vectorised.
+        for k in range(np.uint64(starts[i]), np.uint64(i)):
+            total -= a[i, k] * x[k]
+        x[i] = total
+    for k in range(count - 1, -1, -1):
+        total = x[k]
+        for c in range(k + 1, reach[1, k]):
+            total -= a[k, c] * x[c]
+        x[k] = total * a[k, k]

@@ -22,6 +22,7 @@ from fecontact.core.types import Array
 from fecontact.integrate import bernstein
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import tableau
+from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import ground_at, signal_at
 
 # Entries of Control.ground: bounds of the ground.
@@ -66,36 +67,36 @@ class Course(NamedTuple):
 
 
 @helper
-def _project(shapes, v, columns, out):
+def _project(blocks, v, columns, out):
     """Fill out with velocities along and displacements away from the ground, then along it."""
-    m, rows = shapes.shape
+    m, rows = blocks.shapes.shape
     n = rows // 2
-    for j in range(n):
-        out[j] = shapes[0, j] * v[m]
-        out[n + j] = shapes[0, n + j] * v[0]
-    i = 1
-    while i + 3 < m:
-        for j in range(n):
-            out[j] += (shapes[i, j] * v[m + i] + shapes[i + 1, j] * v[m + i + 1]
-                       + shapes[i + 2, j] * v[m + i + 2] + shapes[i + 3, j] * v[m + i + 3])
-            out[n + j] += (shapes[i, n + j] * v[i] + shapes[i + 1, n + j] * v[i + 1]
-                           + shapes[i + 2, n + j] * v[i + 2] + shapes[i + 3, n + j] * v[i + 3])
-        i += 4
-    while i < m:
-        for j in range(n):
-            out[j] += shapes[i, j] * v[m + i]
-            out[n + j] += shapes[i, n + j] * v[i]
-        i += 1
-    if columns == 3 * n:
-        for j in range(n):
-            out[2 * n + j] = 0.0
-        for i in range(m):
-            for j in range(n):
-                out[2 * n + j] += shapes[i, j] * v[i]
+    along, away = blocks.shapes[:, :n], blocks.shapes[:, n:]
+    slip, height, place = out[:n], out[n : 2 * n], out[2 * n :]
+    for j in range(columns):
+        out[j] = 0.0
+    for part in range(len(blocks.parts)):
+        i, end, left, right = block_at(blocks.parts, part)
+        if columns == 3 * n:
+            for k in range(i, end):
+                for j in range(left, right):
+                    place[j] += along[k, j] * v[k]
+        while i + 3 < end:
+            for j in range(left, right):
+                slip[j] += (along[i, j] * v[m + i] + along[i + 1, j] * v[m + i + 1]
+                            + along[i + 2, j] * v[m + i + 2] + along[i + 3, j] * v[m + i + 3])
+                height[j] += (away[i, j] * v[i] + away[i + 1, j] * v[i + 1]
+                              + away[i + 2, j] * v[i + 2] + away[i + 3, j] * v[i + 3])
+            i += 4
+        while i < end:
+            for j in range(left, right):
+                slip[j] += along[i, j] * v[m + i]
+                height[j] += away[i, j] * v[i]
+            i += 1
 
 
 @helper
-def set_courses(s, shapes, bounds, before, after, room):
+def set_courses(s, blocks, bounds, before, after, room):
     """Fill ``room.courses`` (6, 2 n or 3 n) with the coefficients over a step.
 
     Velocities of the nodes along the ground, heights with their gap, and where the ground is not
@@ -103,12 +104,12 @@ def set_courses(s, shapes, bounds, before, after, room):
     :func:`fecontact.integrate.rodas5p.dynamics.project` says of the end.
     """
     out, inner = room.courses, room.inner
-    n = shapes.shape[1] // 2
+    n = len(s.gap)
     columns = 2 * n if bounds[STEEPEST] == 0.0 else 3 * n
     tableau.inner_coefficients(before, after, room.dense, inner)
-    _project(shapes, before, columns, out[0])
+    _project(blocks, before, columns, out[0])
     for k in range(3):
-        _project(shapes, inner[k], columns, out[1 + k])
+        _project(blocks, inner[k], columns, out[1 + k])
     for j in range(n):
         out[4, j] = room.nodes[1, j]
         out[4, n + j] = room.nodes[0, n + j]
@@ -121,10 +122,10 @@ def set_courses(s, shapes, bounds, before, after, room):
 
 
 @helper
-def set_ends(t, y, s, shapes, bounds, ends):
+def set_ends(t, y, s, blocks, bounds, ends):
     """Fill ``ends`` (3, 2 n) with displacements and velocities of the nodes, and heights below."""
     n = len(s.gap)
-    motion.project(shapes, y, ends[0], ends[1])
+    motion.project(blocks, y, ends[0], ends[1])
     travel = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[0]
     _set_heights(travel, s, bounds, ends[0], ends[2, :n])
 
@@ -152,15 +153,15 @@ def keep_ends(n, room):
 
 
 @helper
-def restless(speed, h, s, shapes, control, room):
+def restless(speed, h, s, blocks, control, room):
     """Whether :func:`doubtful` may be true.
 
     ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
     end; ``speed`` is that of the ground at the start.
     """
     if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
-        return _restless_nodes(speed, h, s, shapes, control, room)
-    return _restless_modes(speed, h, s, control, room)
+        return _restless_nodes(speed, h, s, blocks, control, room)
+    return _restless_modes(speed, h, s, blocks, control, room)
 
 
 @helper
@@ -174,23 +175,25 @@ def _range(first, last, k1, k2, k3):
 
 
 @helper
-def _restless_nodes(speed, h, s, shapes, control, room):
+def _restless_nodes(speed, h, s, blocks, control, room):
     """As :func:`doubtful`, without slip velocities of nodes clear of the ground."""
     levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
+    shapes = blocks.shapes
     n, m = len(s.gap), len(control.largest)
     some = False
     for j in range(n):
         spread = abs(s.sliding[j]) * control.ground[QUICKEST] * h
         passing = s.sliding[j] * speed
         k1, k2, k3, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(m):
-            along, away = shapes[i, j], shapes[i, n + j]
-            k1 += away * dense[0, i]
-            k2 += away * dense[1, i]
-            k3 += away * dense[2, i]
-            r1 += along * dense[0, m + i]
-            r2 += along * dense[1, m + i]
-            r3 += along * dense[2, m + i]
+        for span in range(blocks.spans.shape[1]):
+            for i in range(blocks.spans[j, span, 0], blocks.spans[j, span, 1]):
+                along, away = shapes[i, j], shapes[i, n + j]
+                k1 += away * dense[0, i]
+                k2 += away * dense[1, i]
+                k3 += away * dense[2, i]
+                r1 += along * dense[0, m + i]
+                r2 += along * dense[1, m + i]
+                r3 += along * dense[2, m + i]
         first, last = ends[0, n + j], nodes[0, n + j]
         low, high, monotone = _range(first, last, k1, k2, k3)
         touching = nodes[2, n + j] != 0.0
@@ -210,22 +213,30 @@ def _restless_nodes(speed, h, s, shapes, control, room):
 
 
 @helper
-def _restless_modes(speed, h, s, control, room):
+def _restless_modes(speed, h, s, blocks, control, room):
     """The same for many nodes, from the modes only."""
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
     n, m = len(s.gap), len(control.largest)
-    move, quicken = 0.0, 0.0
+    # Sums over the modes before each one.
+    moves, speeds = room.inner[0], room.inner[1]
+    moves[0], speeds[0] = 0.0, 0.0
     for i in range(m):
         largest = control.largest[i]
-        move += largest * _departure(dense[0, i], dense[1, i], dense[2, i])
-        quicken += largest * _departure(dense[0, m + i], dense[1, m + i], dense[2, m + i])
+        moves[i + 1] = moves[i] + largest * _departure(dense[0, i], dense[1, i], dense[2, i])
+        speeds[i + 1] = speeds[i] + largest * _departure(
+            dense[0, m + i], dense[1, m + i], dense[2, m + i])
     wavy = bounds[STEEPEST] != 0.0
     if wavy:
         _set_heights(room.given[motion.TRAVEL], s, bounds, nodes[0], ends[2, n:])
     later = room.given[motion.SPEED]
     some = False
     for j in range(n):
+        move, quicken = 0.0, 0.0
+        for span in range(blocks.spans.shape[1]):
+            first_mode, last_mode = blocks.spans[j, span, 0], blocks.spans[j, span, 1]
+            move += moves[last_mode] - moves[first_mode]
+            quicken += speeds[last_mode] - speeds[first_mode]
         reach = move
         f, g = bounds[HIGHEST], bounds[HIGHEST]
         if wavy:

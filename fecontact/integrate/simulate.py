@@ -17,8 +17,9 @@ from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.solvers import RODAS5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import PENETRATION, POWERS
+from fecontact.system.kernels import PENETRATION
 from fecontact.system.model_limits import warn_of_limits
+from fecontact.system.powers import POWERS
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 

@@ -17,6 +17,7 @@ from fecontact.integrate.events import Events
 from fecontact.laws.wear import WearLaw
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.powers import POWERS
 
 
 class Status(Enum):
@@ -137,7 +138,7 @@ class Solution:
     states : (N, 2 m + n s) array
         y = [q, q', z].
     work : (N, p) array
-        Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
+        Integrals of the powers :data:`fecontact.system.powers.POWERS` from the first time
         [J]. Energy lost in impacts on rigid stops is part of ``contact_damping``.
     status : Status
         How the run ended.
@@ -177,7 +178,7 @@ class Trajectory(Summarised):
     modal_coordinates, modal_velocities : (N, m) arrays
         q and q'.
     work : (N, p) array
-        Integrals of the powers :data:`fecontact.system.kernels.POWERS` from the first time
+        Integrals of the powers :data:`fecontact.system.powers.POWERS` from the first time
         [J].
     status : Status
         How the run ended.
@@ -434,7 +435,7 @@ class Trajectory(Summarised):
             ends = motion.history(t)[:, 0]
             spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
         bristles = self._bristles[0].sum(axis=1)
-        put = dict(zip(kernels.POWERS, self.work.T, strict=True))
+        put = dict(zip(POWERS, self.work.T, strict=True))
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
             elastic=0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1),

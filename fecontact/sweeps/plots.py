@@ -11,12 +11,12 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.plots.style import COLOURS, distinct_colours
 from fecontact.study.study import Study
 from fecontact.sweeps.statistics import SobolIndices
 from fecontact.sweeps.summaries import unit_of
 from fecontact.sweeps.table import SweepTable, is_numeric
-from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,7 +21,7 @@ from fecontact.core.types import Array
 from fecontact.core.user_code import user_function
 from fecontact.integrate.trajectory import ContactState, Trajectory
 from fecontact.laws.wear import WearLaw
-from fecontact.system.kernels import POWERS
+from fecontact.system.powers import POWERS
 
 Point = str | int
 # Where a study gives what some summaries need.

@@ -12,8 +12,8 @@ from fecontact.system.kernels import (
     memory_of,
     node_forces,
     node_motion,
-    storing_power,
 )
+from fecontact.system.powers import storing_power
 
 
 @kernel(types.void(vector, matrix, SYSTEM, block))

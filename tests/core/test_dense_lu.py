@@ -49,3 +49,29 @@ def test_elimination_of_the_first_columns():
     assert known == pytest.approx(x, rel=1e-11)
     assert a[3:, 3:] @ x[3:] == pytest.approx(reduced[3:], rel=1e-11)
     assert further[3:] @ x[3:] == pytest.approx(row @ x - weights @ reduced[:3], rel=1e-11)
+
+
+@njit
+def _banded(a, reach, starts, pivots, x):
+    dense_lu.factorise_within(a, reach, starts, pivots)
+    dense_lu.solve_within(a, reach, starts, pivots, x)
+
+
+@pytest.mark.parametrize("sizes", [(1,), (7,), (1, 1, 1, 1, 1), (3, 5, 2, 6), (6, 1, 6, 1, 6)])
+def test_rows_that_end_early_are_solved_as_by_lapack(sizes):
+    """Block-tridiagonal matrices whose diagonal is zero, so that pivots fill their rows."""
+    rng = np.random.default_rng(len(sizes))
+    block = np.repeat(np.arange(len(sizes)), sizes)
+    a = rng.standard_normal((len(block),) * 2) * 10.0 ** rng.integers(-3, 4, (len(block), 1))
+    a[np.abs(block[:, None] - block) > 1] = 0.0
+    if len(block) > 5:
+        np.fill_diagonal(a, 0.0)
+    ends = np.cumsum(sizes)
+    column = ends[np.minimum(block + 1, len(sizes) - 1)]
+    reach = np.array([column, column[column - 1]])
+    x = rng.standard_normal(len(block))
+    wanted, factors = np.linalg.solve(a, x), a.copy()
+    _banded(factors, reach, np.zeros(len(block), np.int64), np.zeros(len(block), np.int64), x)
+    assert x == pytest.approx(wanted, rel=1e-8, abs=1e-12 * np.abs(wanted).max())
+    beyond = np.arange(len(block)) >= reach[1][:, None]
+    assert not factors[beyond].any()

@@ -23,7 +23,7 @@ from fecontact.laws import (
     LinearContact,
     RoughSurface,
 )
-from fecontact.system.kernels import CONTACT_DAMPING
+from fecontact.system.powers import CONTACT_DAMPING
 
 SPEEDS = slice(3, 6)
 

@@ -32,7 +32,7 @@ from fecontact.laws import (
     Pulse,
     RoughSurface,
 )
-from fecontact.system.kernels import FRICTION, POWERS
+from fecontact.system.powers import FRICTION, POWERS
 
 
 def run_of(system, state, times, rtol=1e-7, work=True):

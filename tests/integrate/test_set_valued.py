@@ -30,7 +30,7 @@ from fecontact.laws import (
     RoughSurface,
     SpeedRamp,
 )
-from fecontact.system.kernels import CONTACT_DAMPING, FRICTION, LOAD
+from fecontact.system.powers import CONTACT_DAMPING, FRICTION, LOAD
 
 BOTH = pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
     ("events", 1e-11, 1e-11), ("stepping", 1e-6, 2e-6)])

@@ -13,6 +13,7 @@ from fecontact.integrate import Energies
 from fecontact.output.plots import run as plots
 from fecontact.plot import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
 from fecontact.system import kernels as kernels
+from fecontact.system import powers
 
 
 def labels(figure):
@@ -175,15 +176,15 @@ def test_contact_map_without_friction_shows_contact():
 
 def test_energies_leave_out_what_is_zero():
     trajectory = run(times=101)
-    work = np.zeros((101, len(kernels.POWERS)))
-    work[:, kernels.FRICTION] = 1e-3 * np.linspace(0.0, 1.0, 101)
+    work = np.zeros((101, len(powers.POWERS)))
+    work[:, powers.FRICTION] = 1e-3 * np.linspace(0.0, 1.0, 101)
     figure = plot_energies(replace(trajectory, work=work))
     assert labels(figure) == ["stored energy [mJ]", "work put in [J]", "energy lost [mJ]"]
     shown = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
     assert shown == [["kinetic", "elastic", "contact", "total"], ["total"], ["friction", "total"]]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(),
                                1e3 * trajectory.energies.kinetic)
-    np.testing.assert_allclose(figure.axes[2].lines[0].get_ydata(), 1e3 * work[:, kernels.FRICTION])
+    np.testing.assert_allclose(figure.axes[2].lines[0].get_ydata(), 1e3 * work[:, powers.FRICTION])
 
 
 def test_modes_are_titled_by_their_frequencies():

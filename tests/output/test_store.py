@@ -16,7 +16,7 @@ from fecontact.output.files import case as store
 from fecontact.output.files import pvd
 from fecontact.output.files.frames import frame_indices, von_mises
 from fecontact.reduction import ModeShapes
-from fecontact.system.kernels import POWERS
+from fecontact.system.powers import POWERS
 
 LENGTH, HEIGHT = 0.2, 0.02
 

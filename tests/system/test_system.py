@@ -21,7 +21,7 @@ from fecontact import (
 from fecontact.integrate import initial_state
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.system import kernels as kernels
-from fecontact.system.kernels import POWERS, powers
+from fecontact.system.powers import POWERS, powers
 
 R = 10e-6
 

@@ -22,8 +22,8 @@ from fecontact.integrate.rodas5p.event_kernels import FOUND
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import POWER_COUNT
 from fecontact.system.loads import work_of_loads
+from fecontact.system.powers import POWER_COUNT
 
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8

@@ -42,18 +42,20 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.laws.signatures import friction_at, normal_at, signal_at
 from fecontact.system.kernels import (
+    body_acceleration,
+    given_at,
+    node_contact,
+    node_motion,
+    pressing_force,
+)
+from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
     CONTACT_DAMPING,
     FRICTION,
     POWER_COUNT,
     belt_normal_power,
-    body_acceleration,
     body_powers,
-    given_at,
-    node_contact,
-    node_motion,
-    pressing_force,
 )
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.

@@ -53,7 +53,7 @@ from fecontact.integrate.nonsmooth.rigid_stops import (
 )
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
 from fecontact.integrate.rodas5p.event_kernels import WATCH
-from fecontact.system.kernels import DRIVE, drive_jump
+from fecontact.system.powers import DRIVE, drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
 EARLY = 0.25

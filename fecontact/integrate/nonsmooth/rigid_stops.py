@@ -60,14 +60,14 @@ from fecontact.integrate.nonsmooth.problem import (
     STICK,
     WORKSPACE,
 )
-from fecontact.system.kernels import (
+from fecontact.system.kernels import ground_motion
+from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
     CONTACT_DAMPING,
     FRICTION,
     POWER_COUNT,
     belt_normal_power,
-    ground_motion,
 )
 
 # What is returned in place of a time of flight.

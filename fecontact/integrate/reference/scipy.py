@@ -9,8 +9,9 @@ import numpy as np
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import NODE_POWERS, POWERS, powers, right_hand_side
+from fecontact.system.kernels import right_hand_side
 from fecontact.system.loads import work_of_loads
+from fecontact.system.powers import NODE_POWERS, POWERS, powers
 
 
 def integrate(

@@ -13,6 +13,7 @@ from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.reference.scipy import energy_scale
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
+from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.run import Run
@@ -21,7 +22,7 @@ from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import NODE_POWERS, POWER_COUNT
+from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.
@@ -116,7 +117,7 @@ def start(
     first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * longest)
     return Run(
-        Problem(system.arrays, np.vstack([system.arrays.Tx, system.arrays.Ty]).T.copy(), control),
+        Problem(system.arrays, blocks_of(basis, system.arrays), control),
         progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),

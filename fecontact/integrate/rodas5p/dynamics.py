@@ -1,7 +1,7 @@
 """Accelerations of the reduced system, and their derivatives, for the time integrator.
 
-The same equations as :mod:`fecontact.system.kernels`, laid out for speed: rows Tx, Ty of all
-nodes side by side in ``shapes`` (m, 2 n), so that sums over nodes vectorise.
+The same equations as :mod:`fecontact.system.kernels`, laid out for speed, by the blocks of
+:mod:`fecontact.integrate.rodas5p.blocks`.
 """
 
 import math
@@ -11,6 +11,7 @@ from numba import types
 
 from fecontact.core.compiled import block, helper, matrix
 from fecontact.core.types import Array
+from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system import kernels as kernels
 
@@ -55,48 +56,78 @@ def motion_of(j, w):
 
 
 @helper
-def project(shapes, y, places, speeds):
+def project(blocks, y, places, speeds):
     """Fill displacements and velocities (2 n,), all x, then all y, of the contact nodes."""
+    shapes = blocks.shapes
     m, rows = shapes.shape
     for j in range(rows):
-        places[j] = shapes[0, j] * y[0]
-        speeds[j] = shapes[0, j] * y[m]
-    i = 1
-    while i + 3 < m:
-        for j in range(rows):
-            a, b, c, d = shapes[i, j], shapes[i + 1, j], shapes[i + 2, j], shapes[i + 3, j]
-            places[j] += a * y[i] + b * y[i + 1] + c * y[i + 2] + d * y[i + 3]
-            speeds[j] += (a * y[m + i] + b * y[m + i + 1] + c * y[m + i + 2] + d * y[m + i + 3])
-        i += 4
-    while i < m:
-        for j in range(rows):
-            places[j] += shapes[i, j] * y[i]
-            speeds[j] += shapes[i, j] * y[m + i]
-        i += 1
+        places[j] = 0.0
+        speeds[j] = 0.0
+    for tile in range(len(blocks.tiles)):
+        i, end, left, right = block_at(blocks.tiles, tile)
+        while i + 3 < end:
+            for j in range(left, right):
+                a, b, c, d = shapes[i, j], shapes[i + 1, j], shapes[i + 2, j], shapes[i + 3, j]
+                places[j] += a * y[i] + b * y[i + 1] + c * y[i + 2] + d * y[i + 3]
+                speeds[j] += (a * y[m + i] + b * y[m + i + 1] + c * y[m + i + 2]
+                              + d * y[m + i + 3])
+            i += 4
+        while i < end:
+            for j in range(left, right):
+                places[j] += shapes[i, j] * y[i]
+                speeds[j] += shapes[i, j] * y[m + i]
+            i += 1
 
 
 @helper
-def gather(y, s, shapes, load, forces, rate):
+def moved_by(blocks, column, q):
+    """Motion of a node, along it in column j, away from it in n + j, by modal coordinates q."""
+    n = len(blocks.spans)
+    j = column if column < n else column - n
+    total = 0.0
+    for span in range(blocks.spans.shape[1]):
+        for i in range(blocks.spans[j, span, 0], blocks.spans[j, span, 1]):
+            total += blocks.shapes[i, column] * q[i]
+    return total
+
+
+@helper
+def push(blocks, forces, out):
+    """Add to ``out`` (m,) the modal forces of the node forces (2 n,), all -T, then all F."""
+    for tile in range(len(blocks.tiles)):
+        top, bottom, left, right = block_at(blocks.tiles, tile)
+        for i in range(top, bottom):
+            total = 0.0
+            for j in range(left, right):
+                total += blocks.shapes[i, j] * forces[j]
+            out[i] += total
+
+
+@helper
+def gather(y, s, blocks, load, forces, rate):
     """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -T, then all F."""
-    m, rows = shapes.shape
+    m = len(load)
+    v = y[m : 2 * m]
     for i in range(m):
-        total = load[i]
-        for k in range(m):
-            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
-        for j in range(rows):
-            total += shapes[i, j] * forces[j]
-        rate[i] = y[m + i]
-        rate[m + i] = total
+        rate[i] = v[i]
+        rate[m + i] = load[i]
+    for part in range(len(blocks.own)):
+        top, bottom, left, right = block_at(blocks.own, part)
+        for i in range(top, bottom):
+            total = 0.0
+            for k in range(left, right):
+                total += s.stiffness[i, k] * y[k] + s.damping[i, k] * v[k]
+            rate[m + i] -= total
+    push(blocks, forces, rate[m : 2 * m])
 
 
 @helper
-def set_rate(y, s, shapes, given, load, w, scratch, rate):
+def set_rate(y, s, blocks, given, load, w, scratch, rate):
     """Fill ``rate`` (size,) with y'. ``w`` (3, 2 n) and ``scratch`` are room to work in."""
-    m, rows = shapes.shape
-    n = rows // 2
+    m, n = len(load), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
-    project(shapes, y, w[0], w[1])
+    project(blocks, y, w[0], w[1])
     moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
     force, rates = scratch.force[0], scratch.rates[0]
     for j in range(n):
@@ -107,17 +138,16 @@ def set_rate(y, s, shapes, given, load, w, scratch, rate):
         forces[n + j] = F
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
-    gather(y, s, shapes, load, forces, rate)
+    gather(y, s, blocks, load, forces, rate)
 
 
 @helper
-def set_rate_and_gradients(y, s, shapes, given, load, w, out, rate):
+def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
-    m, rows = shapes.shape
-    n = rows // 2
+    m, n = len(load), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
-    project(shapes, y, w[0], w[1])
+    project(blocks, y, w[0], w[1])
     moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
     for j in range(n):
         first = 2 * m + j * states
@@ -128,22 +158,24 @@ def set_rate_and_gradients(y, s, shapes, given, load, w, out, rate):
         forces[n + j] = F
         for k in range(states):
             rate[first + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
-    gather(y, s, shapes, load, forces, rate)
+    gather(y, s, blocks, load, forces, rate)
 
 
 @helper
-def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):
+def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     """Fill ``out`` (size,) with df/dt at a fixed state.
 
     The ground that moves on under a node acts as the node moving back: travel enters with x,
     speed with x'. ``acceleration`` is that of the ground, ``rate_of_loads`` (m,) the rate of the
     modal loads.
     """
-    m, rows = shapes.shape
-    n = rows // 2
+    m, n = len(rate_of_loads), len(s.gap)
     states = g.rates.shape[1]
     forces = w[2]
-    out[: 2 * m] = 0.0
+    for i in range(m):
+        out[i] = 0.0
+        out[m + i] = (rate_of_loads[i] + given[PULL_X_RATE] * s.drive_shapes[0, i]
+                      + given[PULL_Y_RATE] * s.drive_shapes[1, i])
     for j in range(n):
         v, a = s.sliding[j] * given[SPEED], s.sliding[j] * acceleration
         forces[j] = v * g.partial[j, 1, 0] + a * g.partial[j, 1, 2]
@@ -153,16 +185,11 @@ def set_time_rate(s, shapes, given, acceleration, g, rate_of_loads, w, out):
             out[2 * m + j * states + k] = (
                 -a * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
                 if k < s.memory[j] else 0.0)
-    for i in range(m):
-        total = (rate_of_loads[i] + given[PULL_X_RATE] * s.drive_shapes[0, i]
-                 + given[PULL_Y_RATE] * s.drive_shapes[1, i])
-        for j in range(rows):
-            total += shapes[i, j] * forces[j]
-        out[m + i] = total
+    push(blocks, forces, out[m : 2 * m])
 
 
 @helper
-def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):
+def next_kink(y, rate, s, blocks, g, depth, slow, speed, w, within):
     """Time until the forces of a node change their character, or ``within`` if later.
 
     By the velocity and acceleration of the nodes: touch-down and lift-off on level ground, the
@@ -170,14 +197,10 @@ def next_kink(y, rate, s, shapes, g, depth, slow, speed, w, within):
     normal forces that fall to zero. Stepping there saves the steps that would fail because
     forces change within them; it is an estimate, and nothing depends on its accuracy.
     """
-    m, rows = shapes.shape
-    n = rows // 2
-    project(shapes, y, w[0], w[1])
-    for j in range(rows):
-        total = 0.0
-        for i in range(m):
-            total += shapes[i, j] * rate[m + i]
-        w[2, j] = total
+    m, n = len(blocks.position), len(s.gap)
+    project(blocks, y, w[0], w[1])
+    for j in range(2 * n):
+        w[2, j] = moved_by(blocks, j, rate[m : 2 * m])
     first = within
     for j in range(n):
         u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]

@@ -4,8 +4,10 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.integrate.rodas5p import dynamics, tableau
+from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
-from fecontact.system.kernels import POWER_COUNT, powers
+from fecontact.system.kernels import ground_motion
+from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
 
 
 @helper
@@ -29,19 +31,16 @@ def state_error(control, progress, room):
 
 
 @helper
-def slip_error(error, s, shapes, control, progress, room):
+def slip_error(error, s, blocks, control, progress, room):
     """The larger of the error and that of the slip velocities at the end of the step.
 
     Only where friction has no memory: there the force follows the slip velocity alone.
     """
-    m, rows = shapes.shape
-    n = rows // 2
+    m, n = len(control.largest), len(s.gap)
     difference = room.stages[tableau.STAGES - 1]
     for j in range(n):
         if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
-            slip = 0.0
-            for i in range(m):
-                slip += shapes[i, j] * difference[m + i]
+            slip = dynamics.moved_by(blocks, j, difference[m : 2 * m])
             distance = abs(room.nodes[1, j] - s.sliding[j] * room.given[dynamics.SPEED])
             part = abs(slip) / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
@@ -103,7 +102,25 @@ _DIFFERENCE = _third_difference()
 
 
 @helper
-def _set_powers(step, s, stick_speed, progress, room):
+def _powers(t, y, problem, room, out):
+    """As :func:`fecontact.system.powers.powers` by blocks; ``out`` (p + 2 n,) holds both."""
+    s, blocks = problem.system, problem.blocks
+    m, n = len(blocks.position), len(s.gap)
+    states = (len(y) - 2 * m) // n
+    given_powers(t, y, s, out)
+    for part in range(len(blocks.own)):
+        matrix_powers(block_at(blocks.own, part), y, s, out)
+    moved = ground_motion(t, s)
+    dynamics.project(blocks, y, room.between[0], room.between[1])
+    for j in range(n):
+        first = 2 * m + j * states
+        add_node_powers(j, dynamics.motion_of(j, room.between), moved,
+                        y[first : first + s.memory[j]], problem.control.stick_speed[j], s,
+                        room.scratch.force[0], room.scratch.rates[0], out, out[POWER_COUNT:])
+
+
+@helper
+def _set_powers(step, problem, progress, room):
     """Fill ``room.power`` with the powers at the points of a step."""
     for k in range(len(progress.power)):
         room.power[0, k] = progress.power[k]
@@ -113,8 +130,8 @@ def _set_powers(step, s, stick_speed, progress, room):
             state = room.right
         else:
             state = room.after
-        powers(min(step.t + _POINTS[point] * step.h, step.latest), state, s, stick_speed,
-               room.power[point, :POWER_COUNT], room.power[point, POWER_COUNT:])
+        _powers(min(step.t + _POINTS[point] * step.h, step.latest), state, problem, room,
+                room.power[point])
 
 
 @helper
@@ -133,7 +150,7 @@ def _quadrature_error(h, power):
 def work_error(step, problem, progress, room):
     """Error of the work in a step; fills ``room.power`` with the powers at the points of it."""
     control = problem.control
-    _set_powers(step, problem.system, control.stick_speed, progress, room)
+    _set_powers(step, problem, progress, room)
     return _quadrature_error(step.h, room.power) / (
         control.rtol * _energy_scale(control, progress, room))
 

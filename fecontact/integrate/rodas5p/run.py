@@ -26,7 +26,7 @@ class Run:
         What is integrated, and how finely.
     output : Output
         Output times and what belongs to them; rows from ``outputs`` on are not filled yet. Work
-        of the powers :data:`fecontact.system.kernels.POWERS`, then friction work of each node and
+        of the powers :data:`fecontact.system.powers.POWERS`, then friction work of each node and
         its part in stick [J].
     variation : Vary
         Derivatives that go with the run.

@@ -20,20 +20,23 @@ import numpy as np
 from numba import types
 
 from fecontact.core.compiled import block, helper, integers, matrix, vector
-from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.dense_lu import factorise_within, solve_within
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.dynamics import project
 
 
 class Reduced(NamedTuple):
     """The reduced system of a step.
 
-    J = [Jq, Jv] (m, 2 m); factors (m, m) and pivots (m,) of its matrix; per node the inverse of
-    G - Zz (n, s, s) and e (n, s); room to work in: (m,), (4, 2 n) and (2 m, 2 n).
+    J = [Jq, Jv] (m, 2 m); factors (m, m), their first columns and pivots (m,) of its matrix; per
+    node the inverse of G - Zz (n, s, s) and e (n, s); room to work in: (m,), (4, 2 n) and
+    (2 m, 2 n).
     """
 
     J: Array
     factors: Array
+    starts: Integers
     pivots: Integers
     inverse: Array
     weights: Array
@@ -43,13 +46,14 @@ class Reduced(NamedTuple):
 
 
 REDUCED = types.NamedTuple(
-    [matrix, matrix, integers, block, matrix, vector, matrix, matrix], Reduced)
+    [matrix, matrix, integers, integers, block, matrix, vector, matrix, matrix], Reduced)
 
 
 def reduced_for(modes: int, nodes: int, states: int) -> Reduced:
     """Zeros for a system of so many modes, contact nodes and internal variables per node."""
     return Reduced(
-        np.zeros((modes, 2 * modes)), np.zeros((modes, modes)), np.zeros(modes, dtype=np.int64),
+        np.zeros((modes, 2 * modes)), np.zeros((modes, modes)),
+        np.zeros(modes, dtype=np.int64), np.zeros(modes, dtype=np.int64),
         np.zeros((nodes, states, states)), np.zeros((nodes, states)), np.zeros(modes),
         np.zeros((4, 2 * nodes)), np.zeros((2 * modes, 2 * nodes)))
 
@@ -87,40 +91,56 @@ def eliminate_memory(G, s, g, w):
 
 
 @helper
-def products(a, b, out):
-    """Fill out[i, k] with the products of the rows a_i and b_k, two by two at a time."""
-    rows, length = a.shape
-    columns = len(b)
-    for i in range(0, rows - 1, 2):
-        for k in range(0, columns - 1, 2):
+def add_products(a, b, ends, columns, out):
+    """Add to out[i, k] the products of parts of the rows a_i and b_k, two by two at a time.
+
+    ``ends`` are first and last i, first and last k; ``columns`` those of a and b.
+    """
+    top, bottom = ends[0], ends[1]
+    first, last = np.int64(ends[2]), np.int64(ends[3])
+    left, right = columns
+    for i in range(top, bottom - 1, 2):
+        for k in range(first, last - 1, 2):
             a00, a01, a10, a11 = 0.0, 0.0, 0.0, 0.0
-            for j in range(length):
+            for j in range(left, right):
                 x, y = a[i, j], a[i + 1, j]
                 u, v = b[k, j], b[k + 1, j]
                 a00 += x * u
                 a01 += x * v
                 a10 += y * u
                 a11 += y * v
-            out[i, k], out[i, k + 1], out[i + 1, k], out[i + 1, k + 1] = a00, a01, a10, a11
-        if columns % 2:
+            out[i, k] += a00
+            out[i, k + 1] += a01
+            out[i + 1, k] += a10
+            out[i + 1, k + 1] += a11
+        if (last - first) % 2:
             a00, a10 = 0.0, 0.0
-            for j in range(length):
-                a00 += a[i, j] * b[columns - 1, j]
-                a10 += a[i + 1, j] * b[columns - 1, j]
-            out[i, columns - 1], out[i + 1, columns - 1] = a00, a10
-    if rows % 2:
-        for k in range(columns):
+            for j in range(left, right):
+                a00 += a[i, j] * b[last - 1, j]
+                a10 += a[i + 1, j] * b[last - 1, j]
+            out[i, last - 1] += a00
+            out[i + 1, last - 1] += a10
+    if (bottom - top) % 2:
+        for k in range(first, last):
             total = 0.0
-            for j in range(length):
-                total += a[rows - 1, j] * b[k, j]
-            out[rows - 1, k] = total
+            for j in range(left, right):
+                total += a[bottom - 1, j] * b[k, j]
+            out[bottom - 1, k] += total
 
 
 @helper
-def set_answers(shapes, g, w):
+def products(a, b, out):
+    """Fill out[i, k] with the products of the rows a_i and b_k."""
+    out[:] = 0.0
+    add_products(a, b, (0, len(a), 0, len(b)),
+                 (np.uint64(0), np.uint64(a.shape[1])), out)
+
+
+@helper
+def set_answers(blocks, g, w):
     """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n)."""
-    m, rows = shapes.shape
-    n = rows // 2
+    shapes = blocks.shapes
+    m, n = len(shapes), len(g.partial)
     states = w.weights.shape[1]
     c = w.coefficients
     for j in range(n):
@@ -133,69 +153,95 @@ def set_answers(shapes, g, w):
             c[k, j] = -p[1, k] - pressing * p[2, k]
             c[k, n + j] = p[0, k]
         c[2, j] -= slip
-    for k in range(m):
-        for half in range(2):
-            first = half * n
-            for j in range(n):
-                w.answers[k, first + j] = (c[0, first + j] * shapes[k, j]
-                                           + c[1, first + j] * shapes[k, n + j])
-            for j in range(n):
-                w.answers[m + k, first + j] = (c[2, first + j] * shapes[k, j]
-                                               + c[3, first + j] * shapes[k, n + j])
+    for part in range(len(blocks.parts)):
+        top, bottom, left, right = block_at(blocks.parts, part)
+        for k in range(top, bottom):
+            along, away = shapes[k, :n], shapes[k, n:]
+            for first in (0, n):
+                by_place, by_speed = w.answers[k, first:], w.answers[m + k, first:]
+                for j in range(left, right):
+                    by_place[j] = c[0, first:][j] * along[j] + c[1, first:][j] * away[j]
+                for j in range(left, right):
+                    by_speed[j] = c[2, first:][j] * along[j] + c[3, first:][j] * away[j]
 
 
 @helper
-def assemble(s, shapes, g, w):
+def assemble(s, blocks, g, w):
     """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
-    m = len(shapes)
-    set_answers(shapes, g, w)
-    products(shapes, w.answers, w.J)
-    for i in range(m):
-        for k in range(m):
-            w.J[i, k] -= s.stiffness[i, k]
-            w.J[i, m + k] -= s.damping[i, k]
+    m = len(blocks.shapes)
+    set_answers(blocks, g, w)
+    for part in range(len(blocks.coupled)):
+        top, bottom, left, right = block_at(blocks.coupled, part)
+        for i in range(top, bottom):
+            by_place, by_speed = w.J[i, :m], w.J[i, m:]
+            for k in range(left, right):
+                by_place[k] = -s.stiffness[i, k]
+                by_speed[k] = -s.damping[i, k]
+    for pair in range(len(blocks.pairs)):
+        add_products(blocks.shapes, w.answers, block_at(blocks.pairs, pair),
+                     (np.uint64(blocks.pairs[pair, 4]), np.uint64(blocks.pairs[pair, 5])), w.J)
 
 
 @helper
-def factorise_step(G, w):
+def factorise_step(G, blocks, w):
     """Factorise G^2 - G Jv - Jq."""
     m = len(w.pivots)
+    if len(blocks.coupled) > 1:
+        for i in range(m):
+            w.factors[i, w.starts[i] : blocks.reach[1, i]] = 0.0
+    for part in range(len(blocks.coupled)):
+        top, bottom, left, right = block_at(blocks.coupled, part)
+        row, column = blocks.coupled[part, 4] - top, blocks.coupled[part, 5]
+        for i in range(top, bottom):
+            by_place, by_speed = w.J[i, left:right], w.J[i, m + np.int64(left) :]
+            factors = w.factors[row + i, column:]
+            for k in range(len(by_place)):
+                factors[k] = -G * by_speed[k] - by_place[k]
     for i in range(m):
-        for k in range(m):
-            w.factors[i, k] = -G * w.J[i, m + k] - w.J[i, k]
         w.factors[i, i] += G * G
-    factorise(w.factors, m, w.pivots)
+    factorise_within(w.factors, blocks.reach, w.starts, w.pivots)
 
 
 @helper
-def solve_stage(G, s, shapes, g, w, r, motion, out):
+def solve_stage(G, s, blocks, g, w, r, motion, out):
     """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, 2 n) is room to work in."""
-    m, rows = shapes.shape
-    n = rows // 2
+    shapes = blocks.shapes
+    m, n = len(shapes), len(g.partial)
     states = w.weights.shape[1]
     x = w.room
+    for i in range(m):
+        out[m + i] = r[m + i]
     if states > 0:
         for j in range(n):
             total = 0.0
             for k in range(states):
                 total += w.weights[j, k] * r[2 * m + j * states + k]
             motion[2, j] = -total
+        for part in range(len(blocks.parts)):
+            top, bottom, left, right = block_at(blocks.parts, part)
+            for i in range(top, bottom):
+                total = 0.0
+                for j in range(left, right):
+                    total += shapes[i, j] * motion[2, j]
+                out[m + i] += total
     for i in range(m):
-        total = r[m + i]
-        if states > 0:
-            for j in range(n):
-                total += shapes[i, j] * motion[2, j]
-        total *= G
-        for k in range(m):
-            total += w.J[i, k] * r[k]
-        x[i] = total
-    solve(w.factors, w.pivots, x)
+        x[blocks.position[i]] = G * out[m + i]
+    for part in range(len(blocks.coupled)):
+        top, bottom, left, right = block_at(blocks.coupled, part)
+        row = blocks.coupled[part, 4]
+        for i in range(top, bottom):
+            total = 0.0
+            for k in range(left, right):
+                total += w.J[i, k] * r[k]
+            x[row + i - top] += total
+    solve_within(w.factors, blocks.reach, w.starts, w.pivots, x)
     for i in range(m):
-        out[m + i] = x[i]
-        out[i] = (r[i] + x[i]) / G
+        speed = x[blocks.position[i]]
+        out[m + i] = speed
+        out[i] = (r[i] + speed) / G
     if states == 0:
         return
-    project(shapes, out, motion[0], motion[1])
+    project(blocks, out, motion[0], motion[1])
     for j in range(n):
         p = g.partial[j, 2]
         pressing = (p[0] * motion[0, j] + p[1] * motion[0, n + j] + p[2] * motion[1, j]

@@ -10,7 +10,9 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
-from fecontact.system.kernels import NODE_POWERS, POWER_COUNT, SYSTEM
+from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks
+from fecontact.system.kernels import SYSTEM
+from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
 # fail may still lie ahead, else zero. ENERGY is the largest energy or work so far.
@@ -75,17 +77,14 @@ CONTROL = types.NamedTuple([vector] * 8 + [matrix, vector] + [f8] * 5 + [i8] * 2
 
 
 class Problem(NamedTuple):
-    """What is integrated, and how finely.
-
-    ``shapes`` (m, 2 n) are the rows Tx, then Ty, of all contact nodes side by side.
-    """
+    """What is integrated, and how finely."""
 
     system: Any
-    shapes: Array
+    blocks: Blocks
     control: Control
 
 
-PROBLEM = types.NamedTuple([SYSTEM, matrix, CONTROL], Problem)
+PROBLEM = types.NamedTuple([SYSTEM, BLOCKS, CONTROL], Problem)
 
 
 class Step(NamedTuple):
@@ -165,7 +164,8 @@ class Room(NamedTuple):
 
     Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
     what the names say; ``nodes`` (3, 2 n), ``given`` and ``load`` for what acts at the time of a
-    stage, ``power`` (4, p + 2 n) for a quadrature. ``ends`` to ``places`` serve to look at the
+    stage, ``between`` (2, 2 n) for the nodes at a point within the step, ``power`` (4, p + 2 n) for
+    a quadrature. ``ends`` to ``places`` serve to look at the
     course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
     what they may do.
     """
@@ -179,6 +179,7 @@ class Room(NamedTuple):
     after: Array
     rate_after: Array
     nodes: Array
+    between: Array
     given: Array
     load: Array
     pull_rate: Array
@@ -195,7 +196,7 @@ class Room(NamedTuple):
 
 
 ROOM = types.NamedTuple(
-    [matrix] * 2 + [vector] * 6 + [matrix] + [vector] * 3
+    [matrix] * 2 + [vector] * 6 + [matrix] * 2 + [vector] * 3
     + [matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector],
     Room)
 
@@ -213,7 +214,8 @@ def room_for(modes: int, nodes: int, states: int) -> Room:
     return Room(
         np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
         stage, right, base, time_rate, after, rate_after,
-        np.zeros((3, 2 * nodes)), np.zeros(motion.GIVEN), np.zeros(modes), np.zeros(modes),
+        np.zeros((3, 2 * nodes)), np.zeros((2, 2 * nodes)), np.zeros(motion.GIVEN),
+        np.zeros(modes), np.zeros(modes),
         np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)),
         stage_solver.reduced_for(modes, nodes, states),
         gradients_for(nodes, states), gradients_for(nodes, states),

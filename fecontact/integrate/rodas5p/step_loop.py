@@ -40,7 +40,7 @@ from fecontact.integrate.rodas5p.state import (
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, propagate
 from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import DRIVE, POWER_COUNT, drive_jump, powers
+from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, powers
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
@@ -55,7 +55,7 @@ def _start(t, problem, progress, room, output, watch):
     """Prepare the first step of a run, and write its first output."""
     s, control = problem.system, problem.control
     dynamics.set_given(t, s, room.given, room.load)
-    dynamics.set_rate_and_gradients(progress.state, s, problem.shapes, room.given, room.load,
+    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
                                     room.nodes, progress.gradients, progress.rate)
     if control.work:
         powers(t, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
@@ -96,7 +96,7 @@ def _aim(t, h, exactly, speed, end, problem, progress, room):
     caution, limit = 0.0, numbers[CAUTIOUS]
     if limit > 0.0:
         reach = max(target - t, limit)
-        kink = dynamics.next_kink(progress.state, progress.rate, problem.system, problem.shapes,
+        kink = dynamics.next_kink(progress.state, progress.rate, problem.system, problem.blocks,
                                   progress.gradients, control.depth, control.slow, speed,
                                   room.nodes, reach)
         # Nearer ones are left to the error control, lest steps shrink without end.
@@ -131,7 +131,7 @@ def _linearise(step, after_t, problem, progress, room):
         rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
         for i in range(m):
             room.pull_rate[i] += rate * s.load_shapes[k, i]
-    dynamics.set_time_rate(s, problem.shapes, room.given, acceleration, progress.gradients,
+    dynamics.set_time_rate(s, problem.blocks, room.given, acceleration, progress.gradients,
                            room.pull_rate, room.nodes, room.time_rate)
     for i in range(m):
         progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
@@ -142,7 +142,7 @@ def _linearise(step, after_t, problem, progress, room):
 @helper
 def _stages(step, G, problem, progress, room):
     """All stages of a step, and its end in ``room.after``."""
-    s, shapes = problem.system, problem.shapes
+    s, blocks = problem.system, problem.blocks
     size = len(progress.state)
     m = len(room.load)
     last = step.t
@@ -156,14 +156,14 @@ def _stages(step, G, problem, progress, room):
             if now != last:
                 dynamics.set_given(now, s, room.given, room.load)
                 last = now
-            dynamics.set_rate(room.stage, s, shapes, room.given, room.load, room.nodes,
+            dynamics.set_rate(room.stage, s, blocks, room.given, room.load, room.nodes,
                               room.scratch, room.base)
             tableau.combined(tableau.C[i], 1.0 / step.h, room.base, room.stages, room.right)
         factor = tableau.TIME[i] * step.h
         if factor != 0.0:
             for k in range(m, size):
                 room.right[k] += factor * room.time_rate[k]
-        stage_solver.solve_stage(G, s, shapes, progress.gradients, room.reduced, room.right,
+        stage_solver.solve_stage(G, s, blocks, progress.gradients, room.reduced, room.right,
                                  room.nodes, room.stages[i])
     for k in range(size):
         room.after[k] = room.stage[k] + room.stages[tableau.STAGES - 1, k]
@@ -181,8 +181,8 @@ def _attempt(step, new, end, problem, progress, room):
     if memory:
         stage_solver.eliminate_memory(G, s, progress.gradients, room.reduced)
     if new or memory:
-        stage_solver.assemble(s, problem.shapes, progress.gradients, room.reduced)
-    stage_solver.factorise_step(G, room.reduced)
+        stage_solver.assemble(s, problem.blocks, progress.gradients, room.reduced)
+    stage_solver.factorise_step(G, problem.blocks, room.reduced)
     _stages(step, G, problem, progress, room)
 
 
@@ -192,23 +192,23 @@ def _error_at_end(step, end, problem, progress, room):
 
     Where the state is within its tolerance, its rates and gradients are evaluated too.
     """
-    s, shapes, control = problem.system, problem.shapes, problem.control
+    s, blocks, control = problem.system, problem.blocks, problem.control
     error = state_error(control, progress, room)
     if error <= 1.0:
         if step.at_break:
             dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.load)
-        dynamics.set_rate_and_gradients(room.after, s, shapes, room.given, room.load, room.nodes,
+        dynamics.set_rate_and_gradients(room.after, s, blocks, room.given, room.load, room.nodes,
                                         room.gradients_after, room.rate_after)
-        error = slip_error(error, s, shapes, control, progress, room)
+        error = slip_error(error, s, blocks, control, progress, room)
     return error
 
 
 @helper
 def _unfelt_part(step, again, smallest, problem, progress, room):
     """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
-    s, shapes, control = problem.system, problem.shapes, problem.control
-    if restless(step.speed, step.h, s, shapes, control, room) and again < _MOST_AGAIN:
-        set_courses(s, shapes, control.ground, progress.state, room.after, room)
+    s, blocks, control = problem.system, problem.blocks, problem.control
+    if restless(step.speed, step.h, s, blocks, control, room) and again < _MOST_AGAIN:
+        set_courses(s, blocks, control.ground, progress.state, room.after, room)
         if doubtful(step.speed, step.h, s, control.ground, control.levels, control.slip_scale,
                     room):
             part = first_unfelt_at(control.unfelt)(step, again, problem, progress, room)
@@ -251,7 +251,7 @@ def _find_events(step, problem, progress, room, watch):
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
     s, control = problem.system, problem.control
     if _watched(watch):
-        set_courses(s, problem.shapes, control.ground, progress.state, room.after, room)
+        set_courses(s, problem.blocks, control.ground, progress.state, room.after, room)
         return note_events_at(watch.note)(step, problem, progress, room, watch)
     if watch.counts[KINKS]:
         begin(min(step.target, step.latest), room.after, s, control.depth, watch, room.scratch)
@@ -355,7 +355,7 @@ def advance(held_problem, held_progress, held_room, held_output, held_vary, held
     varies = len(vary.variation.columns) > 0
     if counts[STARTED] == 0:
         _start(t, problem, progress, room, output, watch)
-    set_ends(t, progress.state, s, problem.shapes, control.ground, room.ends)
+    set_ends(t, progress.state, s, problem.blocks, control.ground, room.ends)
     new, speed, attempts, exactly, again = True, 0.0, 0, False, 0
     while counts[OUTPUTS] < len(output.times):
         # A step that failed is repeated before the call returns: derivatives are not kept.

@@ -34,12 +34,12 @@ _LOOKS = 8
 
 
 @helper
-def _matters(impulse, column, h, shapes, control, progress):
+def _matters(impulse, column, h, blocks, control, progress):
     """Whether an impulse on a node would be an error beyond the tolerance of the step."""
     speed_scale = max(progress.numbers[run_arrays.SPEED_SCALE], control.speed_scale)
     allowed = _PART * control.rtol
     for i in range(len(control.largest)):
-        kick = abs(shapes[i, column]) * impulse
+        kick = abs(blocks.shapes[i, column]) * impulse
         place = max(progress.extremes[i], control.displacement_scale[i])
         if kick * control.largest[i] > allowed * speed_scale or kick * h > allowed * place:
             return True
@@ -112,7 +112,7 @@ def _first_unfelt(step, again, held_problem, held_progress, held_room):
     """
     problem, progress = borrowed(held_problem), borrowed(held_progress)
     room = borrowed(held_room)
-    s, shapes, control = problem.system, problem.shapes, problem.control
+    s, blocks, control = problem.system, problem.blocks, problem.control
     levels, places = control.levels, room.places
     b, height, row = room.bound[0], room.bound[1], room.bound[2]
     n = len(s.gap)
@@ -139,7 +139,7 @@ def _first_unfelt(step, again, held_problem, held_progress, held_room):
                     F = _normal_force(place, course, height)
                     if F > 0.0:
                         force = _unfelt_rub(j, inside, F, largest, ends, s)
-                if force > 0.0 and _matters(2.0 / 3.0 * force * brief, column, step.h, shapes,
+                if force > 0.0 and _matters(2.0 / 3.0 * force * brief, column, step.h, blocks,
                                             control, progress):
                     if again == 0 and begin > 0.0:
                         place = begin + _JUST_PAST * (end - begin)

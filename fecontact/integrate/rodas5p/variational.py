@@ -32,11 +32,10 @@ _JUMP = 3.0 * _PART
 
 
 @helper
-def probing_distance(u, shapes, control, w):
+def probing_distance(u, blocks, control, w):
     """Multiple e of the stage u that is small against the scales of all laws."""
-    m, rows = shapes.shape
-    n = rows // 2
-    dynamics.project(shapes, u, w[0], w[1])
+    m, n = len(control.largest), len(control.depth)
+    dynamics.project(blocks, u, w[0], w[1])
     largest = 1.0
     for j in range(n):
         largest = max(largest, abs(w[1, j]) / control.slip_scale[j])
@@ -80,24 +79,24 @@ def learn(here, usual):
 
 
 @helper
-def set_sinking(t, y, s, shapes, v, out):
+def set_sinking(t, y, s, blocks, v, out):
     """Fill out (2, n): slope of the ground under each node, and rate of its penetration."""
     moved = ground_motion(t, s)
-    dynamics.project(shapes, y, v.nodes[0], v.nodes[1])
+    dynamics.project(blocks, y, v.nodes[0], v.nodes[1])
     for j in range(len(s.abscissa)):
         contact = node_contact(j, dynamics.motion_of(j, v.nodes), moved, s)
         out[0, j], out[1, j] = contact.slope, contact.rate
 
 
 @helper
-def differences(ahead, here, behind, usual, factor, u, travelled, sinking, shapes, w):
+def differences(ahead, here, behind, usual, factor, u, travelled, sinking, blocks, w):
     """Put the difference quotients of gradients along the stage u into those ahead.
 
     A stage that moves a node as the step does shows with its forward side what is within the
     step.
     """
     n, states, width = ahead.rates.shape
-    dynamics.project(shapes, u, w[0], w[1])
+    dynamics.project(blocks, u, w[0], w[1])
     for j in range(n):
         sunk = sinking[0, j] * (w[0, j] - travelled) - w[0, n + j]
         forward = sunk * sinking[1, j] >= 0.0
@@ -224,14 +223,14 @@ def variation_for(
 
 
 @helper
-def _rates_between(t, Y, shapes, vary, factor, out):
+def _rates_between(t, Y, blocks, vary, factor, out):
     """Fill out = factor (f of the system above less f of that below)."""
     v = vary.variation
     rate, other = v.vectors[4], v.vectors[5]
     dynamics.set_given(t, vary.above, v.given, v.load)
-    dynamics.set_rate(Y, vary.above, shapes, v.given, v.load, v.nodes, v.behind, rate)
+    dynamics.set_rate(Y, vary.above, blocks, v.given, v.load, v.nodes, v.behind, rate)
     dynamics.set_given(t, vary.below, v.given, v.load)
-    dynamics.set_rate(Y, vary.below, shapes, v.given, v.load, v.nodes, v.behind, other)
+    dynamics.set_rate(Y, vary.below, blocks, v.given, v.load, v.nodes, v.behind, other)
     for k in range(len(Y)):
         out[k] = factor * (rate[k] - other[k])
 
@@ -264,7 +263,7 @@ def propagate(step, held_problem, held_progress, held_room, held_vary):
     """
     problem, progress = borrowed(held_problem), borrowed(held_progress)
     room, vary = borrowed(held_room), borrowed(held_vary)
-    s, shapes, v = problem.system, problem.shapes, vary.variation
+    s, blocks, v = problem.system, problem.blocks, vary.variation
     state, gradients, reduced, stages = (progress.state, progress.gradients, room.reduced,
                                          room.stages)
     size = len(state)
@@ -274,39 +273,39 @@ def propagate(step, held_problem, held_progress, held_room, held_vary):
     varies = vary.width != 0.0
     G = 1.0 / (step.h * tableau.GAMMA)
     if size == 2 * m:
-        columns.set_solver(G, reduced, v)
-    set_sinking(step.t, state, s, shapes, v, v.sinking)
+        columns.set_solver(G, blocks, reduced, v)
+    set_sinking(step.t, state, s, blocks, v, v.sinking)
     speed = ground_motion(step.t, s).speed
     for i in range(tableau.STAGES):
         now = step.t if i == 0 else min(step.t + tableau.NODES[i] * step.h, step.latest)
         tableau.combined(tableau.A[i], 1.0, state, stages, Y)
         dynamics.set_given(now, s, v.given, v.load)
-        dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.load, w, v.inside, rate)
+        dynamics.set_rate_and_gradients(Y, s, blocks, v.given, v.load, w, v.inside, rate)
         learn(v.inside, v.usual)
         advance = tableau.TIME[i] * step.h
-        reach = probing_distance(stages[i], shapes, problem.control, w)
+        reach = probing_distance(stages[i], blocks, problem.control, w)
         if varies:
-            _rates_between(now, Y, shapes, vary, 1.0 / vary.width, forced)
+            _rates_between(now, Y, blocks, vary, 1.0 / vary.width, forced)
         for side in range(2):
             e = reach if side == 0 else -reach
             for k in range(size):
                 Y[k] = state[k] + e * stages[i, k]
             later = step.t + e * advance
             if varies:
-                _rates_between(later, Y, shapes, vary, 0.5 / (e * vary.width), right)
+                _rates_between(later, Y, blocks, vary, 0.5 / (e * vary.width), right)
                 for k in range(size):
                     forced[k] += right[k]
             dynamics.set_given(later, s, v.given, v.load)
             if side == 0:
-                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.load, w, v.ahead, rate)
+                dynamics.set_rate_and_gradients(Y, s, blocks, v.given, v.load, w, v.ahead, rate)
             else:
-                dynamics.set_rate_and_gradients(Y, s, shapes, v.given, v.load, w, v.behind, rate)
+                dynamics.set_rate_and_gradients(Y, s, blocks, v.given, v.load, w, v.behind, rate)
         differences(v.ahead, gradients, v.behind, v.usual, 1.0 / reach, stages[i],
-                    speed * advance, v.sinking, shapes, w)
+                    speed * advance, v.sinking, blocks, w)
         if size > 2 * m:
-            columns.one_by_one(i, step.h, G, s, shapes, gradients, reduced, forced, varies, v)
+            columns.one_by_one(i, step.h, G, s, blocks, gradients, reduced, forced, varies, v)
         else:
-            columns.all_at_once(i, step.h, G, s, shapes, reduced, forced, varies, v)
+            columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
     return _largest_error(room.right, v)
 
 

@@ -8,7 +8,7 @@ columns go at once, by dense matrices of the size of the modes; else each goes f
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.core.dense_lu import solve
+from fecontact.core.dense_lu import solve_within
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 
 # Products of matrices with more multiplications than these go to BLAS.
@@ -16,18 +16,18 @@ _LARGE = 2000
 
 
 @helper
-def set_solver(G, reduced, v):
+def set_solver(G, blocks, reduced, v):
     """Fill v.solver (m, 2 m), which makes u_v of a right side: the factors' F^-1 [Jq, G I]."""
     m = len(reduced.pivots)
     x = reduced.room
     for c in range(2 * m):
         for i in range(m):
-            x[i] = reduced.J[i, c] if c < m else 0.0
+            x[blocks.position[i]] = reduced.J[i, c] if c < m else 0.0
         if c >= m:
-            x[c - m] = G
-        solve(reduced.factors, reduced.pivots, x)
+            x[blocks.position[c - m]] = G
+        solve_within(reduced.factors, blocks.reach, reduced.starts, reduced.pivots, x)
         for i in range(m):
-            v.solver[i, c] = x[i]
+            v.solver[i, c] = x[blocks.position[i]]
 
 
 @helper
@@ -40,13 +40,13 @@ def _products(a, b, out):
 
 
 @helper
-def all_at_once(i, h, G, s, shapes, reduced, forced, varies, v):
+def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
     """Solve stage i of all columns; systems without internal variables."""
     count, size = v.columns.shape
     m = len(v.none)
     for matrix, gradients in ((v.inside_matrix, v.inside), (v.ahead_matrix, v.ahead)):
-        stage_solver.set_answers(shapes, gradients, reduced)
-        _products(shapes, reduced.answers, matrix)
+        stage_solver.set_answers(blocks, gradients, reduced)
+        _products(blocks.shapes, reduced.answers, matrix)
     for row in range(m):
         for k in range(m):
             v.inside_matrix[row, k] -= s.stiffness[row, k]
@@ -78,12 +78,11 @@ def all_at_once(i, h, G, s, shapes, reduced, forced, varies, v):
 
 
 @helper
-def _push(g, s, shapes, x, w, rate):
+def _push(g, s, blocks, x, w, rate):
     """Add to w[2] (2 n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
-    m, rows = shapes.shape
-    n = rows // 2
-    states = g.rates.shape[1]
-    dynamics.project(shapes, x, w[0], w[1])
+    n, states, _ = g.rates.shape
+    m = len(blocks.position)
+    dynamics.project(blocks, x, w[0], w[1])
     for j in range(n):
         a, b, c, d = w[0, j], w[0, n + j], w[1, j], w[1, n + j]
         p = g.partial[j]
@@ -101,7 +100,7 @@ def _push(g, s, shapes, x, w, rate):
 
 
 @helper
-def one_by_one(i, h, G, s, shapes, gradients, reduced, forced, varies, v):
+def one_by_one(i, h, G, s, blocks, gradients, reduced, forced, varies, v):
     """Solve stage i of all columns; ``gradients`` are those at the start of the step."""
     count, size = v.columns.shape
     m = len(v.none)
@@ -111,14 +110,14 @@ def one_by_one(i, h, G, s, shapes, gradients, reduced, forced, varies, v):
         tableau.combined(tableau.A[i], 1.0, v.columns[c], own, X)
         w[2, :] = 0.0
         rate[2 * m :] = 0.0
-        _push(v.ahead, s, shapes, v.columns[c], w, rate)
-        _push(v.inside, s, shapes, X, w, rate)
-        dynamics.gather(X, s, shapes, v.none, w[2], rate)
+        _push(v.ahead, s, blocks, v.columns[c], w, rate)
+        _push(v.inside, s, blocks, X, w, rate)
+        dynamics.gather(X, s, blocks, v.none, w[2], rate)
         if varies and c == count - 1:
             for k in range(size):
                 rate[k] += forced[k]
         tableau.combined(tableau.C[i], 1.0 / h, rate, own, right)
-        stage_solver.solve_stage(G, s, shapes, gradients, reduced, right, w, own[i])
+        stage_solver.solve_stage(G, s, blocks, gradients, reduced, right, w, own[i])
         if i == tableau.STAGES - 1:
             for k in range(size):
                 v.after[c, k] = X[k] + own[i, k]

@@ -22,7 +22,8 @@ from fecontact.output.files.hdf5 import new_file, open_file, store_basis, stored
 from fecontact.output.files.vtkhdf import write_vtkhdf
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import GROUND_RATE, POWERS
+from fecontact.system.kernels import GROUND_RATE
+from fecontact.system.powers import POWERS
 from fecontact.system.tables import system_from_tables, system_tables
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")

@@ -13,8 +13,8 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.output.plots.diagram_insets import DOTS, draw_beneath, draw_insets, main_axis
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.plots.style import DASHES, distinct_colours
-from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.plots.style import DASHES, distinct_colours
-from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

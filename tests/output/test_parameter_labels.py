@@ -7,7 +7,7 @@ import pytest
 
 from fecontact import Study
 from fecontact.core.docstrings import documented
-from fecontact.system.parameter_labels import _classes, _units_of, parameter_label
+from fecontact.output.plots.parameter_labels import _classes, _units_of, parameter_label
 
 
 @pytest.mark.parametrize(("name", "label"), [

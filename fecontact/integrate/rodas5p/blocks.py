@@ -1,0 +1,146 @@
+"""Rows of the contact nodes over the modes, and where they and the matrices are not zero.
+
+Modes of several bodies stand one body after the other, contact nodes one interface after the other.
+An interface moves with the modes of its two bodies only, so the rows, the matrices and the Jacobian
+consist of blocks, and a chain of bodies costs so many times one body. One body is one block.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from fecontact.core.compiled import helper, i8, integers, matrix
+from fecontact.core.types import Array, Integers
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.kernels import SystemArrays
+
+
+class Blocks(NamedTuple):
+    """Rows of contact nodes, and blocks of them and of the matrices; ends are exclusive.
+
+    Attributes
+    ----------
+    shapes : (m, 2 n) array
+        Rows Tx, then Ty, of all contact nodes side by side, so that sums over nodes vectorise.
+    parts : (p, 4) integer array
+        First and last mode, first and last node of each block of the rows.
+    tiles : (t, 4) integer array
+        The same as first and last row, first and last column of ``shapes``.
+    spans : (n, r, 2) integer array
+        First and last modes that move each node; empty spans fill the array.
+    own : (b, 4) integer array
+        Rows and columns of the blocks of stiffness and damping.
+    coupled : (c, 6) integer array
+        Those of the blocks of the Jacobian, and where each starts in the order of elimination.
+    pairs : (k, 6) integer array
+        Rows of ``shapes``, columns of the Jacobian [Jq, Jv], columns of ``shapes`` of the products
+        that the Jacobian is the sum of.
+    position : (m,) integer array
+        Place of each mode in the order of elimination.
+    reach : (2, m) integer array
+        In this order, ends of the columns and, with the fill-in of pivoting, of the rows.
+    """
+
+    shapes: Array
+    parts: Integers
+    tiles: Integers
+    spans: Integers
+    own: Integers
+    coupled: Integers
+    pairs: Integers
+    position: Integers
+    reach: Integers
+
+
+_TABLE = types.Array(i8, 2, "C")
+BLOCKS = types.NamedTuple(
+    [matrix, _TABLE, _TABLE, types.Array(i8, 3, "C"), _TABLE, _TABLE, _TABLE, integers, _TABLE],
+    Blocks)
+
+
+@helper
+def block_at(table, k):
+    """First and last row, first and last column of block k of a table.
+
+    Those of columns are unsigned: loops over indices that might be negative are not vectorised.
+    """
+    return table[k, 0], table[k, 1], np.uint64(table[k, 2]), np.uint64(table[k, 3])
+
+
+def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
+    """The blocks of a system, by its bodies and interfaces and by what is zero."""
+    n, m = arrays.Tx.shape
+    modes = _ranges([part.modes[1] for part in basis.parts], m)
+    nodes = _ranges([count for _, count in basis.groups], n)
+    moved = np.array([[bool(arrays.Tx[slice(*j), slice(*i)].any()
+                            or arrays.Ty[slice(*j), slice(*i)].any()) for i in modes]
+                      for j in nodes])
+    own = np.array([[any(one[slice(*i), slice(*k)].any()
+                         for one in (arrays.stiffness, arrays.damping, arrays.modal_damping))
+                     for k in modes] for i in modes])
+    own |= np.eye(len(modes), dtype=bool)
+    coupled = own | own.T | (moved.T.astype(int) @ moved.astype(int) > 0)
+    if coupled.all():
+        modes, nodes = [(0, m)], [(0, n)]
+        moved = own = coupled = np.ones((1, 1), dtype=bool)
+    parts = [(*modes[a], *nodes[b]) for b, a in np.argwhere(moved)]
+    position, starts, reach = _elimination(modes, coupled)
+    most = int(moved.sum(axis=1).max())
+    spans = np.zeros((n, most, 2), dtype=np.int64)
+    for b, (first, last) in enumerate(nodes):
+        for place, a in enumerate(np.flatnonzero(moved[b])):
+            spans[first:last, place] = modes[a]
+    return Blocks(
+        shapes=np.vstack([arrays.Tx, arrays.Ty]).T.copy(),
+        parts=_table(parts, 4),
+        tiles=_table([(*part[:2], *columns) for part in parts
+                      for columns in _both(part[2:], n)], 4),
+        spans=spans,
+        own=_table([(*modes[a], *modes[c]) for a, c in np.argwhere(own)], 4),
+        coupled=_table([(*modes[a], *modes[c], starts[a], starts[c])
+                        for a, c in np.argwhere(coupled)], 6),
+        pairs=_table([(*modes[a], *answered, *columns) for b in range(len(nodes))
+                      for a in np.flatnonzero(moved[b]) for c in np.flatnonzero(moved[b])
+                      for answered in _both(modes[c], m) for columns in _both(nodes[b], n)], 6),
+        position=position, reach=reach)
+
+
+def _ranges(counts: list[int], total: int) -> list[tuple[int, int]]:
+    """Ranges of so many, or the one of all where they are not told apart."""
+    ends = np.concatenate([[0], np.cumsum(counts, dtype=int)]).tolist()
+    if ends[-1] != total or min(counts, default=0) == 0:
+        ends = [0, total]
+    return list(pairwise(ends))
+
+
+def _both(span: tuple[int, int], size: int) -> list[tuple[int, int]]:
+    """A range within two halves of so many; in one where it is all of them."""
+    if span == (0, size):
+        return [(0, 2 * size)]
+    return [span, (size + span[0], size + span[1])]
+
+
+def _table(rows: list[tuple[int, ...]], width: int) -> Integers:
+    return np.array(rows, dtype=np.int64).reshape(-1, width)
+
+
+def _elimination(
+    modes: list[tuple[int, int]], coupled: Array,
+) -> tuple[Integers, Integers, Integers]:
+    """Places of the modes, first place of each block, and reach, in an order of narrow band."""
+    order = reverse_cuthill_mckee(csr_array(coupled), symmetric_mode=True)
+    sizes = np.array([last - first for first, last in modes])
+    ends = np.cumsum(sizes[order])
+    starts = np.empty(len(modes), dtype=np.int64)
+    starts[order] = ends - sizes[order]
+    position = np.concatenate([starts[a] + np.arange(size) for a, size in enumerate(sizes)])
+    # Ends of the rows of each block of columns; the rows' own ends before pivoting are the same.
+    last = np.maximum.accumulate([
+        max(starts[c] + sizes[c] for c in np.flatnonzero(coupled[a])) for a in order])
+    column_end = np.repeat(last, sizes[order])
+    # A pivot row may be any row of the column, and brings its own end along.
+    return position, starts, np.array([column_end, column_end[column_end - 1]], dtype=np.int64)

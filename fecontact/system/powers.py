@@ -1,0 +1,128 @@
+"""Powers of a contact system in a state: what is put in, lost and stored, for energy balances."""
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import borrowed, f8, helper, kernel, vector
+from fecontact.laws.signatures import normal_at, signal_at
+from fecontact.system.kernels import SYSTEM, ground_motion, memory_of, node_forces, node_motion
+
+# Columns of `powers`: five that are put in, by stiffness that is not symmetric too, four that are
+# lost, and what is stored in bristles at constant normal force.
+POWERS = ("drive", "belt_normal", "belt_friction", "load", "circulatory", "modal_damping",
+          "dashpots", "contact_damping", "friction", "bristles")
+POWER_COUNT = len(POWERS)
+(DRIVE, BELT_NORMAL, BELT_FRICTION, LOAD, CIRCULATORY, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING,
+ FRICTION, BRISTLES) = range(POWER_COUNT)
+NODE_POWERS = 2
+
+
+@helper
+def given_powers(t, y, s, out):
+    """Fill out (p,) with the powers of drive and loads, the others with zero."""
+    m = s.Tx.shape[1]
+    out[:POWER_COUNT] = 0.0
+    for axis in range(2):
+        value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
+        place, speed = 0.0, 0.0
+        for i in range(m):
+            place += s.drive_shapes[axis, i] * y[i]
+            speed += s.drive_shapes[axis, i] * y[m + i]
+        damping = s.drive_damping[axis]
+        out[DRIVE] += (s.drive_stiffness[axis] * (value - place) + damping * (rate - speed)) * rate
+        out[DASHPOTS] += damping * rate * (rate - 2.0 * speed)
+    for k in range(len(s.load)):
+        value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
+        for i in range(m):
+            out[LOAD] += value * s.load_shapes[k, i] * y[m + i]
+    for i in range(m):
+        out[LOAD] += s.constant_load[i] * y[m + i]
+
+
+@helper
+def matrix_powers(ends, y, s, out):
+    """Add to out (p,) the powers of a block of the matrices: first and last row and column."""
+    m = s.Tx.shape[1]
+    top, bottom, left, right = ends
+    modal, relative, circulatory = 0.0, 0.0, 0.0
+    for i in range(top, bottom):
+        for k in range(left, right):
+            product = y[m + i] * y[m + k]
+            modal += s.modal_damping[i, k] * product
+            relative += (s.damping[i, k] - s.modal_damping[i, k]) * product
+            circulatory += 0.5 * (s.stiffness[i, k] - s.stiffness[k, i]) * y[m + i] * y[k]
+    out[MODAL_DAMPING] += modal
+    out[DASHPOTS] += relative
+    out[CIRCULATORY] -= circulatory
+
+
+@helper
+def body_powers(t, y, s, out):
+    """Fill out (p,) with the powers outside the contact, the others with zero."""
+    m = s.Tx.shape[1]
+    given_powers(t, y, s, out)
+    matrix_powers((0, m, 0, m), y, s, out)
+
+
+@helper
+def drive_jump(before, after, y, s):
+    """Work that the drive puts in where its motions jump, between two times on both sides [J]."""
+    work = 0.0
+    for axis in range(2):
+        old = signal_at(s.drive[axis])(before, s.drive_parameters[axis])[0]
+        new = signal_at(s.drive[axis])(after, s.drive_parameters[axis])[0]
+        stretch = 0.5 * (old + new)
+        for i in range(s.Tx.shape[1]):
+            stretch -= s.drive_shapes[axis, i] * y[i]
+        work += s.drive_stiffness[axis] * stretch * (new - old)
+    return work
+
+
+@helper
+def belt_normal_power(F, slope, slip, speed, s):
+    """Power of the normal force's motion: of the drag up the slopes, or of lifting the node."""
+    return -F * slope * speed if s.leans else F * slope * slip
+
+
+@helper
+def storing_power(j, F, z, rates, s):
+    """Power that goes into the bristles of node j at constant normal force."""
+    total = 0.0
+    for k in range(s.memory[j]):
+        stiffness = s.bristle_stiffness[0, j, k] + s.bristle_stiffness[1, j, k] * abs(F)
+        total += stiffness * z[k] * rates[k, 0]
+    return total
+
+
+@helper
+def add_node_powers(j, motion, moved, z, stick_speed, s, force, rates, out, nodes):
+    """Add to out (p,) the powers of node j; fill its entries of ``nodes`` (2 n,)."""
+    F, R, contact = node_forces(j, motion, moved, z, s, force, rates)
+    elastic = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])[0]
+    speed = s.sliding[j] * moved.speed
+    out[BELT_NORMAL] += belt_normal_power(F, contact.slope, contact.slip, speed, s)
+    out[BELT_FRICTION] -= R * speed
+    out[CONTACT_DAMPING] += (F - elastic) * contact.rate
+    storing = storing_power(j, F, z, rates, s)
+    lost = R * contact.slip - storing
+    out[BRISTLES] += storing
+    out[FRICTION] += lost
+    nodes[j] = lost
+    nodes[len(s.gap) + j] = lost if abs(contact.slip) < stick_speed else 0.0
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, vector, vector))
+def powers(t, y, s, stick_speed, out, nodes):
+    """Fill out (p,) with the powers and ``nodes`` (2 n,) with those of each node.
+
+    Its friction's losses, then those by creep, at slip velocities below ``stick_speed`` (n,).
+    """
+    y, s = borrowed(y), borrowed(s)
+    n = len(s.Tx)
+    moved = ground_motion(t, s)
+    states = s.memory.max()
+    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    body_powers(t, y, s, out)
+    for j in range(n):
+        add_node_powers(j, node_motion(j, y, s), moved, memory_of(j, y, s), stick_speed[j], s,
+                        force, rates, out, nodes)
