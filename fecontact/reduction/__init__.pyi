@@ -1,4 +1,5 @@
 from .assembly.assembled_basis import PointPairing, assembled_basis
+from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, Spring, Weld, linked
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
@@ -15,6 +16,7 @@ __all__ = [
     "BodyPart",
     "Bushing",
     "Hinge",
+    "InterfaceCompliance",
     "ModalRotation",
     "ModeShapes",
     "PointPairing",
@@ -23,6 +25,7 @@ __all__ = [
     "Weld",
     "assembled_basis",
     "eigenfrequencies_hz",
+    "interface_compliance",
     "linked",
     "mode_convergence",
     "normalisation",
