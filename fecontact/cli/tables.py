@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from fecontact.fem.mesh import Mesh
     from fecontact.integrate.events import Events
     from fecontact.integrate.trajectory import Trajectory
+    from fecontact.reduction.assembly.interface_compliance import InterfaceCompliance
     from fecontact.system.complex_modes import ComplexModes
 
 ROUGH_SLOPE = 0.3  # of the ground, above which friction along x is a rough assumption
@@ -67,6 +68,17 @@ def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
         rows.append((face.title, f"{len(face.abscissa)} nodes, " + ", ".join(
             f"{100.0 * share:.1f} % {name}" for name, share in shares.items())))
     return rows
+
+
+def compliance_table(interfaces: "Iterable[InterfaceCompliance]") -> Any:
+    """Parts of the static compliance of interfaces that the modes resolve, in per cent."""
+    rows = []
+    for one in interfaces:
+        figures = [f"{100.0 * part:.2f}" for axis in (1, 0) for part in (
+            one.uniform[axis], one.nodes[:, axis].mean(), one.nodes[:, axis].min())]
+        rows.append((one.name, f"{len(one.nodes)}", *figures))
+    return table("interface", "nodes", "pressure", "mean", "worst", "traction", "mean", "worst",
+                 rows=rows)
 
 
 def complex_table(modes: "ComplexModes") -> Any:

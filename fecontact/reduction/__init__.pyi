@@ -1,4 +1,5 @@
 from .assembly.assembled_basis import PointPairing, assembled_basis
+from .assembly.bodies_convergence import BodiesConvergence, bodies_convergence
 from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, Spring, Weld, linked
 from .convergence import mode_convergence
@@ -13,6 +14,7 @@ from .rotating import ModalRotation
 
 __all__ = [
     "BasisReport",
+    "BodiesConvergence",
     "BodyPart",
     "Bushing",
     "Hinge",
@@ -24,6 +26,7 @@ __all__ = [
     "Spring",
     "Weld",
     "assembled_basis",
+    "bodies_convergence",
     "eigenfrequencies_hz",
     "interface_compliance",
     "linked",

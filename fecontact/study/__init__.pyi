@@ -1,3 +1,4 @@
+from .convergence import study_convergence
 from .preload_section import PreloadSettings
 from .sections import BasisSettings
 from .sweep_section import Distribution, Span, Strobing, SweepSettings
@@ -9,4 +10,5 @@ __all__ = [
     "Span",
     "Strobing",
     "SweepSettings",
+    "study_convergence",
 ]

@@ -79,12 +79,12 @@ def modes(
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
-    Of several bodies those of each; --complex and --movie are for all bodies together, with modes
-    that are counted through.
+    Of several bodies those of each, and how much of the compliance of their interfaces they
+    resolve; --complex and --movie are for all bodies together, with modes that are counted through.
     """
     from fecontact.cli.console import waiting
-    from fecontact.cli.run_files import convergence_of, read_study
-    from fecontact.cli.tables import complex_table
+    from fecontact.cli.run_files import interfaces_of, read_study
+    from fecontact.cli.tables import complex_table, compliance_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.reduction.report import BasisReport
 
@@ -95,13 +95,23 @@ def modes(
         with waiting("Computing modes"):
             basis = described.reduced.basis
             bases = described.modal_bases() if described.bodies else {"": basis}
+            interfaces = interfaces_of(described)
         for name, one in bases.items():
             if name:
                 echo(f"\n{name}:")
-            echo(str(BasisReport(one)))
+            touched = tuple(face.name for face in interfaces if name in face.bodies)
+            echo(str(BasisReport(one, touched if name else None)))
             picture = folder / f"{described.name}{'-' * bool(name)}{name}-modes.png"
             plot_modes(one, path=picture)
             echo_written(picture)
+        if interfaces:
+            echo("\nPart of the static compliance that the modes resolve [%], under uniform "
+                 "pressure and normal\nforces at single nodes (mean and worst), then under "
+                 "traction and tangential forces:")
+            show(compliance_table(interfaces))
+            for face in interfaces:
+                if not face.enough:
+                    echo(f"note: {face.recommendation}")
         sliding = None
         if complex_:
             from fecontact.analysis.complex_modes import complex_modes
@@ -116,7 +126,9 @@ def modes(
             echo_written(render_mode(basis, folder / f"{described.name}-{kind}-{movie}.mp4", movie,
                                      modes=sliding, progress=True))
         if converge:
-            result = convergence_of(described)
+            from fecontact.study.convergence import study_convergence
+
+            result = study_convergence(described, progress=True)
             echo(f"\n{result}")
             picture = folder / f"{described.name}-convergence.png"
             plot_convergence(result, path=picture)

@@ -95,7 +95,8 @@ class InterfaceCompliance(Summarised):
         of = f" of body '{self.stiffest}'" if self.stiffest else ""
         return (f"Interface '{self.name}' is too stiff: only {100.0 * self.worst:.3g} % of its "
                 f"static compliance under {load} is resolved. Complete the modes{of} with "
-                f"reduction = \"residual\" (tolerance 0.1 or less), or keep more modes.")
+                f"reduction = \"residual\" and a small tolerance, such as 0.01, or keep more "
+                f"modes.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Resolved parts, mean and worst over the nodes."""
