@@ -114,7 +114,7 @@ class StudyModels:
             raise InputError(f"{self.title} describes a single body; Study.{name} is for "
                              f"several, use Study.{instead}.")
 
-    def reuse(self, other: "StudyModels") -> None:
+    def reuse(self, other: Self) -> None:
         """Take over what another study has made, as far as it depends on equal sections."""
         for made, needed in _MADE_FROM.items():
             if made in vars(other) and needed(self) == needed(other):
