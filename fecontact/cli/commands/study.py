@@ -147,24 +147,26 @@ def preload(
     """Load a study along the path of [preload]; write a table and plots of shear and force loop."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_preload
-    from fecontact.cli.tables import table
+    from fecontact.cli.tables import preload_table, table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.system.quasistatic.prestressed_modes import prestressed_modes
 
     described = read_study(study, set_)
     with output_folder(output or described.results) as folder:
-        with waiting("Loading the body"):
+        with waiting("Loading the system"):
             history = described.load_history()
         files = write_preload(described, history, folder)
-        show(table("", "", rows=history.summary()))
+        system = described.system()
+        show(preload_table(history, system.basis))
         if modes:
-            found = prestressed_modes(described.system(), history)
+            found = prestressed_modes(system, history)
             show(table("mode", "frequency [Hz]", "damping ratio", rows=(
                 (str(number), f"{frequency:.6g}", f"{ratio:.3g}")
                 for number, (frequency, ratio) in enumerate(
                     zip(found.frequencies_hz, found.damping_ratios, strict=True)))))
         if history.statistics["jumps"]:
-            echo(f"note: the body jumps {history.statistics['jumps']} times along the path.")
+            what = "the bodies jump" if described.bodies else "the body jumps"
+            echo(f"note: {what} {history.statistics['jumps']} times along the path.")
         echo_written(*files)
     if history.status != "finished":
         return fail("the path of loads has no equilibrium beyond the points that are written; "
@@ -224,7 +226,7 @@ def run(
 
 
 def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> int:
-    """Wear the contact face of a study over many cycles; the loads redistribute.
+    """Wear the contact faces of a study over many cycles; the loads redistribute.
 
     The section [wear] of the study gives the law, its coefficient, the blocks and the acceleration
     of cycles. Writes the history (NAME-wear.h5) and a plot of the worn profile. Ctrl-C stops it;
@@ -232,7 +234,7 @@ def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study
-    from fecontact.cli.tables import table
+    from fecontact.cli.tables import wear_table
     from fecontact.core.files.atomic_write import output_folder
 
     described = read_study(study, set_)
@@ -247,6 +249,6 @@ def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
             stored = write_wear(folder / f"{described.name}-wear.h5", history)
             picture = folder / f"{described.name}-wear.png"
             plot_wear(history, basis=basis, path=picture)
-        show(table("", "", rows=history.summary()))
+        show(wear_table(history, basis))
         echo_written(stored, picture)
     return INTERRUPTED if history.status.name == "INTERRUPTED" else 0

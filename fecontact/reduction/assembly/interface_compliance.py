@@ -156,12 +156,13 @@ def interface_compliance(
                 FreeSystem.of(body), nodal[used] @ body.expansion).compliance
         whole += full
         missing[name] = full - kept
-    found, faces = {}, contact_faces(basis)
+    faces, first = contact_faces(basis), 0
+    found: dict[str, InterfaceCompliance] = {}
     for name, count in basis.groups:
-        first = sum(len(one.nodes) for one in found.values())
         face = next((face for face in faces if face.name == name), None)
         found[name] = _compared(name, face.bodies if face else (), whole, missing,
                                 basis.tributary, slice(first, first + count))
+        first += count
     return found
 
 
