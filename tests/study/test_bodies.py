@@ -266,6 +266,11 @@ def test_commands_name_bodies_and_interfaces(tmp_path, capsys, monkeypatch):
     assert "pad.contact on block.top" in out
     assert fc.read_mesh("results/a-pad.msh").nodes.max(axis=0).tolist() == [0.09, 0.06]
     assert execute(["modes", "a.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "no contact nodes" not in out
+    assert out.count("The body has contact at the interface 'lining'") == 2
+    assert "static compliance that the modes resolve [%]" in out
+    assert "note:" not in out
     assert (tmp_path / "results" / "a-pad-modes.png").exists()
     assert execute(["run", "a.toml", *short]) == 0
     stored = fc.read_case("results/a.vtkhdf")

@@ -136,13 +136,20 @@ def test_few_modes_and_what_is_refused(study, found):
 def test_the_command_prints_and_draws_it(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert execute(["init", "a.toml", "--shape", "pad"]) == 0
-    assert execute(["modes", "a.toml", "--converge"]) == 0
-    out = capsys.readouterr().out
-    assert "no contact nodes" not in out
-    assert "The body has contact at the interface 'lining'" in out
-    assert "note:" not in out
-    assert "interface 'lining', missing compliance" in out
-    assert (tmp_path / "results" / "a-convergence.png").exists()
-    assert execute(["modes", "a.toml", "--set", "bodies.pad.basis.reduction=vibration"]) == 0
+    assert execute(["modes", "a.toml", "--converge",
+                    "--set", "bodies.pad.basis.reduction=vibration"]) == 0
     out = capsys.readouterr().out
     assert "note: Interface 'lining' is too stiff: only" in out
+    assert "interface 'lining', missing compliance" in out
+    assert (tmp_path / "results" / "a-convergence.png").exists()
+
+
+def test_the_command_names_bodies_that_only_links_hold(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tables = fc.Study.from_toml(template("pad")).with_(**BOLT).tables(defaults=False)
+    del tables["interfaces"]
+    (tmp_path / "a.toml").write_text(fc.Study.from_tables(tables).to_toml())
+    assert execute(["modes", "a.toml"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("The body touches nothing at an interface.") == 2
+    assert "static compliance that the modes resolve" not in out
