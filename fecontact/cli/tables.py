@@ -91,7 +91,7 @@ def preload_table(history: "LoadHistory", basis: "ModalBasis") -> Any:
     """
     from fecontact.core.units import quantity
     from fecontact.reduction.assembly.contact_faces import contact_faces
-    from fecontact.system.quasistatic.history import STATES
+    from fecontact.system.quasistatic.rest_state import STATES
 
     faces, rows = contact_faces(basis), dict(history.summary())
     if not faces[0].name:
