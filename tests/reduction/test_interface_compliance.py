@@ -5,7 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 from scipy.linalg import eigh
 
-from fecontact import ElasticBody, InputError, Material, modal_basis
+from fecontact import ElasticBody, InputError, Material, Mesh, modal_basis
 from fecontact.fem import pair_faces
 from fecontact.reduction import (
     BasisReport,
@@ -163,3 +163,34 @@ def test_what_cannot_be_compared_is_refused(bodies, pairing):
             (with_point, bodies, r"linked bodies.*assembled_basis\(bases, pairings\)")):
         with pytest.raises(InputError, match=f"interface_compliance.*{told}"):
             interface_compliance(wrong, given)
+
+
+def fork():
+    """Two prongs of one body, held at their left end, the upper one above the lower one."""
+    nodes = np.array([(0.01 * i, 0.005 * j) for j in range(6) for i in range(9)])
+    at = np.arange(len(nodes)).reshape(6, 9)
+    cells = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1)
+    # Without the middle row of cells but for its first one, which holds the prongs together.
+    kept = np.ones(cells.shape[:2], dtype=bool)
+    kept[2, 1:] = False
+    mesh = Mesh(nodes, cells[kept], {
+        "lower": np.column_stack([at[2, 1:-1], at[2, 2:]])[:, ::-1],
+        "upper": np.column_stack([at[3, 1:-1], at[3, 2:]]),
+        "root": np.column_stack([at[:-1, 0], at[1:, 0]])})
+    return ElasticBody(mesh, thickness=0.02, fixed={"root": "xy"})
+
+
+def test_a_body_that_touches_itself():
+    """Both sides move with the same modes: rows of node less foot on one stiffness matrix."""
+    bodies = {"fork": fork()}
+    touch = pair_faces(bodies, "fork.upper", "fork.lower")
+    bases = reduce_bodies(bodies, [touch], modes=5, reduction="vibration")
+    found = interface_compliance(assembled_basis(bases, {"gap": touch}), bodies)["gap"]
+    E, n = bodies["fork"].expansion.toarray(), len(touch.tributary)
+    rows = (touch.nodes - touch.feet).toarray().reshape(n, 3, -1)[:, :2].reshape(2 * n, -1) @ E
+    whole = rows @ np.linalg.solve(E.T @ bodies["fork"].stiffness @ E, rows.T)
+    np.testing.assert_allclose(found.node_compliance, np.diag(whole).reshape(n, 2), rtol=1e-9)
+    assert found.bodies == ("fork",)
+    # A few modes bend the prongs, but do not dent them.
+    assert found.uniform[1] > 0.99
+    assert found.worst < 0.2
