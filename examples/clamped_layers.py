@@ -38,7 +38,7 @@ from fecontact import (
 from fecontact.fem import pair_faces
 from fecontact.laws import Constant, ConstantFriction, PrescribedForce
 from fecontact.reduction import reduce_bodies
-from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system import LoadHistory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,4 +1,16 @@
-from . import analysis, bifurcation, fem, integrate, io, laws, plot, reduction, study, sweeps
+from . import (
+    analysis,
+    bifurcation,
+    fem,
+    integrate,
+    io,
+    laws,
+    plot,
+    reduction,
+    study,
+    sweeps,
+    system,
+)
 from .core.errors import (
     AnalysisError,
     FecontactError,
@@ -98,6 +110,7 @@ __all__ = [
     "study",
     "sweep",
     "sweeps",
+    "system",
     "write_case",
     "write_mesh",
 ]

@@ -1,15 +1,18 @@
 from .output.files.branches import read_branch, read_branches, write_branch, write_branches
+from .output.files.case import Case
 from .output.files.dataset import to_xarray
 from .output.files.export import export_csv, export_fields, export_mat, export_netcdf
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .output.files.wear import read_wear, write_wear
 from .reduction.matrix_files import AssembledMatrix, read_matrix
-from .reduction.matrix_files.uff import read_uff
+from .reduction.matrix_files.uff import UffModes, read_uff
 from .sweeps.table import read_table
 
 __all__ = [
     "AssembledMatrix",
+    "Case",
+    "UffModes",
     "export_csv",
     "export_fields",
     "export_mat",

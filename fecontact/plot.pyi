@@ -10,7 +10,7 @@ from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.contact_map import plot_contact_map
 from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
-from .output.plots.figure import new_figure
+from .output.plots.figure import StyledFigure, new_figure
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.run import plot_energies, plot_history, plot_phase
@@ -26,6 +26,7 @@ __all__ = [
     "COLOURS",
     "STATE_COLOURS",
     "Inset",
+    "StyledFigure",
     "new_figure",
     "phase_inset",
     "picture",

@@ -648,7 +648,7 @@ Rodas5P(keep_checkpoint=3)
 """
 
 NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study",
-              "sweeps", "plot", "io")
+              "sweeps", "system", "plot", "io")
 
 
 @pytest.fixture(scope="module")

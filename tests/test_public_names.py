@@ -1,5 +1,6 @@
 """The public names: all there, documented, and quick to import."""
 
+import ast
 import importlib
 import inspect
 import pydoc
@@ -7,13 +8,15 @@ import re
 import subprocess
 import sys
 import textwrap
+import typing
+from functools import cached_property
 
 import pytest
 
 import fecontact
 
 NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study",
-              "sweeps", "plot", "io")
+              "sweeps", "system", "plot", "io")
 PUBLIC = [("fecontact", name) for name in fecontact.__all__ if name not in NAMESPACES] + [
     (f"fecontact.{space}", name) for space in NAMESPACES
     for name in importlib.import_module(f"fecontact.{space}").__all__]
@@ -32,7 +35,7 @@ def test_every_public_name_exists_and_is_documented(space, name):
 def test_every_name_has_one_place():
     names = [name for _, name in PUBLIC]
     assert len(set(names)) == len(names)
-    assert len(fecontact.__all__) < 60
+    assert len(fecontact.__all__) <= 60
     assert set(NAMESPACES) <= set(fecontact.__all__)
     assert fecontact.laws.LuGreFriction.__module__ == "fecontact.laws.friction.bristle"
 
@@ -90,6 +93,66 @@ def test_help_of_a_public_function_fits_a_screen():
         assert len(signature) <= 13, name
         assert len(shown) <= 45, name
         assert len(shown) + len(signature) - 1 <= 52, name
+
+
+def names_for_types(module):
+    """Names of a module with those that it imports for type checkers alone."""
+    found = dict(vars(module))
+    for block in ast.parse(inspect.getsource(module)).body:
+        if not (isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"):
+            continue
+        for one in block.body:
+            for alias in one.names:
+                source = importlib.import_module(
+                    one.module if isinstance(one, ast.ImportFrom) else alias.name)
+                found[alias.asname or alias.name] = (
+                    getattr(source, alias.name) if isinstance(one, ast.ImportFrom) else source)
+    return found
+
+
+def annotated(thing):
+    """All types in the annotations of a function, or of a class, its fields and its methods."""
+    if inspect.isroutine(thing):
+        parts = [inspect.unwrap(thing)]
+    else:
+        parts = []
+        for cls in thing.__mro__:
+            if not cls.__module__.startswith("fecontact."):
+                continue
+            inner = [getattr(one, "fget", None) or getattr(one, "func", None)
+                     or getattr(one, "__func__", one) for name, one in vars(cls).items()
+                     if not name.startswith("_") and (inspect.isfunction(one) or isinstance(
+                         one, property | cached_property | classmethod | staticmethod))]
+            parts += [cls, *(one for one in inner if inspect.isfunction(one))]
+    for part in parts:
+        hints = typing.get_type_hints(part, names_for_types(sys.modules[part.__module__]))
+        yield from (hint for name, hint in hints.items() if not name.startswith("_"))
+
+
+def classes_in(hint):
+    """The classes in a type: in its arguments, options, and behind its alias."""
+    if hasattr(hint, "__value__"):
+        yield from classes_in(hint.__value__)
+    elif isinstance(hint, list | tuple):
+        for one in hint:
+            yield from classes_in(one)
+    else:
+        if inspect.isclass(hint):
+            yield hint
+        yield from classes_in(typing.get_args(hint))
+
+
+def test_what_public_names_take_and_give_has_a_public_name():
+    """Also their fields, properties and methods: users import it for checks and annotations."""
+    pytest.importorskip("xarray")
+    things = public_things()
+    known = {thing for thing in things.values() if inspect.isclass(thing)}
+    assert len(known) > 150
+    nameless = {f"{cls.__module__}.{cls.__qualname__} of {name}" for name, thing in things.items()
+                if inspect.isroutine(thing) or inspect.isclass(thing)
+                for hint in annotated(thing) for cls in classes_in(hint)
+                if cls.__module__.startswith("fecontact.") and cls not in known}
+    assert not nameless
 
 
 @pytest.mark.parametrize("alias", ["ArrayLike", "Array", "PerNode"])

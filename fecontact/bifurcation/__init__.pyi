@@ -4,6 +4,7 @@ from .attractors.poincare_scan import PoincareScan, poincare_scan
 from .codim2 import codim2_curve
 from .continuation.branch import Branch
 from .continuation.points import (
+    BranchHeader,
     BranchPoint,
     CrossingPoint,
     DoubleHopfPoint,
@@ -32,6 +33,7 @@ __all__ = [
     "Axis",
     "Basins",
     "Branch",
+    "BranchHeader",
     "BranchPoint",
     "BranchSettings",
     "BranchStatus",

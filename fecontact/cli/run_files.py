@@ -11,7 +11,7 @@ from fecontact.core.errors import FecontactError, InputError
 
 if TYPE_CHECKING:
     from fecontact.integrate.trajectory import Trajectory
-    from fecontact.reduction.convergence import ModeConvergence
+    from fecontact.reduction.assembly.interface_compliance import InterfaceCompliance
     from fecontact.study.sections import RenderSettings
     from fecontact.study.study import Study
     from fecontact.system.quasistatic.history import LoadHistory
@@ -178,16 +178,17 @@ def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") ->
                   progress=True)
 
 
-def convergence_of(study: "Study") -> "ModeConvergence":
-    """Convergence of frequencies and contact compliance with mesh refinement and modes."""
-    from fecontact.reduction.convergence import mode_convergence
+def interfaces_of(study: "Study") -> list["InterfaceCompliance"]:
+    """Compliance of the interfaces of several bodies, or of several boundaries of one body."""
+    from fecontact.reduction.assembly.assembled_basis import assembled_basis
+    from fecontact.reduction.assembly.interface_compliance import interface_compliance
 
     if study.bodies:
-        raise InputError("--converge is for a single body; refine the meshes of several bodies by "
-                         "element_size and compare their modes.")
-    settings = replace(study.basis, select=None)
-    body = study.elastic_body()
-    return mode_convergence(
-        body, lambda part, count: replace(settings, modes=count).modal_basis(part), settings.modes,
-        levels=4 if body.mass.shape[0] < 4000 else 3,
-        progress=True)
+        # Links change the modes of the bodies, but not what the modes of each resolve.
+        basis = assembled_basis(study.modal_bases(), study.pairings())
+        bodies: Any = study.elastic_bodies()
+    else:
+        basis, bodies = study.modal_basis(), study.elastic_body()
+    if len(basis.groups) < (1 if study.bodies else 2):
+        return []
+    return list(interface_compliance(basis, bodies).values())

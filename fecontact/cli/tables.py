@@ -10,7 +10,11 @@ if TYPE_CHECKING:
     from fecontact.fem.mesh import Mesh
     from fecontact.integrate.events import Events
     from fecontact.integrate.trajectory import Trajectory
+    from fecontact.integrate.wear import WearHistory
+    from fecontact.reduction.assembly.interface_compliance import InterfaceCompliance
+    from fecontact.reduction.modal_basis import ModalBasis
     from fecontact.system.complex_modes import ComplexModes
+    from fecontact.system.quasistatic.history import LoadHistory
 
 ROUGH_SLOPE = 0.3  # of the ground, above which friction along x is a rough assumption
 
@@ -67,6 +71,60 @@ def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
         rows.append((face.title, f"{len(face.abscissa)} nodes, " + ", ".join(
             f"{100.0 * share:.1f} % {name}" for name, share in shares.items())))
     return rows
+
+
+def compliance_table(interfaces: "Iterable[InterfaceCompliance]") -> Any:
+    """Parts of the static compliance of interfaces that the modes resolve, in per cent."""
+    rows = []
+    for one in interfaces:
+        figures = [f"{100.0 * part:.2f}" for axis in (1, 0) for part in (
+            one.uniform[axis], one.nodes[:, axis].mean(), one.nodes[:, axis].min())]
+        rows.append((one.name, f"{len(one.nodes)}", *figures))
+    return table("interface", "nodes", "pressure", "mean", "worst", "traction", "mean", "worst",
+                 rows=rows)
+
+
+def preload_table(history: "LoadHistory", basis: "ModalBasis") -> Any:
+    """Summary of a history of loading, of several bodies with the states and forces by interface.
+
+    Their sum over faces of different directions would mean nothing.
+    """
+    from fecontact.core.units import quantity
+    from fecontact.reduction.assembly.contact_faces import contact_faces
+    from fecontact.system.quasistatic.rest_state import STATES
+
+    faces, rows = contact_faces(basis), dict(history.summary())
+    if not faces[0].name:
+        return table("", "", rows=rows.items())
+    for total in ("at the end", "normal force", "friction force"):
+        rows.pop(total)
+    found = [("points", rows.pop("points"))]
+    for face in faces:
+        states, forces = history.contact_state[-1, face.nodes], [
+            quantity(float(values[-1, face.nodes].sum()), "N", 4)
+            for values in (history.normal_force, history.friction_force)]
+        found.append((face.title, "at the end " + ", ".join(
+            f"{np.count_nonzero(states == code)} {name}" for code, name in enumerate(STATES))))
+        found.append((f"{face.name}: forces", f"normal {forces[0]}, friction {forces[1]}"))
+    return table("", "", rows=[*found, *rows.items()])
+
+
+def wear_table(history: "WearHistory", basis: "ModalBasis") -> Any:
+    """Summary of wear, of several bodies with the depth by interface."""
+    from fecontact.core.units import quantity
+    from fecontact.reduction.assembly.contact_faces import contact_faces
+
+    faces, rows = contact_faces(basis), dict(history.summary())
+    if not faces[0].name:
+        return table("", "", rows=rows.items())
+    rows.pop("depth")
+    volume = rows.pop("volume")
+    for face in faces:
+        depth = history.depth[-1, face.nodes]
+        least, most = (quantity(float(value), "m") for value in (depth.min(), depth.max()))
+        place = quantity(float(face.abscissa[depth.argmax()]), "m")
+        rows[face.title] = f"{least} ... {most}, most at {face.axis} = {place}"
+    return table("", "", rows=[*rows.items(), ("volume", volume)])
 
 
 def complex_table(modes: "ComplexModes") -> Any:

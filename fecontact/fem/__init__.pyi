@@ -1,8 +1,10 @@
+from .fields import BodyFields
 from .pairing import Pairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
 from .rotation import Rotation
 
 __all__ = [
+    "BodyFields",
     "Pairing",
     "PairingReport",
     "Rotation",

@@ -12,6 +12,7 @@ from fecontact.fem.face_curve import Closest, Face
 from fecontact.fem.face_samples import Samples
 
 SAME = 1e-9  # of an edge: gaps and lengths below this are round-off
+_TINY = 1e-12  # [m], less than an atom: shown as zero
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,9 +64,14 @@ class PairingReport(Summarised):
             ("covered", f"{100.0 * self.covered:.4g} %"),
             ("largest gap", quantity(self.largest_gap, "m")),
             ("overlap closed", quantity(self.closed_overlap, "m")),
-            ("unevenness", f"{100.0 * self.unevenness:.3g} %"),
-            ("largest offset", quantity(self.largest_offset, "m")),
+            ("unevenness", f"{100.0 * _beyond(self.unevenness, SAME):.3g} %"),
+            ("largest offset", quantity(_beyond(self.largest_offset, _TINY), "m")),
         ]
+
+
+def _beyond(value: float, least: float) -> float:
+    """A value, or zero where it is round-off."""
+    return value if value >= least else 0.0
 
 
 def no_partner(samples: Samples, found: Closest, face: Face, other: Face, limit: float) -> str:

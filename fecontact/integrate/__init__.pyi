@@ -3,8 +3,8 @@ from .events import ContactEvents, Crossing, Events
 from .initial_state import PointStart, initial_state
 from .sensitivity import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
-from .solvers import CVODE, Rodas5P, Scipy, SetValued
-from .trajectory import Energies
+from .solvers import CVODE, Rodas5P, Scipy, SetValued, Solver, Task
+from .trajectory import Energies, Solution
 from .wear import WearHistory, wear_history
 
 __all__ = [
@@ -20,6 +20,9 @@ __all__ = [
     "Sensitivity",
     "SetValued",
     "SmoothingCost",
+    "Solution",
+    "Solver",
+    "Task",
     "WearHistory",
     "initial_state",
     "smoothing_cost",

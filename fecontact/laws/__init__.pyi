@@ -1,5 +1,5 @@
 from .base import Bound, FrictionLaw, NormalLaw, NotNegative, PerNode, Positive
-from .check import check_law
+from .check import CompiledLaw, check_law
 from .friction.bristle import BoucWenFriction, DahlFriction, LuGreFriction
 from .friction.maxwell_slip import FourParameterIwanFriction, IwanFriction, JenkinsFriction
 from .friction.stribeck import (
@@ -13,7 +13,7 @@ from .friction.stribeck import (
 )
 from .ground.fourier_series import FourierSeries
 from .ground.measured_profile import MeasuredProfile
-from .ground.motion import HarmonicSpeed, SpeedRamp
+from .ground.motion import GroundMotion, HarmonicSpeed, SpeedRamp
 from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .ground.sliding import SlidingRotation, SlidingTranslation
@@ -34,6 +34,7 @@ __all__ = [
     "BackBurdekinContact",
     "BoucWenFriction",
     "Bound",
+    "CompiledLaw",
     "Constant",
     "ConstantFriction",
     "CosineSurface",
@@ -50,6 +51,7 @@ __all__ = [
     "GaussianFriction",
     "GaussianSurface",
     "GreenwoodWilliamson",
+    "GroundMotion",
     "Harmonic",
     "HarmonicSpeed",
     "Harmonics",

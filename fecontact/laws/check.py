@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.compiled import CompiledLaw
+from fecontact.core.compiled import CompiledLaw as CompiledLaw
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw, NormalLaw

@@ -1,8 +1,10 @@
 from .assembly.assembled_basis import PointPairing, assembled_basis
+from .assembly.bodies_convergence import BodiesConvergence, bodies_convergence
+from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, Spring, Weld, linked
-from .convergence import mode_convergence
+from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
-from .from_modes import normalisation
+from .from_modes import Normalisation, normalisation
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from .point_masses import point_masses
 from .reduce_body import reduce_bodies
@@ -12,17 +14,23 @@ from .rotating import ModalRotation
 
 __all__ = [
     "BasisReport",
+    "BodiesConvergence",
     "BodyPart",
     "Bushing",
     "Hinge",
+    "InterfaceCompliance",
     "ModalRotation",
+    "ModeConvergence",
     "ModeShapes",
+    "Normalisation",
     "PointPairing",
     "ReductionQuality",
     "Spring",
     "Weld",
     "assembled_basis",
+    "bodies_convergence",
     "eigenfrequencies_hz",
+    "interface_compliance",
     "linked",
     "mode_convergence",
     "normalisation",

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fecontact.core.errors import choices
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
 from fecontact.reduction.modal_basis import ModalBasis
@@ -18,9 +19,17 @@ class BasisReport:
     """Figures of merit of a basis; ``str(report)`` is a table with a recommendation.
 
     Figures that need the finite-element body are NaN for a basis without one.
+
+    Attributes
+    ----------
+    basis : ModalBasis
+    interfaces : tuple of str, optional
+        Of one of several bodies, the interfaces at which it touches others; see
+        :func:`fecontact.reduction.interface_compliance` for their compliance.
     """
 
     basis: ModalBasis
+    interfaces: tuple[str, ...] | None = None
 
     @property
     def effective_mass(self) -> Array:
@@ -85,8 +94,8 @@ class BasisReport:
     def recommendation(self) -> str:
         """Recommendation in one or two sentences."""
         if self.basis.parts:
-            return ("The basis is that of several bodies; the reports of their own bases judge "
-                    "the compliance at their faces.")
+            return ("The basis is that of several bodies; interface_compliance compares the "
+                    "compliance of its interfaces with that of the finite-element bodies.")
         if self.basis.quality is None:
             return ("The basis came without a body, so its compliance at the contact cannot be "
                     "judged; compare it with a static solution of the full model.")
@@ -94,8 +103,14 @@ class BasisReport:
             return ("The basis is rigid: the body moves, but does not deform. Keep more modes "
                     "where its vibration or its elasticity at the contact matters.")
         error = self.contact_error
+        if self.interfaces:
+            noun = "interface" if len(self.interfaces) == 1 else "interfaces"
+            return (f"The body has contact at the {noun} {choices(self.interfaces)}; the basis "
+                    f"can be used up to about {self._valid_hz:.4g} Hz.")
         if not error.size:
-            return "The body has no contact nodes."
+            return ("The body touches nothing at an interface." if self.interfaces is not None else
+                    "The basis has no contact nodes of its own; if the body is one of several, "
+                    "interface_compliance judges its interfaces.")
         node, axis = np.unravel_index(int(np.argmax(error)), error.shape)
         worst = float(error[node, axis])
         if worst <= _GOOD:

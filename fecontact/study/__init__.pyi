@@ -1,12 +1,34 @@
+from .bodies_section import BodyBasisSettings, BodySections, InterfaceSettings, Placement, Reduced
+from .convergence import study_convergence
+from .geometry_section import MeshFile
 from .preload_section import PreloadSettings
-from .sections import BasisSettings
+from .sections import (
+    BasisSettings,
+    BodySettings,
+    OutputSettings,
+    RenderSettings,
+    SimulationSettings,
+    WearSettings,
+)
 from .sweep_section import Distribution, Span, Strobing, SweepSettings
 
 __all__ = [
     "BasisSettings",
+    "BodyBasisSettings",
+    "BodySections",
+    "BodySettings",
     "Distribution",
+    "InterfaceSettings",
+    "MeshFile",
+    "OutputSettings",
+    "Placement",
     "PreloadSettings",
+    "Reduced",
+    "RenderSettings",
+    "SimulationSettings",
     "Span",
     "Strobing",
     "SweepSettings",
+    "WearSettings",
+    "study_convergence",
 ]

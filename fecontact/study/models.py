@@ -1,9 +1,10 @@
 """Meshes, elastic bodies and modal bases of a study, made once and kept."""
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from fecontact.core.errors import InputError, choices
 from fecontact.core.tables import located
@@ -113,11 +114,22 @@ class StudyModels:
             raise InputError(f"{self.title} describes a single body; Study.{name} is for "
                              f"several, use Study.{instead}.")
 
-    def reuse(self, other: "StudyModels") -> None:
+    def reuse(self, other: Self) -> None:
         """Take over what another study has made, as far as it depends on equal sections."""
         for made, needed in _MADE_FROM.items():
             if made in vars(other) and needed(self) == needed(other):
                 vars(self)[made] = vars(other)[made]
+
+    def refined(self) -> Self:
+        """The same study on meshes whose cells are cut into four."""
+        finer = copy(self)
+        for made in _MADE_FROM:
+            vars(finer).pop(made, None)
+        if self.bodies:
+            vars(finer)["_meshes"] = {name: mesh.refined() for name, mesh in self._meshes.items()}
+        else:
+            vars(finer)["_mesh"] = self._mesh.refined()
+        return finer
 
     @property
     def reduced(self) -> Reduced:

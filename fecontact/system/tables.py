@@ -31,22 +31,35 @@ def system_from_tables(
 ) -> ContactSystem:
     """The contact system of a basis and tables ``normal``, ``friction``, ... , ``gap``."""
     parts = system_parts(tables, where, PART_CLASSES)
-    groups = convert(tables.get("interfaces", {}), Mapping[str, Mapping[str, Any]], where,
-                     "interfaces")
-    sliding: dict[str, Any] = {}
-    for group, laws in groups.items():
-        for part, table in laws.items():
-            place = f"{where}: [interfaces.{group}]"
-            require_known(part, ("normal", "friction", "sliding"), place)
-            if part == "sliding":
-                sliding[group] = convert(table, Sliding, place, part)
-                continue
+    for part in ("normal", "friction"):
+        for group, table in law_tables(tables, part, where).items():
             if not isinstance(parts.get(part), dict):
                 parts[part] = {}
             parts[part][group] = from_table(PART_CLASSES[part], table,
                                             f"{where}: [interfaces.{group}.{part}]")
     gap = convert(tables.get("gap", 0.0), float | tuple[float, ...], where, "gap")
-    return ContactSystem(basis, gap=gap, sliding=sliding, **parts)
+    return ContactSystem(basis, gap=gap, sliding=sliding_from_tables(tables, where), **parts)
+
+
+def law_tables(tables: Mapping[str, Any], part: str, where: str) -> dict[str, Any]:
+    """Tables of the laws ``normal`` or ``friction`` of single interfaces, by their names."""
+    return {group: one[part] for group, one in _interfaces(tables, where).items() if part in one}
+
+
+def sliding_from_tables(tables: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Prescribed sliding by the names of the interfaces."""
+    return {group: convert(one["sliding"], Sliding, f"{where}: [interfaces.{group}]", "sliding")
+            for group, one in _interfaces(tables, where).items() if "sliding" in one}
+
+
+def _interfaces(tables: Mapping[str, Any], where: str) -> Mapping[str, Mapping[str, Any]]:
+    groups: Mapping[str, Mapping[str, Any]] = convert(
+        tables.get("interfaces", {}), Mapping[str, Mapping[str, Any]], where, "interfaces")
+    for group, one in groups.items():
+        for part in one:
+            require_known(part, ("normal", "friction", "sliding"),
+                          f"{where}: [interfaces.{group}]")
+    return groups
 
 
 def system_parts(

@@ -48,6 +48,8 @@ def test_block_on_a_belt(study, capsys):
     (["ground.speed", "--bounds", "1", "1"], "bounds = [1.0, 1.0] must be two values"),
     (["ground.speed", "--bounds", "0.01", "0.02", "--set", "drive.amplitude_x=1e-3",
       "--set", "drive.angular_frequency=10.0"], "take the drive's amplitude"),
+    ([], "block.toml: [branch] lacks the key 'parameter'"),
+    (["ground.speed"], "block.toml: [branch] lacks the key 'bounds'"),
 ])
 def test_errors_are_one_line(study, capsys, arguments, message):
     assert execute(["branch", str(study), *arguments]) != 0

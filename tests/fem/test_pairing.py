@@ -75,6 +75,7 @@ def test_uniform_pressure_through_matching_meshes_is_the_consistent_load(triangl
     assert pairing.tangents == pytest.approx(np.tile(TURN @ [1.0, 0.0], (len(pairing.gaps), 1)),
                                              abs=1e-14)
     assert pairing.report.unevenness < 1e-13
+    assert dict(pairing.summary())["unevenness"] == "0 %"
     assert pairing.report.covered == pytest.approx(1.0, abs=1e-12)
     assert (pairing.body, pairing.other) == ("pad", "disc")
 

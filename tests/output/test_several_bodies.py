@@ -15,7 +15,7 @@ from synthetic import run
 from fecontact import InputError, Load, LoadPath, load_history, read_case, write_case
 from fecontact.analysis import history
 from fecontact.cli import execute
-from fecontact.cli.tables import contact_shares, run_table
+from fecontact.cli.tables import contact_shares, preload_table, run_table, wear_table
 from fecontact.integrate import WearHistory
 from fecontact.io import export_pvd, to_xarray
 from fecontact.laws import EnergyWear, SlidingRotation, SlidingTranslation
@@ -240,6 +240,43 @@ def test_shear_has_a_column_an_interface():
             axis.lines[2].get_ydata(), (history.friction_force[-1] / lengths)[nodes])
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert names[0] == "limit"
+
+
+def printed(table):
+    from rich.console import Console
+
+    console = Console(width=120, file=StringIO())
+    console.print(table)
+    return " ".join(console.file.getvalue().split())
+
+
+def test_what_loading_leaves_is_told_by_interface():
+    """Forces of faces that look different ways are not added; those of each carry the load."""
+    basis = stack()
+    T = basis.T.copy()
+    T[1, 1, 1] = 1.0
+    system = stack_system().with_(basis=replace(basis, T=T), load=Load(100.0))
+    history = load_history(system, LoadPath(load_scale=(1.0, 2.0), steps=2))
+    text = printed(preload_table(history, system.basis))
+    assert "shoe: block and beam at the end 0 open, " in text
+    shoe, foot = (history.normal_force[-1, nodes].sum() for nodes in (slice(0, 8), slice(8, 29)))
+    assert f"shoe: forces normal {shoe:.4g} N, friction " in text
+    assert f"foot: forces normal {foot:.4g} N, friction " in text
+    assert f" {shoe + foot:.4g} N" not in text
+
+
+def test_wear_is_told_by_interface(trajectory):
+    basis = trajectory.system.basis
+    n = basis.contact_nodes
+    depth = np.outer([0.0, 2.0], np.arange(1.0, n + 1)) * 1e-6
+    history = WearHistory(
+        EnergyWear(1e-13), 0.01, 100.0, basis.contact_x, basis.tributary, np.zeros(n),
+        np.array([0.0, 100.0]), np.arange(2.0), depth, np.ones((1, n)), np.ones((1, n)),
+        np.zeros(3))
+    text = printed(wear_table(history, basis))
+    # Nodes 0 to 7 of the shoe end at x = 0.11 m, 8 to 28 of the foot at 0.2 m.
+    assert "shoe: block and beam 2 µm ... 16 µm, most at x = 110 mm" in text
+    assert "foot: beam and ground 18 µm ... 58 µm, most at x = 200 mm" in text
 
 
 def test_wear_has_a_column_an_interface(trajectory):

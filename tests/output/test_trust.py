@@ -12,6 +12,15 @@ import pytest
 import fecontact as fc
 from fecontact import Study
 from fecontact.cli import execute
+from fecontact.core.user_code import module_name, user_module
+from fecontact.integrate import PointStart
+from fecontact.laws import (
+    ConstantFriction,
+    LinearContact,
+    SlidingRotation,
+    SlidingTranslation,
+)
+from fecontact.reduction import PointPairing, point_masses
 
 LAW = """
 from dataclasses import dataclass
@@ -184,3 +193,57 @@ def test_a_law_that_is_loaded_needs_no_trust(tmp_path, monkeypatch):
     written = fc.write_case(tmp_path / "a.vtkhdf", fc.simulate(system, 1e-5, outputs=3))
     assert type(fc.read_case(written).trajectory.system.normal) is mylaws.Stiff
     assert Path(tmp_path / "ran").read_text() == "xx"  # by import, and by the study
+
+
+def test_sliding_of_interfaces_is_read_without_the_laws(tmp_path):
+    """The motion of the other sides is no code: slip, states and work are those of the run."""
+    file = tmp_path / "own.py"
+    file.write_text(LAW)
+    own = user_module(file)
+    bodies = {name: point_masses({"p": mass, "r": mass}, components="xy")
+              for name, mass in (("pad", 1.0), ("disc", 2.0))}
+    sliding = {"lining": SlidingTranslation(0.3, (1, 1)), "rim": SlidingRotation(2.0, (0, -0.1))}
+    system = fc.ContactSystem(bodies=bodies, interfaces=[
+        fc.Interface(name, PointPairing("pad", point, "disc", point), normal,
+                     ConstantFriction(0.4, smoothing_slope=1e3), sliding[name])
+        for name, point, normal in (("lining", "p", own.Stiff()), ("rim", "r", LinearContact(1e5)))
+    ])
+    run = fc.simulate(system, 5e-3, outputs=21, initial=PointStart(
+        velocities={"pad.p": (0.0, -0.1), "pad.r": (0.1, -0.2)}))
+    assert np.ptp(run.contact_state) == 2
+    fc.write_case(tmp_path / "run.h5", run)
+    del sys.modules[module_name(file)]
+    file.unlink()
+    read = fc.read_case(tmp_path / "run.h5").trajectory
+    for name in ("slip_velocity", "contact_state", "friction_force", "friction_work"):
+        assert np.array_equal(getattr(read, name), getattr(run, name)), name
+    assert dict(read.system.sliding) == sliding
+    motion = read.system.prescribed_motion
+    assert np.array_equal(motion.factors, system.prescribed_motion.factors)
+    # Slip is the motion of the pad along the disc less that of the disc's surface.
+    moved = run.modal_velocities @ system.basis.contact_T[:, 0].T
+    # The rim is 0.1 m above the centre: it moves in -x at 0.2 m/s.
+    np.testing.assert_allclose(moved - read.slip_velocity, np.tile(
+        (0.3 / np.sqrt(2.0), -0.2), (len(moved), 1)), rtol=0.0, atol=1e-14)
+    assert list(dict(read.system.summary())) == list(dict(system.summary()))
+    assert read.system.friction["rim"] == system.friction["rim"]
+    with pytest.raises(fc.InputError, match=r"own\.py.*if you trust"):
+        _ = read.system.normal["lining"].stiffness
+
+
+def test_sliding_that_is_damaged_in_a_file_is_told(tmp_path):
+    """Of a run whose laws are not read, too."""
+    (tmp_path / "own.py").write_text(LAW)
+    own = user_module(tmp_path / "own.py")
+    system = fc.ContactSystem(
+        bodies={"a": point_masses({"p": 1.0}), "b": point_masses({"p": 2.0})},
+        interfaces=[fc.Interface("touch", PointPairing("a", "p", "b", "p"), own.Stiff(),
+                                 ConstantFriction(0.1), SlidingTranslation(0.3))])
+    run = fc.simulate(system, 1e-4, outputs=2, initial=PointStart())
+    fc.write_case(tmp_path / "run.h5", run)
+    del sys.modules[module_name(tmp_path / "own.py")]
+    with h5py.File(tmp_path / "run.h5", "r+") as stored:
+        text = stored["system"].attrs["json"].replace('"speed": 0.3', '"speed": "fast"')
+        stored["system"].attrs["json"] = text
+    with pytest.raises(fc.InputError, match=r"run\.h5.*\[interfaces\.touch\.sliding\].*fast"):
+        fc.read_case(tmp_path / "run.h5")

@@ -37,10 +37,12 @@ def branch(
     from fecontact.cli.run_files import read_study
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.progress import titled_bar
+    from fecontact.core.tables import located
 
     described = read_study(study, set_)
     wanted = _wanted(described.branch, parameter, bounds, start)
-    _ = wanted.checked_parameter, wanted.checked_bounds
+    with located(f"{described.title}:"):
+        _ = wanted.checked_parameter, wanted.checked_bounds
     from fecontact.bifurcation.diagram import follow_branches
     from fecontact.cli.branch_results import runs_beneath, special_table, write_branch_results
 

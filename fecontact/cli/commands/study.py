@@ -79,12 +79,12 @@ def modes(
 ) -> None:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
-    Of several bodies those of each; --complex and --movie are for all bodies together, with modes
-    that are counted through.
+    Of several bodies those of each, and how much of the compliance of their interfaces they
+    resolve; --complex and --movie are for all bodies together, with modes that are counted through.
     """
     from fecontact.cli.console import waiting
-    from fecontact.cli.run_files import convergence_of, read_study
-    from fecontact.cli.tables import complex_table
+    from fecontact.cli.run_files import interfaces_of, read_study
+    from fecontact.cli.tables import complex_table, compliance_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.reduction.report import BasisReport
 
@@ -95,13 +95,23 @@ def modes(
         with waiting("Computing modes"):
             basis = described.reduced.basis
             bases = described.modal_bases() if described.bodies else {"": basis}
+            interfaces = interfaces_of(described)
         for name, one in bases.items():
             if name:
                 echo(f"\n{name}:")
-            echo(str(BasisReport(one)))
+            touched = tuple(face.name for face in interfaces if name in face.bodies)
+            echo(str(BasisReport(one, touched if name else None)))
             picture = folder / f"{described.name}{'-' * bool(name)}{name}-modes.png"
             plot_modes(one, path=picture)
             echo_written(picture)
+        if interfaces:
+            echo("\nPart of the static compliance that the modes resolve [%], under uniform "
+                 "pressure and normal\nforces at single nodes (mean and worst), then under "
+                 "traction and tangential forces:")
+            show(compliance_table(interfaces))
+            for face in interfaces:
+                if not face.enough:
+                    echo(f"note: {face.recommendation}")
         sliding = None
         if complex_:
             from fecontact.analysis.complex_modes import complex_modes
@@ -116,7 +126,9 @@ def modes(
             echo_written(render_mode(basis, folder / f"{described.name}-{kind}-{movie}.mp4", movie,
                                      modes=sliding, progress=True))
         if converge:
-            result = convergence_of(described)
+            from fecontact.study.convergence import study_convergence
+
+            result = study_convergence(described, progress=True)
             echo(f"\n{result}")
             picture = folder / f"{described.name}-convergence.png"
             plot_convergence(result, path=picture)
@@ -135,24 +147,26 @@ def preload(
     """Load a study along the path of [preload]; write a table and plots of shear and force loop."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_preload
-    from fecontact.cli.tables import table
+    from fecontact.cli.tables import preload_table, table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.system.quasistatic.prestressed_modes import prestressed_modes
 
     described = read_study(study, set_)
     with output_folder(output or described.results) as folder:
-        with waiting("Loading the body"):
+        with waiting("Loading the system"):
             history = described.load_history()
         files = write_preload(described, history, folder)
-        show(table("", "", rows=history.summary()))
+        system = described.system()
+        show(preload_table(history, system.basis))
         if modes:
-            found = prestressed_modes(described.system(), history)
+            found = prestressed_modes(system, history)
             show(table("mode", "frequency [Hz]", "damping ratio", rows=(
                 (str(number), f"{frequency:.6g}", f"{ratio:.3g}")
                 for number, (frequency, ratio) in enumerate(
                     zip(found.frequencies_hz, found.damping_ratios, strict=True)))))
         if history.statistics["jumps"]:
-            echo(f"note: the body jumps {history.statistics['jumps']} times along the path.")
+            what = "the bodies jump" if described.bodies else "the body jumps"
+            echo(f"note: {what} {history.statistics['jumps']} times along the path.")
         echo_written(*files)
     if history.status != "finished":
         return fail("the path of loads has no equilibrium beyond the points that are written; "
@@ -212,7 +226,7 @@ def run(
 
 
 def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> int:
-    """Wear the contact face of a study over many cycles; the loads redistribute.
+    """Wear the contact faces of a study over many cycles; the loads redistribute.
 
     The section [wear] of the study gives the law, its coefficient, the blocks and the acceleration
     of cycles. Writes the history (NAME-wear.h5) and a plot of the worn profile. Ctrl-C stops it;
@@ -220,7 +234,7 @@ def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study
-    from fecontact.cli.tables import table
+    from fecontact.cli.tables import wear_table
     from fecontact.core.files.atomic_write import output_folder
 
     described = read_study(study, set_)
@@ -235,6 +249,6 @@ def wear(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
             stored = write_wear(folder / f"{described.name}-wear.h5", history)
             picture = folder / f"{described.name}-wear.png"
             plot_wear(history, basis=basis, path=picture)
-        show(table("", "", rows=history.summary()))
+        show(wear_table(history, basis))
         echo_written(stored, picture)
     return INTERRUPTED if history.status.name == "INTERRUPTED" else 0

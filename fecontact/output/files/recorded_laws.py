@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.tables import from_table
 from fecontact.core.types import Array
-from fecontact.laws.registry import UntrustedError
+from fecontact.laws.registry import PART_CLASSES, UntrustedError
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import gap_values
-from fecontact.system.tables import system_parts
+from fecontact.system.interfaces import checked_sliding
+from fecontact.system.tables import law_tables, sliding_from_tables, system_parts
 
 LAW_PARTS = ("normal", "friction")
 
@@ -80,6 +82,7 @@ class RecordedSystem(ContactSystem):
 
     def _check(self) -> None:
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+        object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
 
     @property
     def memory(self) -> int:
@@ -142,7 +145,7 @@ def recorded_system(
     Raises
     ------
     InputError
-        If ground, drive or load also need user code.
+        If ground, drive, load or sliding also need user code.
     """
     parts = system_parts(tables, where, ("ground", "drive", "load"))
     laws = {part: _law(part, tables, where, needs) for part in LAW_PARTS}
@@ -151,7 +154,8 @@ def recorded_system(
                             *(() if memory is None else (memory,))])
     normal, friction, penetration, slip = (contact[:, :, k] for k in (0, 1, 2, 4))
     return RecordedSystem(
-        basis, gap=tables.get("gap", 0.0), **parts, **laws,
+        basis, gap=tables.get("gap", 0.0), sliding=sliding_from_tables(tables, where), **parts,
+        **laws,
         history=_Recorded(rows, contact, needs),
         energy=_Recorded(penetration, energy, needs),
         sticking=_Recorded(np.hstack([slip, normal, friction]), contact_state == 1, needs),
@@ -159,10 +163,16 @@ def recorded_system(
 
 
 def _law(part: str, tables: Mapping[str, Any], where: str, needs: str) -> Any:
-    """A law that needs no user code, or its placeholder."""
-    if tables.get("interfaces"):
-        return UnreadLaw(tables["interfaces"], needs)
+    """A law that needs no user code, or its placeholder; a mapping of interfaces to either."""
+    groups = law_tables(tables, part, where)
+    if groups:
+        return {group: _read(part, table, f"{where}: [interfaces.{group}.{part}]", needs)
+                for group, table in groups.items()}
+    return _read(part, tables.get(part, {}), f"{where}: [{part}]", needs)
+
+
+def _read(part: str, table: Mapping[str, Any], where: str, needs: str) -> Any:
     try:
-        return system_parts(tables, where, (part,))[part]
+        return from_table(PART_CLASSES[part], table, where)
     except UntrustedError:
-        return UnreadLaw(tables[part], needs)
+        return UnreadLaw(table, needs)

@@ -8,7 +8,9 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array, Integers
 from fecontact.output.plots.figure import new_figure
+from fecontact.reduction.assembly.bodies_convergence import BodiesConvergence
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import ModalBasis
@@ -82,13 +84,16 @@ def _first_modes(basis: ModalBasis, count: int) -> list[int]:
     return sorted(np.argsort(ranks, kind="stable")[:count].tolist())
 
 
-def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None) -> "Figure":
+def plot_convergence(
+    result: ModeConvergence | BodiesConvergence, *, path: str | Path | None = None
+) -> "Figure":
     """Plot the convergence of frequencies and contact compliance with mesh and modes.
 
     Parameters
     ----------
-    result : ModeConvergence
-        What :func:`fecontact.reduction.mode_convergence` found.
+    result : ModeConvergence or BodiesConvergence
+        What :func:`fecontact.reduction.mode_convergence` found, or of several bodies
+        :func:`fecontact.study.study_convergence`.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -97,28 +102,68 @@ def plot_convergence(result: ModeConvergence, *, path: str | Path | None = None)
     InputError
         For another suffix, or a file that cannot be written.
     """
-    require_kind("plot_convergence", ModeConvergence, result=result)
-    with new_figure(1.2 * _WIDTH, 4.0, path) as figure:
+    require_kind("plot_convergence", (ModeConvergence, BodiesConvergence), result=result)
+    several = isinstance(result, BodiesConvergence)
+    with new_figure(1.2 * _WIDTH, 5.0 if several else 4.0, path) as figure:
         meshes, modes = figure.subplots(1, 2)
-        sizes = result.unknowns[:-1]
-        change = np.abs(result.frequencies_hz[:-1] / result.frequencies_hz[-1] - 1.0)
-        for i, values in enumerate(change.T):
-            hertz = result.frequencies_hz[-1, i]
-            meshes.loglog(sizes, values, "o-", label=f"f{i + 1} = {hertz:.5g} Hz")
-        compliance = np.abs(result.compliance[:-1] / result.compliance[-1] - 1.0)
-        for values, axis, style in zip(compliance.T, "xy", ("s--", "^--"), strict=True):
-            meshes.loglog(sizes, values, style, color="#707070",
-                          label=f"contact compliance in {axis}")
-        meshes.set(xlabel="unknowns of the mesh", ylabel="relative distance from the finest mesh")
-        meshes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        for values, axis, style in zip(result.missing.T, "xy", ("s-", "^-"), strict=True):
-            modes.semilogx(result.modes, 100.0 * values, style, label=f"in {axis}")
-        modes.set(xlabel="modes", ylabel="missing contact compliance, worst node [%]")
-        modes.set_xticks(result.modes, [str(count) for count in result.modes])
+        counts = (_bodies_convergence(meshes, modes, result)
+                  if isinstance(result, BodiesConvergence)
+                  else _body_convergence(meshes, modes, result))
+        meshes.set(xlabel="unknowns of the mesh" + "es" * several,
+                   ylabel="relative distance from the finest mesh")
+        meshes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0),
+                      fontsize="x-small" if several else None)
+        modes.set(xlabel="modes of all bodies" if several else "modes",
+                  ylabel="missing contact compliance, worst " + (
+                      "load [%]" if several else "node [%]"))
+        modes.set_xticks(counts, [str(count) for count in counts])
         modes.minorticks_off()
         modes.set_ylim(bottom=0.0)
-        modes.legend()
+        if modes.lines:
+            modes.legend()
     return figure
+
+
+def _body_convergence(meshes: "Axes", modes: "Axes", result: ModeConvergence) -> Integers:
+    """Draw that of a single body; returns the numbers of modes."""
+    sizes = result.unknowns[:-1]
+    for i, values in enumerate(_distance(result.frequencies_hz).T):
+        hertz = result.frequencies_hz[-1, i]
+        meshes.loglog(sizes, values, "o-", label=f"f{i + 1} = {hertz:.5g} Hz")
+    for values, axis, style in zip(_distance(result.compliance).T, "xy", ("s--", "^--"),
+                                   strict=True):
+        meshes.loglog(sizes, values, style, color="#707070", label=f"contact compliance in {axis}")
+    for values, axis, style in zip(result.missing.T, "xy", ("s-", "^-"), strict=True):
+        modes.semilogx(result.modes, 100.0 * values, style, label=f"in {axis}")
+    return result.modes
+
+
+def _bodies_convergence(meshes: "Axes", modes: "Axes", result: BodiesConvergence) -> Integers:
+    """Draw that of several bodies; returns the numbers of modes of all of them."""
+    sizes = np.sum(list(result.unknowns.values()), axis=0)[:-1]
+    groups = dict(result.frequencies_hz)
+    if result.joined_hz is not None:
+        groups[result.joined] = result.joined_hz
+    for colour, (name, frequencies) in enumerate(groups.items()):
+        for i, values in enumerate(_distance(frequencies).T):
+            meshes.loglog(sizes, values, "o-", color=f"C{colour}", alpha=1.0 - 0.13 * i,
+                          label=f"{name}: f{i + 1} = {frequencies[-1, i]:.5g} Hz")
+    counts = np.sum(list(result.modes.values()), axis=0)
+    for number, (name, compliance) in enumerate(result.compliance.items()):
+        grey = str(0.2 + 0.6 * number / len(result.compliance))
+        for values, load, style in zip(_distance(compliance).T, ("traction", "pressure"),
+                                       ("s--", "^--"), strict=True):
+            meshes.loglog(sizes, values, style, color=grey,
+                          label=f"{name}: compliance under {load}")
+        for values, way, style in zip(result.missing[name].T, ("tangential", "normal"),
+                                      ("s-", "^-"), strict=True):
+            modes.semilogx(counts, 100.0 * values, style, label=f"{name}, {way}")
+    return np.asarray(counts)
+
+
+def _distance(values: Array) -> Array:
+    """Relative distance (L - 1, k) of each mesh but the last from it."""
+    return np.asarray(np.abs(values[:-1] / values[-1] - 1.0))
 
 
 def _draw_mode(

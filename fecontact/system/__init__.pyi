@@ -1,0 +1,14 @@
+from .interfaces import PrescribedMotion
+from .kernels import SystemArrays
+from .quasistatic.history import LoadHistory, Loop
+from .quasistatic.increment import Sliders
+from .quasistatic.rest_state import RestState
+
+__all__ = [
+    "LoadHistory",
+    "Loop",
+    "PrescribedMotion",
+    "RestState",
+    "Sliders",
+    "SystemArrays",
+]
