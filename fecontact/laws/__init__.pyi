@@ -17,7 +17,7 @@ from .ground.motion import HarmonicSpeed, SpeedRamp
 from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .ground.sliding import SlidingRotation, SlidingTranslation
-from .normal.bilateral import BilateralCubic, BilateralPlay, BilateralPiecewise
+from .normal.bilateral import BilateralCubic, BilateralPiecewise, BilateralPlay
 from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .normal.measured_surface import MeasuredSurface
 from .normal.power import BackBurdekinContact, PowerContact, RestitutionContact
@@ -34,8 +34,8 @@ __all__ = [
     "ArchardWear",
     "BackBurdekinContact",
     "BilateralCubic",
-    "BilateralPlay",
     "BilateralPiecewise",
+    "BilateralPlay",
     "BoucWenFriction",
     "Bound",
     "Constant",

@@ -1,5 +1,6 @@
 from .assembly.assembled_basis import PointPairing, assembled_basis
 from .assembly.links import Bushing, Hinge, Spring, Weld, linked
+from .assembly.nonlinear_springs import CubicSpring, PiecewiseSpring, PlaySpring
 from .convergence import mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import normalisation
@@ -14,9 +15,12 @@ __all__ = [
     "BasisReport",
     "BodyPart",
     "Bushing",
+    "CubicSpring",
     "Hinge",
     "ModalRotation",
     "ModeShapes",
+    "PiecewiseSpring",
+    "PlaySpring",
     "PointPairing",
     "ReductionQuality",
     "Spring",

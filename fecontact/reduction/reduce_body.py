@@ -163,7 +163,7 @@ def modal_basis(
 def reduce_bodies(
     bodies: Mapping[str, ElasticBody],
     pairings: Sequence[Pairing] = (),
-    links: Sequence[Link] = (),
+    links: Sequence[Link] | Mapping[str, Link] = (),
     *,
     modes: int | Mapping[str, int] = 20,
     each: Mapping[str, Mapping[str, Any]] | None = None,
@@ -181,7 +181,7 @@ def reduce_bodies(
         The bodies.
     pairings : sequence of Pairing
         Where the bodies may touch each other or the ground; they name the bodies.
-    links : sequence of links
+    links : sequence, or mapping of name to link
         What joins them; points of the meshes need not be among ``points``.
     modes : int or mapping of name to int
         Number of modes of each body, rigid ones included, without residual vectors.
@@ -211,6 +211,7 @@ def reduce_bodies(
                                  f"{nearest(str(name), bodies)}; the bodies are "
                                  f"{choices(bodies)}.")
     found = {}
+    joints = [*links.values()] if isinstance(links, Mapping) else links
     ends = ends_of_bodies(bodies, {name: {**options, **each.get(name, {})} for name in bodies})
     for name, body in bodies.items():
         if name not in counts:
@@ -220,8 +221,8 @@ def reduce_bodies(
         given: dict[str, Any] = {"contact": (), "reduction": "residual", **options,
                                  **each.get(name, {}), **ends[name]}
         with located(f"Body '{name}':"):
-            given["points"], joints = _joints(name, body, given, links)
-            rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + joints
+            given["points"], ending = _joints(name, body, given, joints)
+            rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + ending
             found[name] = modal_basis(body, counts[name], rows=rows, **given)
     return found
 

@@ -93,8 +93,9 @@ class ContactSystem(Summarised):
     interfaces : sequence of Interface, optional
         Where they may touch, with the laws; these become ``normal``, ``friction``, ``gap`` and
         ``sliding``.
-    links : sequence of links, optional
-        Welds, hinges, bushings and springs between the bodies.
+    links : sequence, or mapping of name to link, optional
+        Welds, hinges, bushings and springs between the bodies. Parameters of nonlinear springs are
+        ``links.NAME.stiffness``.
 
     Raises
     ------
@@ -117,11 +118,11 @@ class ContactSystem(Summarised):
     sliding: Mapping[str, Sliding] = field(default_factory=dict)
     bodies: InitVar[Mapping[str, ModalBasis] | None] = None
     interfaces: InitVar[Sequence[Interface] | None] = None
-    links: InitVar[Sequence[Link] | None] = None
+    links: InitVar[Sequence[Link] | Mapping[str, Link] | None] = None
 
     def __post_init__(
         self, bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-        links: Sequence[Link] | None,
+        links: Sequence[Link] | Mapping[str, Link] | None,
     ) -> None:
         if bodies is not None or interfaces is not None or links is not None:
             if any(getattr(self, name) is not None for name in ("basis", "normal", "friction")):
@@ -135,7 +136,7 @@ class ContactSystem(Summarised):
         """Check all parts and bring them into their stored form."""
         if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
             raise InputError("ContactSystem: there are no contact nodes; give the basis contact "
-                             "nodes, or the bodies an interface.")
+                             "nodes, or the bodies an interface or a nonlinear spring.")
         if self.normal is None:
             raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
         if self.friction is None:
@@ -377,7 +378,8 @@ class ContactSystem(Summarised):
         """
         return {outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
-                for name, value in parameters_of(getattr(self, part)).items()}
+                for name, value in parameters_of(getattr(self, part)).items()
+                if part != "friction" or name.partition(".")[0] not in self.basis.springs}
 
     def parameter(self, name: str) -> Any:
         """Value of one parameter by its dotted name, as for :meth:`with_`; None where not given.

@@ -25,6 +25,7 @@ from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import PointPairing, assembled_basis
 from fecontact.reduction.assembly.links import Link
+from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 
@@ -82,7 +83,7 @@ class Interface:
 
 def system_fields(
     bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-    links: Sequence[Link] | None,
+    links: Sequence[Link] | Mapping[str, Link] | None,
 ) -> dict[str, Any]:
     """Basis, laws, gap and sliding of a contact system of several bodies.
 
@@ -93,7 +94,8 @@ def system_fields(
         that slide without friction law.
     """
     require_kind("ContactSystem", Mapping, bodies=bodies)
-    require_kind("ContactSystem", (Sequence, type(None)), interfaces=interfaces, links=links)
+    require_kind("ContactSystem", (Sequence, type(None)), interfaces=interfaces)
+    require_kind("ContactSystem", (Sequence, Mapping, type(None)), links=links)
     assert bodies is not None
     given: dict[str, Interface] = {}
     for one in interfaces or ():
@@ -104,11 +106,18 @@ def system_fields(
         given[one.name] = one
     basis = assembled_basis(bodies, {name: one.pairing for name, one in given.items()},
                             links or ())
-    _require_joined(bodies, given, links or ())
+    springs = nonlinear_springs(links or ())
+    _require_joined(bodies, given, [*(links.values() if isinstance(links, Mapping) else links
+                                      or ())])
     friction, gaps, first = {}, [], 0
     for name, count in basis.groups:
-        one, nodes = given[name], slice(first, first + count)
+        nodes = slice(first, first + count)
         first += count
+        if name in springs:
+            friction[name] = ConstantFriction(0.0)
+            gaps.append(np.zeros(count))
+            continue
+        one = given[name]
         if one.friction is None and basis.contact_T[nodes, 0].any():
             raise InputError(f"Interface '{name}' lacks friction, although its contact nodes can "
                              f"move along the other side: give a friction law with its "
@@ -118,7 +127,8 @@ def system_fields(
             gaps.append(one.pairing.gaps + np.asarray(gap_values(one.gap, basis.contact_x[nodes])))
     return {
         "basis": basis,
-        "normal": {name: one.normal for name, one in given.items()},
+        "normal": {**{name: one.normal for name, one in given.items()},
+                   **{name: one.law for name, one in springs.items()}},
         "friction": friction,
         "gap": np.concatenate([np.zeros(0), *gaps]),
         "sliding": {name: one.sliding for name, one in given.items() if one.sliding is not None},
@@ -210,7 +220,7 @@ def checked_sliding(
         whose normal leans.
     """
     require_kind("ContactSystem", Mapping, sliding=sliding)
-    names = [group for group, _ in basis.groups]
+    names = [group for group, _ in basis.groups if group not in basis.springs]
     for group, one in sliding.items():
         if group not in names:
             raise InputError(f"ContactSystem: sliding names the interface {group!r}"
@@ -260,8 +270,10 @@ def prescribed_motion(
 
 
 def inner_name(name: str) -> str:
-    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness``."""
+    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness`` or ``links.NAME...``."""
     first, _, rest = name.partition(".")
+    if first == "links":
+        return f"normal.{rest}"
     group, _, parameter = rest.partition(".")
     kind, _, last = parameter.partition(".")
     if first != "interfaces" or kind not in _PARTS:
@@ -270,11 +282,13 @@ def inner_name(name: str) -> str:
 
 
 def outer_name(system: Any, name: str) -> str:
-    """The reverse, for laws and sliding of the interfaces of a system."""
+    """The reverse, for laws and sliding of the interfaces of a system, and its springs."""
     kind, _, rest = name.partition(".")
     if kind not in _PARTS or not isinstance(getattr(system, kind), Mapping):
         return name
     group, _, last = rest.partition(".")
     if group not in getattr(system, kind):
         return name
+    if group in system.basis.springs and kind == "normal":
+        return f"links.{group}.{last}" if last else f"links.{group}"
     return f"interfaces.{group}.{kind}.{last}" if last else f"interfaces.{group}.{kind}"

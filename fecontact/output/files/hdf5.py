@@ -157,6 +157,8 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
         group["boundary_rows"].attrs["names"] = list(basis.boundaries)
     group.attrs["groups"] = [name for name, _ in basis.groups]
     group.attrs["group_sizes"] = [count for _, count in basis.groups]
+    if basis.springs:
+        group.attrs["springs"] = list(basis.springs)
     if basis.thickness is not None:
         group.attrs["thickness"] = basis.thickness
     if basis.quality is not None:
@@ -213,6 +215,7 @@ def stored_basis(group: Any) -> ModalBasis:
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
         boundaries=boundaries, parts=_read_parts(group) if "parts" in group else (), **given,
         thickness=float(group.attrs["thickness"]) if "thickness" in group.attrs else None,
+        springs=tuple(str(name) for name in np.atleast_1d(group.attrs.get("springs", ()))),
         rotation=_read_rotation(member(group, "rotation"), m) if "rotation" in group else None)
 
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -34,6 +35,8 @@ class ContactFace:
         Which of them.
     tributary : (k,) array
         Lengths of the face that the nodes represent [m].
+    spring : bool
+        Whether it is no face, but a nonlinear spring between two points.
     """
 
     name: str
@@ -42,6 +45,7 @@ class ContactFace:
     abscissa: Array
     axis: Literal["x", "s"]
     tributary: Array
+    spring: bool = False
 
     @property
     def title(self) -> str:
@@ -85,9 +89,26 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
         abscissa = x[nodes] if flat else _arc_length(places[nodes], normals[nodes],
                                                      tangents[nodes], length[nodes])
         bodies = _bodies_at(basis, nodes) + ["ground"] * bool(ground[nodes].any())
+        if name in basis.springs and len(bodies) == 1:
+            bodies.append("base")
         found.append(ContactFace(name, tuple(bodies), nodes, abscissa, "x" if flat else "s",
-                                 length[nodes]))
+                                 length[nodes], name in basis.springs))
     return tuple(found)
+
+
+def touching_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
+    """The faces of :func:`contact_faces` without nonlinear springs.
+
+    Raises
+    ------
+    AnalysisError
+        If there are none, for ``what`` is shown on them.
+    """
+    found = tuple(face for face in contact_faces(basis) if not face.spring)
+    if not found:
+        raise AnalysisError(f"There is no {what}: nonlinear springs join the bodies, which touch "
+                            f"at no interface.")
+    return found
 
 
 def node_name(basis: ModalBasis, node: int) -> str:

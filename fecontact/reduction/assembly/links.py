@@ -69,14 +69,20 @@ class Spring:
     shortening: Annotated[float, Unit("m")] = 0.0
 
     def __post_init__(self) -> None:
-        _check_points(self)
+        check_ends(self)
         require_not_negative("Spring", stiffness=self.stiffness, damping=self.damping)
         require_finite("Spring", preload=self.preload, shortening=self.shortening)
-        if self.direction is not None:
-            object.__setattr__(self, "direction", as_unit_pair(
-                self.direction, "Spring: direction"))
-        elif self.second is None:
-            raise InputError("Spring: a spring to the base needs direction = (x, y).")
+
+
+class NonlinearSpring:
+    """A spring between two points that is no part of the stiffness matrix.
+
+    See :mod:`fecontact.reduction.assembly.nonlinear_springs`.
+    """
+
+    first: str
+    second: str | None
+    direction: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -155,7 +161,7 @@ class Weld(Hinge):
     held: ClassVar[tuple[int, ...]] = (0, 1, 2)
 
 
-Link = Spring | Bushing | Hinge
+Link = Spring | Bushing | Hinge | NonlinearSpring
 
 
 def _check_points(link: "Link") -> None:
@@ -164,6 +170,23 @@ def _check_points(link: "Link") -> None:
     require_kind(owner, (str, type(None)), second=link.second)
     if link.first == link.second:
         raise InputError(f"{owner}: first and second are the same point '{link.first}'.")
+
+
+def check_ends(spring: Spring | NonlinearSpring) -> None:
+    """Check the points of a spring, and make its direction a unit vector.
+
+    Raises
+    ------
+    InputError
+        For equal points, a direction of length zero, or a spring to the base without one.
+    """
+    _check_points(spring)
+    owner = type(spring).__name__
+    if spring.direction is not None:
+        object.__setattr__(spring, "direction", as_unit_pair(
+            spring.direction, f"{owner}: direction"))
+    elif spring.second is None:
+        raise InputError(f"{owner}: a spring to the base needs direction = (x, y).")
 
 
 def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
@@ -178,7 +201,8 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     basis : ModalBasis
         Of one or several bodies that do not rotate.
     links : sequence of Spring, Bushing, Hinge or Weld
-        Between points of the basis.
+        Between points of the basis; nonlinear springs only count in
+        :func:`~fecontact.reduction.assembled_basis`.
 
     Raises
     ------
@@ -199,7 +223,9 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
             held.append(_felt(link, relative[list(link.held)]))
             continue
         if isinstance(link, Spring):
-            rows = _direction(basis, link)[None] @ relative[:2]
+            ends = [end for end in (link.first, link.second) if end is not None]
+            rows = spring_direction(link, *(basis.positions[basis.point_index(end)]
+                                            for end in ends))[None] @ relative[:2]
             c, b = np.array([link.stiffness]), np.array([link.damping])
             load -= (link.preload + link.stiffness * link.shortening) * rows[0]
         else:
@@ -286,15 +312,20 @@ def _felt(link: Link, rows: Array) -> Array:
     return rows
 
 
-def _direction(basis: ModalBasis, link: Spring) -> Array:
+def spring_direction(link: Spring | NonlinearSpring, first: Array, *second: Array) -> Array:
+    """Unit vector (2,) of a spring between two places (2,), or from one to the base.
+
+    Raises
+    ------
+    InputError
+        If it has neither a direction nor a length.
+    """
     if link.direction is not None:
         return np.array(link.direction)
-    assert link.second is not None, "checked by the spring"
-    first, second = (basis.positions[basis.point_index(name)] for name in (link.first, link.second))
-    length = float(np.linalg.norm(first - second))
+    length = float(np.linalg.norm(first - second[0]))
     if not length > 0.0:
         raise InputError(f"{_described(link)} has length zero; give its direction = (x, y).")
-    return np.asarray((first - second) / length)
+    return np.asarray((first - second[0]) / length)
 
 
 def _require_one_place(basis: ModalBasis, link: Hinge) -> None:
