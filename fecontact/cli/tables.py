@@ -54,6 +54,7 @@ def run_table(trajectory: "Trajectory") -> Any:
 
 def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
     """Shares of the contact states, of several bodies for each interface with its nodes."""
+    from fecontact.core.units import quantity
     from fecontact.reduction.assembly.contact_faces import contact_faces
 
     basis = trajectory.system.basis

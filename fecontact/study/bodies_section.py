@@ -19,6 +19,12 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import assembled_basis
 from fecontact.reduction.assembly.links import Bushing, Hinge, Link, Spring, Weld
+from fecontact.reduction.assembly.nonlinear_springs import (
+    CubicSpring,
+    PiecewiseSpring,
+    PlaySpring,
+    nonlinear_springs,
+)
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
@@ -32,7 +38,9 @@ from fecontact.system.gap import Crown
 
 Gap = float | tuple[float, ...] | Crown
 
-LINKS: Mapping[str, type] = {"spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld}
+LINKS: Mapping[str, type] = {
+    "spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld,
+    "cubic-spring": CubicSpring, "play-spring": PlaySpring, "piecewise-spring": PiecewiseSpring}
 
 # Keys of an interface on which the modal bases of its bodies depend.
 PAIRING_KEYS = ("face", "other", "nodes", "nodes_on", "reach", "overlap")
@@ -396,7 +404,8 @@ def reduced_bodies(
     bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing], links: Mapping[str, Link],
     title: str,
 ) -> Reduced:
-    """The assembled basis, and the gaps of the geometry."""
+    """The assembled basis, and the gaps of the geometry, zero for nonlinear springs."""
     with located(f"{title}:"):
-        return Reduced(assembled_basis(bases, faces, list(links.values())),
-                       np.concatenate([np.zeros(0), *(one.gaps for one in faces.values())]))
+        springs = np.zeros(len(nonlinear_springs(links)))
+        return Reduced(assembled_basis(bases, faces, links), np.concatenate(
+            [*(one.gaps for one in faces.values()), springs]))

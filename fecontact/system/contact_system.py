@@ -189,7 +189,9 @@ class ContactSystem(Summarised):
         return [
             *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
               if name in own),
-            *((kind, _law_names(getattr(self, kind))) for kind in ("normal", "friction")),
+            *((kind, names) for kind in ("normal", "friction")
+              if (names := _law_names(getattr(self, kind),
+                                      self.basis.springs if kind == "friction" else ()))),
             *([("sliding", listed([f"{name} {_sliding_speed(one)}"
                                    for name, one in self.sliding.items()]))]
               if self.sliding else []),
@@ -421,8 +423,9 @@ def _load_summary(load: Load) -> str:
     return ", ".join(parts)
 
 
-def _law_names(law: Any) -> str:
+def _law_names(law: Any, without: tuple[str, ...]) -> str:
     """Class of a law, or those of the interfaces."""
     if isinstance(law, Mapping):
-        return listed([f"{type(one).__name__} ({group})" for group, one in law.items()])
+        return listed([f"{type(one).__name__} ({group})" for group, one in law.items()
+                       if group not in without]) if set(law) - set(without) else ""
     return type(law).__name__

@@ -15,8 +15,8 @@ from fecontact import InputError
 from fecontact.laws import (
     BackBurdekinContact,
     BilateralCubic,
-    BilateralPlay,
     BilateralPiecewise,
+    BilateralPlay,
     CosineSurface,
     ExponentialContact,
     GaussianSurface,
@@ -102,7 +102,8 @@ LAWS = {
 @pytest.mark.parametrize("name", LAWS)
 def test_contract(name):
     law, u_range = LAWS[name]
-    check_normal_law(law, u_range, (-5.0, 5.0), two_sided=isinstance(law, (TwoSidedStop, BilateralLaw)))
+    check_normal_law(law, u_range, (-5.0, 5.0),
+                     two_sided=isinstance(law, TwoSidedStop | BilateralLaw))
 
 
 @pytest.mark.parametrize("law", [
