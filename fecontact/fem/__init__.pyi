@@ -1,4 +1,4 @@
-from .pairing import Pairing, finer_face, pair_both_faces, pair_faces
+from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
 from .rotation import Rotation
 
@@ -6,6 +6,7 @@ __all__ = [
     "Pairing",
     "PairingReport",
     "Rotation",
+    "TwoPassPairing",
     "finer_face",
     "pair_both_faces",
     "pair_faces",

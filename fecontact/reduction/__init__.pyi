@@ -1,4 +1,5 @@
 from .assembly.assembled_basis import PointPairing, assembled_basis
+from .assembly.face_weld import FaceWeld
 from .assembly.links import Bushing, Hinge, Spring, Weld, linked
 from .assembly.nonlinear_springs import CubicSpring, PiecewiseSpring, PlaySpring
 from .convergence import mode_convergence
@@ -16,6 +17,7 @@ __all__ = [
     "BodyPart",
     "Bushing",
     "CubicSpring",
+    "FaceWeld",
     "Hinge",
     "ModalRotation",
     "ModeShapes",

@@ -76,6 +76,8 @@ class ModalBasis(Summarised):
     springs : tuple of str
         Groups that are no interfaces, but nonlinear springs: one node each, which moves along its
         normal only.
+    first_passes : tuple of (str, int)
+        Interfaces of two passes, and how many of the nodes belong to the first one.
 
     Raises
     ------
@@ -105,6 +107,7 @@ class ModalBasis(Summarised):
     parts: tuple[BodyPart, ...] = ()
     link_load: Array | None = None
     springs: tuple[str, ...] = ()
+    first_passes: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
         m = len(self.angular_frequencies)

@@ -116,7 +116,8 @@ def _rubs(study: Described, basis: ModalBasis) -> bool:
     """Whether a node of an interface without own friction law can move along its other side."""
     own, first = _own(study, "friction"), 0
     for name, count in basis.groups:
-        if name not in own and name not in basis.springs and basis.contact_T[first : first + count, 0].any():
+        moves = basis.contact_T[first : first + count, 0].any()
+        if moves and name not in own and name not in basis.springs:
             return True
         first += count
     return False

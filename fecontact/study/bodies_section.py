@@ -9,12 +9,12 @@ import numpy as np
 
 from fecontact.core.docstrings import inherit_documentation
 from fecontact.core.errors import InputError, choices, nearest, require_finite
-from fecontact.core.tables import from_table, located, require_known, shown, to_table
+from fecontact.core.tables import from_table, located, plain, require_known, shown, to_table
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.pairing import Pairing, pair_faces
+from fecontact.fem.pairing import Pairing, TwoPassPairing, pair_both_faces, pair_faces
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import assembled_basis
@@ -43,7 +43,7 @@ LINKS: Mapping[str, type] = {
     "cubic-spring": CubicSpring, "play-spring": PlaySpring, "piecewise-spring": PiecewiseSpring}
 
 # Keys of an interface on which the modal bases of its bodies depend.
-PAIRING_KEYS = ("face", "other", "nodes", "nodes_on", "reach", "overlap")
+PAIRING_KEYS = ("face", "other", "passes", "nodes", "nodes_on", "reach", "overlap")
 
 
 @dataclass(frozen=True)
@@ -149,6 +149,10 @@ class InterfaceSettings:
         several bodies only.
     other : str
         'BODY.BOUNDARY' of the other face, or 'ground'.
+    passes : 1 or 2
+        One pass has contact nodes on one of the faces; two have them on both, which loads them more
+        evenly. Totals refer to both passes together. For compliant laws, not on the ground and not
+        where the other side slides.
     nodes : int or 'all'
         Every displacement node, or so many segments of equal length.
     nodes_on : 'finer' or 'face', optional
@@ -169,6 +173,7 @@ class InterfaceSettings:
     friction: FrictionLaw | None = None
     face: str | None = None
     other: str = "ground"
+    passes: Literal[1, 2] = 1
     nodes: int | Literal["all"] = "all"
     nodes_on: Literal["finer", "face"] | None = None
     reach: Annotated[float | None, Unit("m")] = None
@@ -363,9 +368,9 @@ def elastic_bodies(study: Bodies, meshes: Mapping[str, Mesh], title: str) -> dic
 
 def pairings(
     study: Bodies, bodies: Mapping[str, ElasticBody], title: str
-) -> dict[str, Pairing]:
+) -> dict[str, Pairing | TwoPassPairing]:
     """Pairings of the faces of all interfaces."""
-    found = {}
+    found: dict[str, Pairing | TwoPassPairing] = {}
     for name, one in study.interfaces.items():
         with located(f"{title}: [interfaces.{name}]:", "pair_faces"):
             assert one.face is not None
@@ -375,17 +380,34 @@ def pairings(
                     raise InputError(f"the mesh of body '{body}' has no boundary '{boundary}'"
                                      f"{nearest(boundary, known)}; its boundaries are: "
                                      f"{choices(known)}.")
-            found[name] = pair_faces(bodies, one.face, one.other, nodes=one.nodes,
-                                     nodes_on=one.side_of_nodes, reach=one.reach,
-                                     overlap=one.overlap)
-            if one.sliding is not None and found[name].swapped:
+            if one.passes == 2:
+                found[name] = _both_faces(bodies, one)
+                continue
+            found[name] = made = pair_faces(
+                bodies, one.face, one.other, nodes=one.nodes, nodes_on=one.side_of_nodes,
+                reach=one.reach, overlap=one.overlap)
+            if one.sliding is not None and made.swapped:
                 raise InputError(f"sliding is that of {one.other}, but with nodes_on = 'finer' "
                                  f"the contact nodes lie on it; leave nodes_on out.")
     return found
 
 
+def _both_faces(bodies: Mapping[str, ElasticBody], one: InterfaceSettings) -> TwoPassPairing:
+    """Two passes of an interface."""
+    assert one.face is not None
+    wrong = {"other": one.other == "ground", "nodes_on": one.nodes_on is not None,
+             "sliding": one.sliding is not None}
+    for key, is_wrong in wrong.items():
+        if is_wrong:
+            raise InputError(f"passes = 2 puts contact nodes on both faces, which {key} = "
+                             f"{shown(plain(getattr(one, key)))} does not allow; set passes = 1.")
+    return pair_both_faces(bodies, one.face, one.other, nodes=one.nodes, reach=one.reach,
+                           overlap=one.overlap)
+
+
 def body_bases(
-    study: Bodies, bodies: Mapping[str, ElasticBody], faces: Mapping[str, Pairing], title: str
+    study: Bodies, bodies: Mapping[str, ElasticBody],
+    faces: Mapping[str, Pairing | TwoPassPairing], title: str
 ) -> dict[str, ModalBasis]:
     """Modal bases of all bodies, with the forces at their interfaces; see ``reduce_bodies``."""
     found = {}
@@ -401,8 +423,8 @@ def body_bases(
 
 
 def reduced_bodies(
-    bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing], links: Mapping[str, Link],
-    title: str,
+    bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing | TwoPassPairing],
+    links: Mapping[str, Link], title: str,
 ) -> Reduced:
     """The assembled basis, and the gaps of the geometry, zero for nonlinear springs."""
     with located(f"{title}:"):

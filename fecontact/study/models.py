@@ -9,7 +9,7 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.tables import located
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.pairing import Pairing
+from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.assembly.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import (
@@ -87,7 +87,7 @@ class StudyModels:
         self._require_several("elastic_bodies", "elastic_body")
         return dict(self._bodies)
 
-    def pairings(self) -> dict[str, Pairing]:
+    def pairings(self) -> dict[str, Pairing | TwoPassPairing]:
         """Pairings of the faces of several bodies, by the names of the interfaces."""
         self._require_several("pairings", "mesh")
         return dict(self._pairings)
@@ -144,7 +144,7 @@ class StudyModels:
         return elastic_bodies(self, self._meshes, self.title)
 
     @cached_property
-    def _pairings(self) -> dict[str, Pairing]:
+    def _pairings(self) -> dict[str, Pairing | TwoPassPairing]:
         return pairings(self, self._bodies, self.title)
 
     @cached_property

@@ -17,7 +17,7 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import listed
-from fecontact.fem.pairing import Pairing
+from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
@@ -43,8 +43,8 @@ class Interface:
     ----------
     name : str
         Its laws are ``interfaces.NAME.normal`` and ``interfaces.NAME.friction``.
-    pairing : Pairing or PointPairing
-        Contact nodes of one side, their feet on the other, normals and gaps.
+    pairing : Pairing, TwoPassPairing or PointPairing
+        Contact nodes of one side, their feet on the other, normals and gaps; or those of both.
     normal : normal law
         Extensive parameters are totals of the interface.
     friction : friction law, optional
@@ -61,7 +61,7 @@ class Interface:
     """
 
     name: str
-    pairing: Pairing | PointPairing
+    pairing: Pairing | TwoPassPairing | PointPairing
     normal: NormalLaw
     friction: FrictionLaw | None = None
     sliding: Sliding | None = None
@@ -70,11 +70,15 @@ class Interface:
     def __post_init__(self) -> None:
         require_kind("Interface", str, name=self.name)
         owner = f"Interface '{self.name}'"
-        require_kind(owner, (Pairing, PointPairing), pairing=self.pairing)
+        require_kind(owner, (Pairing, TwoPassPairing, PointPairing), pairing=self.pairing)
         require_kind(owner, NormalLaw, normal=self.normal)
         require_kind(owner, (FrictionLaw, type(None)), friction=self.friction)
         require_kind(owner, (SlidingTranslation, SlidingRotation, type(None)),
                      sliding=self.sliding)
+        if self.sliding is not None and isinstance(self.pairing, TwoPassPairing):
+            raise InputError(f"{owner}: sliding is that of the other side, but with two passes "
+                             f"contact nodes lie on it too; pair the faces in one pass, by "
+                             f"pair_faces with nodes_on='face'.")
         if self.sliding is not None and isinstance(self.pairing, Pairing) and self.pairing.swapped:
             raise InputError(f"{owner}: sliding is that of the other side, but the contact nodes "
                              f"lie on it, the finer face '{self.pairing.report.face}'; pair the "

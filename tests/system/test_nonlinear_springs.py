@@ -197,7 +197,7 @@ def bolted(bolt):
     """A pad on a base, pulled on it by a bolt."""
     rows, base = rectangle(0.1, 0.03, 8, 2), rectangle(0.1, 0.03, 8, 2)
     bodies = {
-        "pad": fc.ElasticBody(fc.Mesh(rows.nodes + np.array([0.0, 0.03]), rows.cells, rows.boundaries)),
+        "pad": fc.ElasticBody(rows.placed((0.0, 0.03))),
         "base": fc.ElasticBody(fc.Mesh(base.nodes, base.cells, base.boundaries),
                                fixed={"bottom": "xy"})}
     face = fc.fem.pair_faces(bodies, "pad.bottom", "base.top")

@@ -15,7 +15,7 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array, ArrayLike
-from fecontact.fem.pairing import Pairing
+from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.assembly.links import Link, NonlinearSpring, linked
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
 from fecontact.reduction.modal_basis import ModalBasis
@@ -58,6 +58,11 @@ class PointPairing:
     normals: ArrayLike = (0.0, 1.0)
     gaps: ArrayLike = 0.0
     tributary: ArrayLike | None = None
+
+    @property
+    def passes(self) -> "tuple[PointPairing, ...]":
+        """The pairing itself."""
+        return (self,)
 
     def __post_init__(self) -> None:
         require_kind("PointPairing", str, body=self.body)
@@ -137,7 +142,7 @@ class _Contact:
 
 def assembled_basis(
     bases: Mapping[str, ModalBasis],
-    pairings: Mapping[str, Pairing | PointPairing],
+    pairings: Mapping[str, Pairing | TwoPassPairing | PointPairing],
     links: Sequence[Link] | Mapping[str, Link] = (),
 ) -> ModalBasis:
     """One basis of several bodies, for a contact system of all of them.
@@ -152,7 +157,7 @@ def assembled_basis(
     ----------
     bases : mapping of name to ModalBasis
         The bodies, which do not rotate.
-    pairings : mapping of name to Pairing or PointPairing
+    pairings : mapping of name to Pairing, TwoPassPairing or PointPairing
         The interfaces.
     links : sequence, or mapping of name to link, optional
         Welds, hinges, bushings and springs; with any, the modes are those of the linked bodies
@@ -170,10 +175,12 @@ def assembled_basis(
     _check_bodies(bases)
     for name in pairings:
         _check_name("interface", name)
-    contacts = []
+    contacts, counts = [], []
     for name, pairing in pairings.items():
         with located(f"Interface '{name}':", "PointPairing"):
-            contacts.append(_contact(bases, pairing))
+            made = [_contact(bases, one) for one in pairing.passes]
+        contacts += made
+        counts.append(sum(len(one.tributary) for one in made))
     springs = nonlinear_springs(links)
     for name, spring in springs.items():
         _check_name("link", name)
@@ -181,6 +188,7 @@ def assembled_basis(
             raise InputError(f"The name '{name}' of a nonlinear spring is that of an interface "
                              f"too; give each its own.")
         contacts.append(_spring_contact(bases, name, spring))
+        counts.append(1)
     places = _Places(bases)
     named = [_named_point(bases, point) for point in ("B", "C")]
     extra = [(name, point) for name, basis in bases.items()
@@ -197,7 +205,7 @@ def assembled_basis(
         nodal.append(places.nodal(sides, frames.shape[0]))
     T += [places.modal([(1.0, side)], 3) for side in further]
     nodal += [places.nodal([(1.0, side)], 3) for side in further]
-    counts = [len(contact.tributary) for contact in contacts]
+    sizes = [len(contact.tributary) for contact in contacts]
     whole = ModalBasis(
         angular_frequencies=np.concatenate([one.angular_frequencies for one in bases.values()]),
         damping=places.blocks([one.damping for one in bases.values()]),
@@ -219,9 +227,11 @@ def assembled_basis(
             one.stiffness is not None for one in bases.values()) else None,
         contact_normals=np.concatenate([np.zeros((0, 2)), *(one.normals for one in contacts)]),
         on_ground=np.repeat([contact.other is None and not contact.spring for contact in contacts],
-                            counts).astype(bool),
+                            sizes).astype(bool),
         parts=places.parts,
         springs=tuple(springs),
+        first_passes=tuple((name, len(one.passes[0].gaps)) for name, one in pairings.items()
+                           if len(one.passes) > 1),
     )
     joints = [link for link in (links.values() if isinstance(links, Mapping) else links)
               if not isinstance(link, NonlinearSpring)]

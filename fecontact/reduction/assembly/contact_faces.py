@@ -4,7 +4,7 @@ For what shows or stores results: systems of several bodies have contact nodes o
 direction, whose rows in ``T`` are those of the motion relative to the other side.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -37,6 +37,8 @@ class ContactFace:
         Lengths of the face that the nodes represent [m].
     spring : bool
         Whether it is no face, but a nonlinear spring between two points.
+    nodes_on : str
+        Of one of two passes, the body with its contact nodes.
     """
 
     name: str
@@ -46,13 +48,15 @@ class ContactFace:
     axis: Literal["x", "s"]
     tributary: Array
     spring: bool = False
+    nodes_on: str = ""
 
     @property
     def title(self) -> str:
         """``shoe: pad and disc``; empty for a single body."""
         bodies = " and ".join(self.bodies) if len(self.bodies) > 1 else (
             f"{self.bodies[0]} with itself" if self.bodies else "")
-        return f"{self.name}: {bodies}" if bodies else self.name
+        nodes = f", nodes on {self.nodes_on}" if self.nodes_on else ""
+        return f"{self.name}: {bodies}{nodes}" if bodies else self.name
 
     @property
     def label(self) -> str:
@@ -76,15 +80,31 @@ def contact_directions(basis: ModalBasis) -> tuple[Array, Array]:
 
 def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
     """One face for each interface; for a single body one of all its contact nodes, along x."""
+    found: dict[str, ContactFace] = {}
+    for one in _passes(basis):
+        first = found.get(one.name, one)
+        found[one.name] = one if first is one else replace(
+            first, nodes=slice(first.nodes.start, one.nodes.stop), nodes_on="",
+            abscissa=np.append(first.abscissa, one.abscissa),
+            axis="x" if first.axis == one.axis == "x" else "s",
+            tributary=np.append(first.tributary, one.tributary))
+    return tuple(found.values())
+
+
+def _passes(basis: ModalBasis) -> tuple[ContactFace, ...]:
+    """As :func:`contact_faces`, but one for each pass of interfaces of two."""
     x, length = basis.contact_x, basis.tributary
     if not several_bodies(basis):
         return (ContactFace("", (), slice(0, len(x)), x, "x", length),)
     ground, (tangents, normals) = basis.ground_nodes, contact_directions(basis)
     places = basis.positions[2 : 2 + len(x)]
     found, first = [], 0
-    for name, count in basis.groups:
-        nodes = slice(first, first + count)
-        first += count
+    halves = dict(basis.first_passes)
+    sizes = ((name, size) for name, count in basis.groups for size in (
+        (halves[name], count - halves[name]) if name in halves else (count,)))
+    for name, size in sizes:
+        nodes = slice(first, first + size)
+        first += size
         flat = bool(ground[nodes].all() or np.abs(normals[nodes, 0]).max(initial=0.0) < _FLAT)
         abscissa = x[nodes] if flat else _arc_length(places[nodes], normals[nodes],
                                                      tangents[nodes], length[nodes])
@@ -92,19 +112,20 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
         if name in basis.springs and len(bodies) == 1:
             bodies.append("base")
         found.append(ContactFace(name, tuple(bodies), nodes, abscissa, "x" if flat else "s",
-                                 length[nodes], name in basis.springs))
+                                 length[nodes], name in basis.springs,
+                                 _owner(basis, nodes) if name in halves else ""))
     return tuple(found)
 
 
 def touching_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
-    """The faces of :func:`contact_faces` without nonlinear springs.
+    """The faces of :func:`contact_faces` without nonlinear springs, and one for each pass.
 
     Raises
     ------
     AnalysisError
         If there are none, for ``what`` is shown on them.
     """
-    found = tuple(face for face in contact_faces(basis) if not face.spring)
+    found = tuple(face for face in _passes(basis) if not face.spring)
     if not found:
         raise AnalysisError(f"There is no {what}: nonlinear springs join the bodies, which touch "
                             f"at no interface.")
@@ -183,6 +204,14 @@ def _bodies_at(basis: ModalBasis, nodes: slice) -> list[str]:
         if touches:
             found.append(part.name)
     return found
+
+
+def _owner(basis: ModalBasis, nodes: slice) -> str:
+    """The body that contact nodes lie on: its part of their motion has weights of sum one."""
+    assert basis.mode_shapes is not None, "faces with two passes have meshes"
+    row = basis.mode_shapes.restriction.tocsr()[[6 + 3 * nodes.start + 1]].toarray()[0]
+    along = row.reshape(-1, 2) @ basis.normals[nodes.start]
+    return max(basis.parts, key=lambda part: along[part.nodes[0] : sum(part.nodes)].sum()).name
 
 
 def _arc_length(places: Array, normals: Array, tangents: Array, tributary: Array) -> Array:

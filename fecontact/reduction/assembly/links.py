@@ -20,6 +20,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
+from fecontact.reduction.assembly.face_weld import FaceWeld, welded_rows
 from fecontact.reduction.eigenmodes import fixed_signs
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -161,7 +162,7 @@ class Weld(Hinge):
     held: ClassVar[tuple[int, ...]] = (0, 1, 2)
 
 
-Link = Spring | Bushing | Hinge | NonlinearSpring
+Link = Spring | Bushing | Hinge | FaceWeld | NonlinearSpring
 
 
 def _check_points(link: "Link") -> None:
@@ -200,7 +201,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     ----------
     basis : ModalBasis
         Of one or several bodies that do not rotate.
-    links : sequence of Spring, Bushing, Hinge or Weld
+    links : sequence of Spring, Bushing, Hinge, Weld or FaceWeld
         Between points of the basis; nonlinear springs only count in
         :func:`~fecontact.reduction.assembled_basis`.
 
@@ -216,7 +217,10 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     damping = np.array(basis.damping)
     load = np.zeros(m) if basis.link_load is None else np.array(basis.link_load)
     for link in links:
-        require_kind("Links", (Spring, Bushing, Hinge), link=link)
+        require_kind("Links", (Spring, Bushing, Hinge, FaceWeld), link=link)
+        if isinstance(link, FaceWeld):
+            held.append(_felt(link, welded_rows(basis, link)))
+            continue
         relative = _relative_rows(basis, link)
         if isinstance(link, Hinge):
             _require_one_place(basis, link)
