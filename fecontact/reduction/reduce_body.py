@@ -173,8 +173,8 @@ def reduce_bodies(
     """Modal bases of several bodies that can carry the forces between them.
 
     By default modes with residual vectors of forces at the nodes and feet of the pairings and on
-    welded faces (of bodies with those all, tolerance = 0), and of forces and moments at the points
-    of the links. B and C are those that ``each`` gives to one
+    welded faces (bodies with these get all of them, tolerance = 0), and of forces and moments at
+    the points of the links. B and C are those that ``each`` gives to one
     body, or of the one mesh that has points of that name.
 
     Parameters
@@ -228,7 +228,8 @@ def reduce_bodies(
             seams = [row for link in joints if isinstance(link, FaceWeld)
                      for row in link.rows(name)]
             if seams:
-                given.setdefault("tolerance", 0.0)
+                # Faces that lack some of their motions could not follow each other.
+                given["tolerance"] = 0.0
             rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + ending + seams
             found[name] = modal_basis(body, counts[name], rows=rows, **given)
     return found

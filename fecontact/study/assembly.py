@@ -12,10 +12,10 @@ from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.registry import PART_CLASSES
-from fecontact.reduction.assembly.links import Link
-from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
+from fecontact.reduction.assembly.links import NonlinearSpring
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import InterfaceSettings, Reduced
+from fecontact.study.links_section import LinkSettings
 from fecontact.system.contact_system import (
     NO_FRICTION_LAW,
     NO_NORMAL_LAW,
@@ -40,7 +40,7 @@ class Described(Protocol):
         """Laws of single interfaces."""
 
     @property
-    def links(self) -> Mapping[str, Link]:
+    def links(self) -> Mapping[str, LinkSettings]:
         """What joins several bodies."""
 
     @property
@@ -66,7 +66,8 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         For laws, loads or a gap that do not fit the basis; the message names the section.
     """
     basis, several = reduced.basis, reduced.gaps is not None
-    springs = nonlinear_springs(study.links)
+    springs = {name: one for name, one in study.links.items()
+               if isinstance(one, NonlinearSpring)}
     groups = {name: count for name, count in basis.groups if name not in springs}
     if not groups and not springs:
         raise InputError(f"{title}: there are no contact nodes; name the faces that touch in "

@@ -18,13 +18,7 @@ from fecontact.fem.pairing import Pairing, TwoPassPairing, pair_both_faces, pair
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import assembled_basis
-from fecontact.reduction.assembly.links import Bushing, Hinge, Link, Spring, Weld
-from fecontact.reduction.assembly.nonlinear_springs import (
-    CubicSpring,
-    PiecewiseSpring,
-    PlaySpring,
-    nonlinear_springs,
-)
+from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
@@ -33,14 +27,11 @@ from fecontact.study.geometry_section import (
     geometry_mesh,
     geometry_table,
 )
+from fecontact.study.links_section import LinkSettings, made_links
 from fecontact.study.sections import BasisSettings, BodySettings
 from fecontact.system.gap import Crown
 
 Gap = float | tuple[float, ...] | Crown
-
-LINKS: Mapping[str, type] = {
-    "spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld,
-    "cubic-spring": CubicSpring, "play-spring": PlaySpring, "piecewise-spring": PiecewiseSpring}
 
 # Keys of an interface on which the modal bases of its bodies depend.
 PAIRING_KEYS = ("face", "other", "passes", "nodes", "nodes_on", "reach", "overlap")
@@ -204,7 +195,7 @@ class Bodies(Protocol):
         """Where they may touch."""
 
     @property
-    def links(self) -> Mapping[str, Link]:
+    def links(self) -> Mapping[str, LinkSettings]:
         """What joins them."""
 
     @property
@@ -320,29 +311,6 @@ def _known_body(body: str, bodies: Mapping[str, Any], where: str) -> str:
     return body
 
 
-def links_from_tables(tables: Any, title: str) -> dict[str, Link]:
-    """All links from ``[links]``; the key ``kind`` names the class of each."""
-    if not isinstance(tables, Mapping):
-        raise InputError(f"{title}: [links] must be a table of links, [links.NAME], not "
-                         f"{shown(tables)}.")
-    found: dict[str, Link] = {}
-    for name, table in tables.items():
-        where = f"{title}: [links.{name}]"
-        kind = table.get("kind") if isinstance(table, Mapping) else None
-        if not isinstance(kind, str) or kind not in LINKS:
-            raise InputError(f"{where}: kind = {shown(kind)} must be one of {choices(LINKS)}"
-                             f"{nearest(str(kind), LINKS)}.")
-        found[name] = from_table(LINKS[kind], {key: value for key, value in table.items()
-                                               if key != "kind"}, where)
-    return found
-
-
-def link_table(link: Link, *, defaults: bool = True) -> dict[str, Any]:
-    """Table of a link; the inverse of :func:`links_from_tables`."""
-    kind = {cls: name for name, cls in LINKS.items()}[type(link)]
-    return {"kind": kind, **to_table(link, defaults=defaults)}
-
-
 def body_meshes(study: Bodies, title: str) -> dict[str, Mesh]:
     """Meshes of all bodies in their places."""
     found = {}
@@ -413,7 +381,7 @@ def body_bases(
     found = {}
     with located(f"{title}: [bodies]:"):
         bases = reduce_bodies(
-            bodies, list(faces.values()), list(study.links.values()),
+            bodies, list(faces.values()), made_links(study.links, bodies, title),
             modes={name: one.basis.modes for name, one in study.bodies.items()},
             each={name: one.basis.options for name, one in study.bodies.items()})
     for name, one in study.bodies.items():
@@ -424,10 +392,11 @@ def body_bases(
 
 def reduced_bodies(
     bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing | TwoPassPairing],
-    links: Mapping[str, Link], title: str,
+    links: Mapping[str, LinkSettings], bodies: Mapping[str, ElasticBody], title: str,
 ) -> Reduced:
     """The assembled basis, and the gaps of the geometry, zero for nonlinear springs."""
     with located(f"{title}:"):
-        springs = np.zeros(len(nonlinear_springs(links)))
-        return Reduced(assembled_basis(bases, faces, links), np.concatenate(
+        made = made_links(links, bodies, title)
+        springs = np.zeros(len(nonlinear_springs(made)))
+        return Reduced(assembled_basis(bases, faces, made), np.concatenate(
             [*(one.gaps for one in faces.values()), springs]))

@@ -10,7 +10,6 @@ from fecontact.core.tables import located
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing, TwoPassPairing
-from fecontact.reduction.assembly.links import Link
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import (
     BodySections,
@@ -23,6 +22,7 @@ from fecontact.study.bodies_section import (
     reduced_bodies,
 )
 from fecontact.study.geometry_section import Geometry, geometry_mesh
+from fecontact.study.links_section import LinkSettings
 from fecontact.study.sections import BasisSettings, BodySettings
 
 # Cached objects of a study, and that on which each depends.
@@ -49,7 +49,7 @@ class StudyModels:
     basis: BasisSettings
     bodies: Mapping[str, BodySections]
     interfaces: Mapping[str, InterfaceSettings]
-    links: Mapping[str, Link]
+    links: Mapping[str, LinkSettings]
     path: Path | None
 
     @property
@@ -154,7 +154,8 @@ class StudyModels:
     @cached_property
     def _reduced(self) -> Reduced:
         if self.bodies:
-            return reduced_bodies(self._bases, self._pairings, self.links, self.title)
+            return reduced_bodies(self._bases, self._pairings, self.links, self._bodies,
+                                  self.title)
         body = self._body
         with located(f"{self.title}: [basis]:"):
             return Reduced(self.basis.modal_basis(body, self.body.rotation))

@@ -113,7 +113,9 @@ def system_fields(
     springs = nonlinear_springs(links or ())
     _require_joined(bodies, given, [*(links.values() if isinstance(links, Mapping) else links
                                       or ())])
-    friction, gaps, first = {}, [], 0
+    friction: dict[str, FrictionLaw] = {}
+    gaps: list[Array] = []
+    first = 0
     for name, count in basis.groups:
         nodes = slice(first, first + count)
         first += count

@@ -14,6 +14,7 @@ from fecontact.fem.pairing import pair_faces
 from fecontact.laws import ConstantFriction, RoughSurface, SlidingTranslation
 from fecontact.reduction import (
     CubicSpring,
+    FaceWeld,
     PiecewiseSpring,
     PlaySpring,
     Spring,
@@ -421,3 +422,45 @@ def test_a_study_of_bodies_that_only_a_nonlinear_spring_joins(study):
     with pytest.raises(fc.InputError, match=r"\[links\.mount\]: stiffness and cubic_stiffness"):
         fc.Study.from_tables({**tables, "links": {
             "mount": {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0]}}})
+
+
+def welded_study(study, **weld):
+    """The pad welded on the block, with a nonlinear spring at its corner."""
+    tables = study.tables(defaults=False)
+    del tables["interfaces"]
+    tables["bodies"]["pad"]["basis"]["points"] = {"P": [0.09, 0.06]}
+    tables["links"] = {
+        "seam": {"kind": "face-weld", "first": "pad.contact", "second": "block.top", **weld},
+        "mount": {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0],
+                  "stiffness": 1e6, "cubic_stiffness": 1e14}}
+    return tables
+
+
+@pytest.mark.parametrize("nodes", ["all", 6])
+def test_faces_are_welded_in_a_study(study, nodes):
+    described = fc.Study.from_tables(welded_study(study, nodes=nodes))
+    bodies = described.elastic_bodies()
+    weld = FaceWeld(pair_faces(bodies, "pad.contact", "block.top", nodes=nodes))
+    mount = described.links["mount"]
+    bases = reduce_bodies(bodies, links={"seam": weld, "mount": mount}, modes=4, each={
+        "block": {"damping": 0.02}, "pad": {"damping": 0.05, "B": "left", "C": "top",
+                                                "points": {"P": (0.09, 0.06)}}})
+    basis = assembled_basis(bases, {}, {"seam": weld, "mount": mount})
+    found = described.system().basis
+    assert (found.angular_frequencies == basis.angular_frequencies).all()
+    assert found.rigid_modes == 0
+    assert found.groups == (("mount", 1),)
+    assert fc.Study.from_toml(described.to_toml()) == described
+    assert np.isfinite(described.run().normal_force).all()
+
+
+@pytest.mark.parametrize(("weld", "message"), [
+    ({"second": "block.left"}, r"\[links\.seam\]:"),
+    ({"second": "blok.top"}, r"\[links\.seam\]: second = \"blok\.top\": there is no body 'blok'"),
+    ({"second": "block.tp"}, "tp"),
+    ({"nodes": 0}, r"\[links\.seam\]: nodes"),
+    ({"reach": -1.0}, r"\[links\.seam\]: reach"),
+])
+def test_bad_welds_of_faces_are_explained(study, weld, message):
+    with pytest.raises(fc.FecontactError, match=message):
+        fc.Study.from_tables(welded_study(study, **weld)).system()

@@ -175,12 +175,14 @@ def assembled_basis(
     _check_bodies(bases)
     for name in pairings:
         _check_name("interface", name)
-    contacts, counts = [], []
+    contacts, counts, halves = [], [], []
     for name, pairing in pairings.items():
         with located(f"Interface '{name}':", "PointPairing"):
             made = [_contact(bases, one) for one in pairing.passes]
         contacts += made
         counts.append(sum(len(one.tributary) for one in made))
+        if len(made) > 1:
+            halves.append((name, len(made[0].tributary)))
     springs = nonlinear_springs(links)
     for name, spring in springs.items():
         _check_name("link", name)
@@ -230,8 +232,7 @@ def assembled_basis(
                             sizes).astype(bool),
         parts=places.parts,
         springs=tuple(springs),
-        first_passes=tuple((name, len(one.passes[0].gaps)) for name, one in pairings.items()
-                           if len(one.passes) > 1),
+        first_passes=tuple(halves),
     )
     joints = [link for link in (links.values() if isinstance(links, Mapping) else links)
               if not isinstance(link, NonlinearSpring)]

@@ -20,6 +20,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
+from fecontact.laws.base import NormalLaw
 from fecontact.reduction.assembly.face_weld import FaceWeld, welded_rows
 from fecontact.reduction.eigenmodes import fixed_signs
 from fecontact.reduction.modal_basis import ModalBasis
@@ -84,6 +85,11 @@ class NonlinearSpring:
     first: str
     second: str | None
     direction: tuple[float, float] | None
+
+    @property
+    def law(self) -> NormalLaw:
+        """Law of its node, whose normal force is minus the tension."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -217,7 +223,10 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     damping = np.array(basis.damping)
     load = np.zeros(m) if basis.link_load is None else np.array(basis.link_load)
     for link in links:
-        require_kind("Links", (Spring, Bushing, Hinge, FaceWeld), link=link)
+        require_kind("Links", (Spring, Bushing, Hinge, FaceWeld, NonlinearSpring), link=link)
+        if isinstance(link, NonlinearSpring):
+            raise InputError(f"{_described(link)} is nonlinear and no part of the modes; give it "
+                             f"to assembled_basis or ContactSystem, links=.")
         if isinstance(link, FaceWeld):
             held.append(_felt(link, welded_rows(basis, link)))
             continue

@@ -42,7 +42,7 @@ class _LawSpring(NonlinearSpring):
             given = {entry.name: getattr(self, entry.name) for entry in fields(kind)}
             require_finite(kind.__name__, **{
                 name: value for name, value in given.items() if name not in kind.shared_fields})
-            return kind(**given)  # type: ignore[no-any-return]
+            return kind(**given)
 
 
 @dataclass(frozen=True)
