@@ -25,6 +25,7 @@ from fecontact.reduction import (
     point_masses,
     reduce_bodies,
 )
+from fecontact.reduction.assembly.contact_faces import contact_sides
 from fecontact.system.parameter_labels import parameter_label
 
 UP = (0.0, 1.0)
@@ -232,6 +233,12 @@ def test_springs_are_no_contact_in_what_is_shown(tmp_path):
     assert dict(system.summary())["friction"] == "ConstantFriction (joint)"
     from rich.console import Console
 
+    # In movies its end on the pad moves as the pad does there, along the spring.
+    own, feet = contact_sides(system.basis)
+    moved = system.basis.mode_shapes.shapes.reshape(-1, system.basis.modes)
+    for rows, name in ((own, "pad.head"), (feet, "base.foot")):
+        assert rows[-1] @ moved == pytest.approx(
+            system.basis.T[system.basis.point_index(name), 1], abs=1e-10)
     text = io.StringIO()
     Console(file=text, width=200).print(run_table(run))
     assert "bolt: pad and base" in text.getvalue()

@@ -87,13 +87,13 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
             first, nodes=slice(first.nodes.start, one.nodes.stop), nodes_on="",
             abscissa=np.append(first.abscissa, one.abscissa),
             axis="x" if first.axis == one.axis == "x" else "s",
-            tributary=np.append(first.tributary, one.tributary))
+            tributary=0.5 * np.append(first.tributary, one.tributary))
     return tuple(found.values())
 
 
 def _passes(basis: ModalBasis) -> tuple[ContactFace, ...]:
-    """As :func:`contact_faces`, but one for each pass of interfaces of two."""
-    x, length = basis.contact_x, basis.tributary
+    """As :func:`contact_faces`, but one for each pass of interfaces of two, with whole lengths."""
+    x, length = basis.contact_x, np.array(basis.tributary)
     if not several_bodies(basis):
         return (ContactFace("", (), slice(0, len(x)), x, "x", length),)
     ground, (tangents, normals) = basis.ground_nodes, contact_directions(basis)
@@ -105,6 +105,7 @@ def _passes(basis: ModalBasis) -> tuple[ContactFace, ...]:
     for name, size in sizes:
         nodes = slice(first, first + size)
         first += size
+        length[nodes] *= 2.0 if name in halves else 1.0
         flat = bool(ground[nodes].all() or np.abs(normals[nodes, 0]).max(initial=0.0) < _FLAT)
         abscissa = x[nodes] if flat else _arc_length(places[nodes], normals[nodes],
                                                      tangents[nodes], length[nodes])
@@ -157,7 +158,7 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
     -------
     (sparse (2 n, 2 N), sparse (2 n, 2 N))
         Along x and y, node by node. What lies on the other side enters the relative rows with
-        weights of sum -1; rows of feet on the ground are zero.
+        weights below zero; rows of feet on the ground are zero.
     """
     import scipy.sparse as sp
     from scipy.sparse.csgraph import connected_components
@@ -170,7 +171,8 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
     turned = sp.bsr_array((np.stack([tangents, normals], axis=2), np.arange(n), np.arange(n + 1)),
                           shape=(2 * n, 2 * n))
     both = sp.csr_array(turned @ local)
-    weights = sp.coo_array(both[::2][:, ::2])
+    # Of nonlinear springs only the parts along their direction.
+    weights = sp.coo_array(both[::2][:, ::2] + both[1::2][:, 1::2])
     weights.sum_duplicates()
     row, node = weights.coords
     # Mesh nodes of one side hang together along the outline, also where a body touches itself.
