@@ -18,7 +18,7 @@ from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
 from fecontact.reduction.assembly.face_weld import FaceWeld
-from fecontact.reduction.assembly.links import Bushing, Link, Weld
+from fecontact.reduction.assembly.links import Bushing, Link, Links, Weld
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.reduction.modal_basis import ModalBasis
@@ -164,7 +164,7 @@ def modal_basis(
 def reduce_bodies(
     bodies: Mapping[str, ElasticBody],
     pairings: Sequence[Pairing | TwoPassPairing] = (),
-    links: Sequence[Link] | Mapping[str, Link] = (),
+    links: Links = (),
     *,
     modes: int | Mapping[str, int] = 20,
     each: Mapping[str, Mapping[str, Any]] | None = None,

@@ -11,7 +11,14 @@ from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.pairing import pair_faces
 from fecontact.reduction.assembly.face_weld import FaceWeld
-from fecontact.reduction.assembly.links import Bushing, Hinge, Link, Spring, Weld
+from fecontact.reduction.assembly.links import (
+    Bushing,
+    Hinge,
+    Link,
+    NonlinearSpring,
+    Spring,
+    Weld,
+)
 from fecontact.reduction.assembly.nonlinear_springs import (
     CubicSpring,
     PiecewiseSpring,
@@ -43,7 +50,7 @@ class FaceWeldSettings:
         require_kind("FaceWeldSettings", str, first=self.first, second=self.second)
 
 
-LinkSettings = Link | FaceWeldSettings
+LinkSettings = Spring | Bushing | Hinge | NonlinearSpring | FaceWeldSettings
 
 LINKS: Mapping[str, type] = {
     "spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld,

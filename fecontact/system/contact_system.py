@@ -18,7 +18,7 @@ from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
-from fecontact.reduction.assembly.links import Link
+from fecontact.reduction.assembly.links import Links
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
@@ -118,11 +118,11 @@ class ContactSystem(Summarised):
     sliding: Mapping[str, Sliding] = field(default_factory=dict)
     bodies: InitVar[Mapping[str, ModalBasis] | None] = None
     interfaces: InitVar[Sequence[Interface] | None] = None
-    links: InitVar[Sequence[Link] | Mapping[str, Link] | None] = None
+    links: InitVar[Links | None] = None
 
     def __post_init__(
         self, bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-        links: Sequence[Link] | Mapping[str, Link] | None,
+        links: Links | None,
     ) -> None:
         if bodies is not None or interfaces is not None or links is not None:
             if any(getattr(self, name) is not None for name in ("basis", "normal", "friction")):

@@ -24,7 +24,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import PointPairing, assembled_basis
-from fecontact.reduction.assembly.links import Link
+from fecontact.reduction.assembly.links import Link, Links
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
@@ -87,7 +87,7 @@ class Interface:
 
 def system_fields(
     bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-    links: Sequence[Link] | Mapping[str, Link] | None,
+    links: Links | None,
 ) -> dict[str, Any]:
     """Basis, laws, gap and sliding of a contact system of several bodies.
 

@@ -123,10 +123,7 @@ def equilibrium(
 def _among_springs(
     system: ContactSystem, problem: "Balance", solution: Array | None, friction: bool
 ) -> Array | None:
-    """An equilibrium beside nonlinear springs, which may soften: their energy is not convex.
-
-    From a place that is none, or that is unstable, downhill to a stable one.
-    """
+    """A stable equilibrium beside springs that may soften, whose energy is not convex."""
     if solution is not None and (friction or problem.stable(solution)):
         return solution
     start = np.zeros(system.basis.modes) if solution is None else solution
@@ -181,7 +178,8 @@ class Balance:
         self.face_force = values + self.face_stiffness * (
             undisplaced[:, kernels.PENETRATION] - far)
         # Of preloaded springs, which cancel within their law.
-        self._initial = np.abs(arrays.Ty).T @ np.abs(undisplaced[:, kernels.NORMAL_FORCE])
+        self._initial = np.abs(arrays.Ty).T @ np.where(
+            arrays.on_ground, 0.0, np.abs(undisplaced[:, kernels.NORMAL_FORCE]))
         tangential = (arrays.Tx**2).T @ self.face_stiffness
         normal = (arrays.Ty**2).T @ self.face_stiffness
         diagonal = np.abs(np.diag(arrays.stiffness))

@@ -16,7 +16,7 @@ from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array, ArrayLike
 from fecontact.fem.pairing import Pairing, TwoPassPairing
-from fecontact.reduction.assembly.links import Link, NonlinearSpring, linked
+from fecontact.reduction.assembly.links import Links, NonlinearSpring, linked
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
@@ -143,7 +143,7 @@ class _Contact:
 def assembled_basis(
     bases: Mapping[str, ModalBasis],
     pairings: Mapping[str, Pairing | TwoPassPairing | PointPairing],
-    links: Sequence[Link] | Mapping[str, Link] = (),
+    links: Links = (),
 ) -> ModalBasis:
     """One basis of several bodies, for a contact system of all of them.
 

@@ -5,11 +5,12 @@ space of G; springs add ``k r^T r`` for the row r of their elongation. Stiffness
 left have the eigenmodes P, by which all rows are multiplied.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import as_floats, as_unit_pair, require_kind
 from fecontact.core.errors import (
@@ -169,6 +170,8 @@ class Weld(Hinge):
 
 
 Link = Spring | Bushing | Hinge | FaceWeld | NonlinearSpring
+# Names are of use for nonlinear springs, whose groups and parameters have them.
+Links = TypeAliasType("Links", Sequence[Link] | Mapping[str, Link])
 
 
 def _check_points(link: "Link") -> None:

@@ -4,7 +4,7 @@ They are no part of the stiffness matrix. Each becomes one node of the system wh
 the elongation along its direction, with a law that pulls as well as pushes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, ClassVar
 
@@ -20,7 +20,7 @@ from fecontact.laws.normal.bilateral import (
     BilateralPiecewise,
     BilateralPlay,
 )
-from fecontact.reduction.assembly.links import Link, NonlinearSpring, check_ends, spring_direction
+from fecontact.reduction.assembly.links import Links, NonlinearSpring, check_ends, spring_direction
 from fecontact.reduction.modal_basis import ModalBasis
 
 
@@ -201,7 +201,7 @@ class PiecewiseSpring(_LawSpring):
 
 
 def nonlinear_springs(
-    links: Sequence[Link] | Mapping[str, Link]
+    links: Links
 ) -> dict[str, NonlinearSpring]:
     """The nonlinear springs among links by name; those of a sequence are ``spring_1`` and on."""
     if isinstance(links, Mapping):
