@@ -130,7 +130,8 @@ def system_fields(
                              f"coefficients, such as ConstantFriction(0.0) for no friction.")
         friction[name] = ConstantFriction(0.0) if one.friction is None else one.friction
         with located(f"Interface '{name}':"):
-            gaps.append(one.pairing.gaps + np.asarray(gap_values(one.gap, basis.contact_x[nodes])))
+            gaps.append(np.asarray(one.pairing.gaps, dtype=float)
+                        + np.asarray(gap_values(one.gap, basis.contact_x[nodes])))
     return {
         "basis": basis,
         "normal": {**{name: one.normal for name, one in given.items()},

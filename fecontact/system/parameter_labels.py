@@ -8,7 +8,6 @@ from typing import Any, get_args, get_type_hints
 
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw
-from fecontact.laws.normal.bilateral import BilateralLaw
 from fecontact.laws.registry import is_kind, law_names
 from fecontact.system.contact_system import ContactSystem
 
@@ -29,8 +28,9 @@ def parameter_label(name: str, owner: type = ContactSystem) -> str:
 def _units(owner: type) -> dict[str, frozenset[str]]:
     """Units of each dotted name; several or none if laws differ."""
     found: dict[str, set[str]] = {"gap": {"m"}}
-    for law in law_names()[NormalLaw].values():
-        if issubclass(law, BilateralLaw):
+    laws: Any = law_names()[NormalLaw]
+    for law in laws.values():
+        if law.bilateral:
             found |= {f"links.{name}": {unit} for name, unit in _units_of(law).items()}
     for entry, hint in get_type_hints(owner).items():
         section = entry.removesuffix("_settings")

@@ -32,6 +32,8 @@ def _felt(tension, slope, damping):
 class BilateralLaw(NormalLaw):
     """Law of a spring between two points; see :mod:`fecontact.laws.normal.bilateral`."""
 
+    bilateral: ClassVar = True
+
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the spring [J], zero at u = 0."""
         table = self.table(share)
