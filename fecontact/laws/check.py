@@ -84,8 +84,9 @@ def check_law(law: NormalLaw | FrictionLaw) -> None:
 
     - values are finite;
     - derivatives agree with finite differences, at a kink with either side or a value between;
-    - normal laws do not pull at u > 0 (unless their class says ``bilateral = True``), their elastic force F(u, 0) does not decrease, their damping
-      dissipates energy, and the stored energy is the integral of F(u, 0) and not negative;
+    - normal laws do not pull at u > 0 (unless their class says ``bilateral = True``), their
+      elastic force F(u, 0) does not decrease, their damping dissipates energy, and the stored
+      energy is the integral of F(u, 0) and not negative;
     - friction is zero without normal force; without memory it opposes the slip velocity, with
       memory every cycle of slip dissipates energy.
 
